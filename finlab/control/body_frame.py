@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control.completion import Completion
+from finlab.control.completion import Completion, axes_of
 from finlab.control.measurement import Controller, Measurement, Setpoint
 from finlab.control.observer import MotionObserver, strongest_wrench
-from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController, axes_of
+from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
@@ -152,9 +152,9 @@ class WaypointController:
         """Forget the pose."""
         self._observer = MotionObserver(self.layout, self.period_s)
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
-        """Returns the wrench (6,) towards the waypoint [N, N m]; `given` is that of the actuators so far."""
-        g, now = self.gains, self._observer.step(measurement, given)
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
+        """Returns the wrench (6,) towards the waypoint [N, N m]; `delivered` is that of the fins so far."""
+        g, now = self.gains, self._observer.step(measurement, delivered)
         ahead = setpoint.velocity * g.lead_s + setpoint.acceleration * (0.5 * g.lead_s**2)
         dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
         distance = math.hypot(dx, dy)
@@ -213,7 +213,7 @@ class VelocityController:
         self.surge, self.depth = (Pid(gains, self.period_s) for gains in (self.gains.surge, self.gains.depth))
         self._speed: float | None = None
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) that keeps speed and depth [N, N m]."""
         seen, share = float(measurement.velocity[0]), 1.0 - math.exp(-self.period_s / FILTER_S)
         self._speed = seen if self._speed is None else self._speed + share * (seen - self._speed)

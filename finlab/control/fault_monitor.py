@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.rates import Rates
 from finlab.arrays import Array
-from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses
+from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
 from finlab.control.measurement import Measurement
-from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
@@ -186,8 +185,8 @@ class FaultMonitor:
         broken = self._lost | self._torn | stuck
         if True in broken.tolist():
             # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
-            whole = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
-            probability = np.where(broken, 1.0 - whole, probability)
+            works = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
+            probability = np.where(broken, 1.0 - works, probability)
             damage = self._damage(strength)
         return Diagnosis(damage, probability, strength, beliefs.strength_std)
 

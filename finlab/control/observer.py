@@ -16,7 +16,7 @@ import numpy as np
 
 from finlab.actuators.fin.response import fin_table
 from finlab.arrays import Array
-from finlab.control.measurement import Measurement
+from finlab.control.measurement import Measurement, Setpoint
 from finlab.layout import Body, Fin, Layout, Rudder
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
@@ -150,11 +150,10 @@ class MotionObserver:
             return now
         known = np.array([now, *past])
         back = np.minimum(np.array(ages) / self._dt, len(past))
-        whole = np.minimum(back.astype(int), len(past) - 1)
-        each = np.arange(len(now))
-        after, before = known[whole, each], known[whole + 1, each]
-        found: Array = after + (back - whole) * (before - after)
-        return found
+        row, each = np.minimum(back.astype(int), len(past) - 1), np.arange(len(now))
+        after, before = known[row, each], known[row + 1, each]
+        then: Array = after + (back - row) * (before - after)
+        return then
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
@@ -169,6 +168,27 @@ class MotionObserver:
         surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
         rates = damping_rates(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         return np.stack([rates[k] for k in AXES], axis=-1) * motion
+
+    def wrenches_along(self, setpoints: Sequence[Setpoint], current: Array, slow: float) -> Array:
+        """Wrenches (K, 6) [N, N m] of a robot that moves as K setpoints say, at least two, nose ahead.
+
+        Args:
+            setpoints: a period apart.
+            current: horizontal velocity (2,) of the water in the world [m/s].
+            slow: speed through the water [m/s] below which turning counts less and less.
+        """
+        velocity = np.array([setpoint.velocity for setpoint in setpoints])
+        acceleration = np.array([setpoint.acceleration for setpoint in setpoints])
+        (x, y), (ax, ay) = (velocity[:, :2] - current).T, acceleration[:, :2].T
+        speed = np.hypot(x, y)
+        turning = (x * ay - y * ax) / np.maximum(speed * speed, slow * slow)
+        faster = (x * ax + y * ay) / np.maximum(speed, 1e-3)
+        rest = np.zeros(len(speed))
+        motion = np.stack([speed, rest, velocity[:, 2], turning], axis=-1)
+        changes = np.stack([faster, rest, acceleration[:, 2], np.gradient(turning, self._dt)], axis=-1)
+        result = np.zeros((len(speed), 6))
+        result[:, AXES] = self.inertia * (changes + self.slowed_by(motion))
+        return result
 
     def _seen(self, m: Measurement) -> Array:
         return np.array([*m.velocity.tolist(), float(m.rates[2])])

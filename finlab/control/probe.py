@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.control.monitor_settings import MonitorSettings
+from finlab.control.hypotheses import MonitorSettings
 from finlab.layout import Azimuth, Fin, Layout, Rudder
 from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of

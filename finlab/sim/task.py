@@ -62,10 +62,7 @@ class Trajectory:
 
     def position(self, time: float | Array) -> Array:
         """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
-        found = np.empty((*np.shape(time), 3))
-        for k in range(3):
-            found[..., k] = np.interp(time, self.time, self.samples[:, k])
-        return found
+        return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
 
     def setpoint(self, time: float) -> Setpoint:
         """Position, velocity and acceleration at `time` [s]; after the end at rest."""
