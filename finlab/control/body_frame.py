@@ -3,7 +3,7 @@
 Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated marine
 robots", section 3, whose formulas stand in its text without numbers; each docstring names its subsection.
 The paper prints no gains. Ours follow from the robot's model and from how late its actuators are, by one rule
-for all robots (`waypoint_gains`, `velocity_gains`), and were not tuned on a path.
+for all robots, and were not tuned on a path.
 """
 
 import math
@@ -56,31 +56,6 @@ class WaypointGains:
     """Largest wrench (6,) [N, N m]."""
 
 
-@dataclass(frozen=True)
-class PidGains:
-    """Of one loop: force [N] per error, per its integral [s] and per its rate."""
-
-    proportional: float
-    integral: float
-    derivative: float
-    most: float
-    """Largest force [N]."""
-
-
-@dataclass(frozen=True)
-class VelocityGains:
-    """Of `VelocityController`."""
-
-    surge: PidGains
-    """Of the speed [N s/m]."""
-    depth: PidGains
-    """Of the depth [N/m]."""
-    yaw_damping: float
-    """Against the yaw rate [N m s/rad]."""
-    max_yaw: float
-    """Largest torque about z [N m]."""
-
-
 def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]:
     """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the inertia (4,),
     the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
@@ -111,23 +86,6 @@ def waypoint_gains(layout: Layout) -> WaypointGains:
         heave_damping=float(damping[2]),
         yaw_damping=max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0),
         max_wrench=tuple(most.tolist()),
-    )
-
-
-def velocity_gains(layout: Layout) -> VelocityGains:
-    """The gains for one robot, by poles: speed a damped oscillator of `SPEED`, whose derivative gain adds a
-    tenth of the mass; depth one of `SLOW` with a third pole, of its integral, at half of that."""
-    pace, inertia, drag, most = _model(layout, VelocityController.period_s)
-    slow, fast = SLOW * pace, SPEED * pace
-    mass = 1.1 * float(inertia[0])
-    surge = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0), fast**2 * mass
-    a, b, heavy = 2.0 * DAMPING * slow, 0.5 * slow, float(inertia[2])
-    depth = heavy * (slow**2 + a * b), heavy * slow**2 * b, max(heavy * (a + b) - float(drag[2]), 0.0)
-    return VelocityGains(
-        surge=PidGains(*surge, 0.1 * float(inertia[0]), float(most[0])),
-        depth=PidGains(*depth, float(most[2])),
-        yaw_damping=float(inertia[3]) * TURN * pace,
-        max_yaw=float(most[5]),
     )
 
 
@@ -167,28 +125,46 @@ class WaypointController:
         return wrench
 
 
+@dataclass
 class Pid:
     """A PID loop in discrete time that does not wind up: its integral rests while the force is bounded and
     the error would push further."""
 
-    def __init__(self, gains: PidGains, period_s: float) -> None:
-        """Takes gains and the time between calls [s]."""
-        self.gains, self._dt = gains, period_s
-        self._share = 1.0 - math.exp(-period_s / FILTER_S)
-        self.integral, self._rate = 0.0, 0.0
-        """What the integral gives [N], and the filtered rate of the error."""
+    proportional: float
+    """Force [N] per error."""
+    integral: float
+    """Per integral of the error over time [s]."""
+    derivative: float
+    """Per rate of the error, which is filtered."""
+    most: float
+    """Largest force [N]."""
+    period_s: float = 0.1
+    """Time between calls [s]."""
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the errors."""
+        self.summed, self._rate = 0.0, 0.0
+        """What the integral gives [N], and the filtered rate."""
         self._last: float | None = None
 
     def step(self, error: float) -> float:
         """Takes an error and returns the force [N]."""
-        g = self.gains
-        rate = 0.0 if self._last is None else (error - self._last) / self._dt
-        self._rate, self._last = self._rate + self._share * (rate - self._rate), error
-        wanted = g.proportional * error + self.integral + g.derivative * self._rate
-        force = min(max(wanted, -g.most), g.most)
+        rate = 0.0 if self._last is None else (error - self._last) / self.period_s
+        self._rate += filter_share(self.period_s) * (rate - self._rate)
+        self._last = error
+        wanted = self.proportional * error + self.summed + self.derivative * self._rate
+        force = min(max(wanted, -self.most), self.most)
         if force == wanted or error * wanted < 0.0:
-            self.integral += g.integral * error * self._dt
+            self.summed += self.integral * error * self.period_s
         return force
+
+
+def filter_share(period_s: float) -> float:
+    """Share of a difference that a filter of `FILTER_S` closes in a period [s]."""
+    return 1.0 - math.exp(-period_s / FILTER_S)
 
 
 class VelocityController:
@@ -197,30 +173,45 @@ class VelocityController:
     Fx by PID of the speed, DVL's after a low-pass filter; Fz by PID of the depth, from the pressure;
     Tz = -k_r r against the IMU's yaw rate; all within bounds. It takes speed and depth of the path, not its
     course: the robot goes where its nose points.
+
+    Gains by poles: the speed is a damped oscillator of `SPEED`, whose derivative gain adds a tenth of the
+    mass; the depth one of `SLOW` with a third pole, of its integral, at half of that.
     """
 
     name = "velocity"
     period_s = 0.1
 
-    def __init__(self, layout: Layout, gains: VelocityGains | None = None) -> None:
-        """Takes the robot and gains; by default those of `velocity_gains`. Errors as `make_controller`."""
+    def __init__(self, layout: Layout) -> None:
+        """Takes the robot; errors as `make_controller`."""
         self.axes, self.free = _axes(layout, self.name)
-        self.layout, self.gains = layout, velocity_gains(layout) if gains is None else gains
+        pace, inertia, drag, most = _model(layout, self.period_s)
+        slow, fast = SLOW * pace, SPEED * pace
+        mass, heavy = 1.1 * float(inertia[0]), float(inertia[2])
+        damped = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0)
+        self.surge = Pid(damped, fast**2 * mass, 0.1 * float(inertia[0]), float(most[0]), self.period_s)
+        a, b = 2.0 * DAMPING * slow, 0.5 * slow
+        damped = max(heavy * (a + b) - float(drag[2]), 0.0)
+        spring = heavy * (slow**2 + a * b)
+        self.depth = Pid(spring, heavy * slow**2 * b, damped, float(most[2]), self.period_s)
+        self.yaw_damping, self.max_yaw = float(inertia[3]) * TURN * pace, float(most[5])
+        """k_r [N m s/rad], and the largest torque about z [N m]."""
         self.reset()
 
     def reset(self) -> None:
         """Forget speed and integrals."""
-        self.surge, self.depth = (Pid(gains, self.period_s) for gains in (self.gains.surge, self.gains.depth))
+        self.surge.reset()
+        self.depth.reset()
         self._speed: float | None = None
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) that keeps speed and depth [N, N m]."""
-        seen, share = float(measurement.velocity[0]), 1.0 - math.exp(-self.period_s / FILTER_S)
-        self._speed = seen if self._speed is None else self._speed + share * (seen - self._speed)
-        g, wrench = self.gains, np.zeros(6)
+        seen = float(measurement.velocity[0])
+        before = seen if self._speed is None else self._speed
+        self._speed = before + filter_share(self.period_s) * (seen - before)
+        wrench = np.zeros(6)
         wrench[0] = self.surge.step(setpoint.surge - self._speed)
         wrench[2] = self.depth.step(float(setpoint.position[2]) + measurement.depth)
-        wrench[5] = min(max(-g.yaw_damping * float(measurement.rates[2]), -g.max_yaw), g.max_yaw)
+        wrench[5] = min(max(-self.yaw_damping * float(measurement.rates[2]), -self.max_yaw), self.max_yaw)
         return wrench
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from finlab.actuators.fin.response import fin_table
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement, Setpoint
-from finlab.layout import Body, Fin, Layout, Rudder
+from finlab.layout import Fin, Layout, Rudder
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
@@ -85,11 +85,9 @@ class Estimate(NamedTuple):
 class MotionObserver:
     """Watches one robot; to be called once a period."""
 
-    def __init__(self, layout: Layout, period_s: float, body: Body | None = None) -> None:
-        """Takes a layout, the time between calls [s] and the body; by default the layout's, completed by
-        U-CAT's."""
-        body = complete_body(layout) if body is None else body
-        self._vehicle, self._dt = Vehicle(body), period_s
+    def __init__(self, layout: Layout, period_s: float) -> None:
+        """Takes a layout, whose body is completed by U-CAT's, and the time between calls [s]."""
+        self._vehicle, self._dt = Vehicle(complete_body(layout)), period_s
         self._dynamics = self._vehicle.dynamics
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""

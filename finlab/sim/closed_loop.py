@@ -214,20 +214,18 @@ class ClosedLoop:
         self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
         if kind == "stuck" and index in self.motion.of_fins:
             self.fins.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
-        for known in (self.broken, self._told) if self._tells(announced) else (self.broken,):
+        tells = self.announced if announced is None else announced
+        for known in (self.broken, self._told) if tells else (self.broken,):
             known.pop(name, None)
             if kind != "whole":
                 known[name] = fault
-        if self._tells(announced) and self.monitor is not None:
+        if tells and self.monitor is not None:
             strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
             self.verdict = self.monitor.tell(name, strength, self._held[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
         """An actuator works again as it should; a `LayoutError` where there is none of that name."""
         self.fail(name, "whole", announced=announced)
-
-    def _tells(self, announced: bool | None) -> bool:
-        return self.announced if announced is None else announced
 
     def step(self) -> Tick:
         """Swims for one control period and returns what happened."""

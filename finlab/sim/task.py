@@ -166,12 +166,14 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
     """A shipped trajectory by name, or one from a file.
 
     Args:
-        source: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        source: circle, lissajous, square, dive, straight, station, or a CSV file with the columns t [s] and
+            x, y, z [m], in any order.
         duration_s: time for a shipped one [s]; a file brings its own.
         scale: how many times larger the path is to be, about its start, in the same time.
 
     Raises:
-        DataError: unknown name, unreadable file, or a duration that does not fit.
+        DataError: unknown name, a duration that does not fit, or a file that cannot be read, lacks a column,
+            or holds something that is no number.
     """
     if scale != 1.0:
         if not 0.0 < scale <= MAX_SCALE:
@@ -190,17 +192,8 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
         raise DataError(f"trajectory: expected {', '.join(SHIPPED)} or a CSV file, got {name!r}")
     if duration_s is not None:
         raise DataError(f"duration: {name} brings its own times; leave it out")
-    return read_trajectory(Path(source))
-
-
-def read_trajectory(path: Path) -> Trajectory:
-    """Reads a CSV file with a header and the columns t [s], x, y, z [m], in any order.
-
-    Raises:
-        DataError: it cannot be read, lacks a column, or holds something that is no number.
-    """
-    table = read_table(path, MAX_BYTES, "a CSV file of a path")
-    if missing := [name for name in COLUMNS if name not in table.header]:
-        raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
-    rows, _ = table.numbers([table.header.index(name) for name in COLUMNS])
-    return Trajectory(path.stem, rows[:, 0], rows[:, 1:])
+    table = read_table(Path(source), MAX_BYTES, "a CSV file of a path")
+    if missing := [column for column in COLUMNS if column not in table.header]:
+        raise DataError(f"{source}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
+    rows, _ = table.numbers([table.header.index(column) for column in COLUMNS])
+    return Trajectory(Path(source).stem, rows[:, 0], rows[:, 1:])

@@ -15,7 +15,7 @@ from finlab.control import (
     make_controller,
     steerable_loss,
 )
-from finlab.control.body_frame import Pid, PidGains
+from finlab.control.body_frame import Pid
 from finlab.control.measurement import NO_WRENCH
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
@@ -78,26 +78,26 @@ def test_the_yaw_rate_is_damped_and_bounded() -> None:
     controller = VelocityController(load_layout("A"))
     turning = AT_REST._replace(rates=np.array([0.0, 0.0, 0.2]))
     wrench = controller.wrench(turning, Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH)
-    np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.gains.yaw_damping], atol=1e-9)
+    np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.yaw_damping], atol=1e-9)
     spun = AT_REST._replace(rates=np.array([0.0, 0.0, -99.0]))
     wrench = controller.wrench(spun, Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)
-    bounds = controller.gains.surge.most, controller.gains.depth.most, controller.gains.max_yaw
+    bounds = controller.surge.most, controller.depth.most, controller.max_yaw
     np.testing.assert_allclose(wrench[[0, 2, 5]], bounds)
 
 
 def test_a_bounded_force_does_not_wind_up_the_integral() -> None:
-    pid = Pid(PidGains(2.0, 1.0, 0.0, most=3.0), 0.1)
+    pid = Pid(2.0, 1.0, 0.0, most=3.0)
     held = [pid.step(5.0) for _ in range(600)]  # as of a robot that is held fast for a minute
-    assert held == [3.0] * 600 and abs(pid.integral) < 3.0
-    assert pid.step(-0.1) < 3.0 and pid.integral < 3.0
+    assert held == [3.0] * 600 and abs(pid.summed) < 3.0
+    assert pid.step(-0.1) < 3.0 and pid.summed < 3.0
 
 
 def test_an_integral_makes_up_for_a_force_that_stays() -> None:
-    pid, height, climb = Pid(PidGains(2.0, 1.0, 3.0, most=5.0), 0.1), 0.0, 0.0
+    pid, height, climb = Pid(2.0, 1.0, 3.0, most=5.0), 0.0, 0.0
     for _ in range(600):
         climb += 0.1 * (pid.step(-height) - 1.5 - climb)
         height += 0.1 * climb
-    assert height == pytest.approx(0.0, abs=1e-3) and pid.integral == pytest.approx(1.5, abs=0.01)
+    assert height == pytest.approx(0.0, abs=1e-3) and pid.summed == pytest.approx(1.5, abs=0.01)
 
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "tracking"])
