@@ -155,7 +155,7 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
         monitor._judge(nowhere)
         assert monitor.verdict().damage == Damage()
     monitor._judge(nowhere)
-    assert monitor.broken == (layout_a.names[2],), "the second in a row decides"
+    assert monitor.verdict().damage.failed == (layout_a.names[2],), "the second in a row decides"
 
 
 @pytest.mark.parametrize("truth", ["ripple", "askew"])
