@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.control import CONTROLLERS
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
@@ -60,6 +61,7 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
     ("key", "wrong"),
     [
         ("scenario", "hexa"),
+        ("controller", "pd"),
     ],
 )
 def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
@@ -100,3 +102,13 @@ def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
     assert (
         moment.figures is not None and moment.figures.mean_w >= 0.0 and moment.motion.shape == (layout.n, 3)
     )
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_swim_has_the_controller_that_is_chosen(controller: str) -> None:
+    settings = SwimSettings().with_value("controller", controller)
+    plan = settings.plan(State(UCAT))
+    assert closed_loop(plan, Allocator(UCAT)).controller.name == controller
+    if controller != "tracking":
+        with pytest.raises(FinlabError, match="'torpedo' cannot give"):
+            settings.plan(State(load_layout("torpedo")))
