@@ -3,7 +3,7 @@
 Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated marine
 robots", section 3, whose formulas stand in its text without numbers; each docstring names its subsection.
 The paper prints no gains. Ours follow from the robot's model and from how late its actuators are, by one rule
-for all robots, and were not tuned on a path.
+for all robots.
 """
 
 import math
@@ -34,28 +34,6 @@ FILTER_S = 0.3
 """Time constant of the filters of the measured speed and of derivatives [s]."""
 
 
-@dataclass(frozen=True)
-class WaypointGains:
-    """Of `WaypointController`."""
-
-    lead_s: float
-    """How far ahead of now the waypoint runs on its path [s]; at `CRUISE` drag and lead cancel."""
-    surge: float
-    """k_d [N/m]."""
-    heave: float
-    """k_z [N/m]."""
-    yaw: float
-    """k_psi [N m/rad]."""
-    surge_damping: float
-    """Against the speed ahead [N s/m]; 0 as printed."""
-    heave_damping: float
-    """Against the speed of climbing [N s/m]; 0 as printed."""
-    yaw_damping: float
-    """Against the yaw rate [N m s/rad]; 0 as printed."""
-    max_wrench: tuple[float, ...]
-    """Largest wrench (6,) [N, N m]."""
-
-
 def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]:
     """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the inertia (4,),
     the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
@@ -69,41 +47,36 @@ def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]
     )
 
 
-def waypoint_gains(layout: Layout) -> WaypointGains:
-    """The gains for one robot: surge and heave are damped oscillators of `SLOW`, or quicker where the drag
-    alone damps more, and the heading one of `TURN`. The lead makes up for the damping: no steady lag."""
-    pace, inertia, drag, most = _model(layout, WaypointController.period_s)
-    slow, turn = SLOW * pace, TURN * pace
-    lead = 2.0 * DAMPING / slow
-    spring = np.maximum(inertia * slow**2, drag / lead)
-    damping = spring * lead - drag
-    return WaypointGains(
-        lead_s=lead,
-        surge=float(spring[0]),
-        heave=float(spring[2]),
-        yaw=float(inertia[3]) * turn**2,
-        surge_damping=float(damping[0]),
-        heave_damping=float(damping[2]),
-        yaw_damping=max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0),
-        max_wrench=tuple(most.tolist()),
-    )
-
-
 class WaypointController:
     """Heads for a waypoint (section 3, "Trajectory tracking controller").
 
     Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint,
-    Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e. To this the gains may add damping of
-    speed, climb and yaw rate. The waypoint runs `lead_s` ahead on the path; odometry is `MotionObserver`'s.
+    Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e, here with damping of speed, climb and yaw
+    rate (`damping`; zeros are the printed law). The waypoint runs `lead_s` ahead on the path; odometry is
+    `MotionObserver`'s.
+
+    Gains: surge and heave are damped oscillators of `SLOW`, or quicker where the drag alone damps more, and
+    the heading one of `TURN`. The lead makes up for damping and drag: no steady lag.
     """
 
     name = "waypoint"
     period_s = 0.1
 
-    def __init__(self, layout: Layout, gains: WaypointGains | None = None) -> None:
-        """Takes the robot and gains; by default those of `waypoint_gains`. Errors as `make_controller`."""
+    def __init__(self, layout: Layout) -> None:
+        """Takes the robot; errors as `make_controller`."""
+        self.layout = layout
         self.axes, self.free = _axes(layout, self.name)
-        self.layout, self.gains = layout, waypoint_gains(layout) if gains is None else gains
+        pace, inertia, drag, self.most = _model(layout, self.period_s)
+        slow, turn = SLOW * pace, TURN * pace
+        self.lead_s = 2.0 * DAMPING / slow
+        """How far ahead of now the waypoint is [s]."""
+        spring = np.maximum(inertia * slow**2, drag / self.lead_s)
+        damping = spring * self.lead_s - drag
+        self.gains = float(spring[0]), float(spring[2]), float(inertia[3]) * turn**2
+        """k_d [N/m], k_z [N/m] and k_psi [N m/rad]."""
+        yaw = max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0)
+        self.damping = float(damping[0]), float(damping[2]), yaw
+        """Against the speed ahead [N s/m], the climb [N s/m] and the yaw rate [N m s/rad]."""
         self.reset()
 
     def reset(self) -> None:
@@ -112,17 +85,16 @@ class WaypointController:
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) towards the waypoint [N, N m]; `delivered` is that of the fins so far."""
-        g, now = self.gains, self._observer.step(measurement, delivered)
-        ahead = setpoint.velocity * g.lead_s + setpoint.acceleration * (0.5 * g.lead_s**2)
+        now = self._observer.step(measurement, delivered)
+        ahead = setpoint.velocity * self.lead_s + setpoint.acceleration * (0.5 * self.lead_s**2)
         dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
         distance = math.hypot(dx, dy)
         e = float(wrapped(math.atan2(dy, dx) - now.yaw)) * min(1.0, distance / NEAR_M)
-        surge = g.surge * distance * max(0.0, math.cos(e)) - g.surge_damping * float(now.velocity[0])
-        heave = g.heave * dz - g.heave_damping * float(now.world_velocity[2])
-        yaw = g.yaw * e - g.yaw_damping * now.yaw_rate
-        most = np.array(g.max_wrench)
-        wrench: Array = np.array([surge, 0.0, heave, 0.0, 0.0, yaw]).clip(-most, most)
-        return wrench
+        toward = distance * max(0.0, math.cos(e)), dz, e
+        motion = now.velocity[0], now.world_velocity[2], now.yaw_rate
+        wrench = np.zeros(6)
+        wrench[[0, 2, 5]] = np.multiply(self.gains, toward) - np.multiply(self.damping, motion)
+        return np.asarray(wrench.clip(-self.most, self.most))
 
 
 @dataclass
