@@ -91,10 +91,16 @@ def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]
     ]
 
 
-def losses_of(layout: Layout, most: int) -> dict[int, tuple[str, ...] | None]:
-    """For 0 to `most` fins the first that may be lost so that the robot can be steered; None where all of
-    them are needed."""
-    return {count: steerable_loss(layout, count) for count in range(min(most, layout.n - 1) + 1)}
+def losses_of(layout: Layout, counts: Sequence[int]) -> dict[int, tuple[str, ...] | None]:
+    """For each number of fins the first that may be lost so that the robot can be steered; None where all are
+    needed. Numbers that leave no fin are left out.
+
+    Raises:
+        DataError: a negative number.
+    """
+    if min(counts) < 0:
+        raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
+    return {count: steerable_loss(layout, count) for count in counts if count < layout.n}
 
 
 POWER = (

@@ -36,7 +36,7 @@ def run(
     trajectory: str = "lissajous",
     methods: tuple[str, ...] = ("dual", "paper"),
     controllers: tuple[str, ...] = ("tracking", "waypoint"),
-    lost: int = 2,
+    lost: tuple[int, ...] = (0, 1, 2),
     runs: int = 1,
     checkpoint: str | None = None,
     paths: bool = False,
@@ -49,7 +49,7 @@ def run(
         trajectory: circle, lissajous, square, dive, straight, station, or a CSV file with t, x, y, z.
         methods: names as in eval wrench.
         controllers: tracking, waypoint (the paper's), velocity (the paper's, which keeps no course).
-        lost: most fins that are lost, announced from the start; 1 or 2 where the rest can be steered.
+        lost: how many fins are lost, announced from the start; a robot that needs them is left out.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         paths: whether rows have the first run's path (in the JSON alone).
@@ -101,7 +101,7 @@ def _picture(rows: Sequence[Row]) -> "Figure":
 def _printed(rows: Sequence[Row]) -> list[Row]:
     figures, swum = paper_figures(), {row["layout"] for row in rows}
     about = {"controller": "waypoint", "method": "paper's method, printed"}
-    healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
+    healthy = [{"layout": name, "lost": (0,)} | about | row for name, row in figures["trajectory"].items()]
     pool = [
         {"layout": "in the pool", "lost": count} | about | table["ours"]
         for count, table in enumerate(figures["fault_tolerance"].values())
@@ -126,7 +126,7 @@ experiment = Experiment(
     note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with lost fins "
     "in a pool, on paths that it does not print. Lost are the first fins without which a robot can be "
     "steered.",
-    quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": 1},
+    quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": (0, 1)},
     printed=_printed,
     picture=_picture,
     for_picture={"paths": True},

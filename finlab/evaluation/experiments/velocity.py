@@ -32,7 +32,7 @@ def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
     controllers: tuple[str, ...] = ("tracking", "velocity"),
-    lost: int = 2,
+    lost: tuple[int, ...] = (0, 1, 2),
     runs: int = 1,
     duration: float = 30.0,
     checkpoint: str | None = None,
@@ -44,7 +44,7 @@ def run(
         layouts: names or files.
         methods: names as in eval wrench.
         controllers: tracking, velocity (the paper's), waypoint (the paper's of paths).
-        lost: most fins that are lost, announced from the start; 1 or 2 where the rest can be steered.
+        lost: how many fins are lost, announced from the start; a robot that needs them is left out.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -108,7 +108,7 @@ experiment = Experiment(
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's sum of I "
     "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
-    quick={"layouts": ("A",), "lost": 0},
-    full={"layouts": ("A",), "lost": 0, "runs": 5},
+    quick={"layouts": ("A",), "lost": (0,)},
+    full={"layouts": ("A",), "lost": (0,), "runs": 5},
     printed=_printed,
 )

@@ -57,7 +57,7 @@ def test_faults(layout_a: Layout, line: str) -> None:
 
 
 def test_velocity() -> None:
-    rows = load_experiment("velocity").rows(layouts=("A",), methods=("analytic",), lost=1, duration=12.0)
+    rows = load_experiment("velocity").rows(layouts=("A",), methods=("analytic",), lost=(0, 1), duration=12.0)
     assert [(row["lost"], row["speed"], row["controller"]) for row in rows] == [
         (lost, speed, law)
         for lost in (0, 1)
@@ -73,6 +73,7 @@ def test_velocity() -> None:
         (["trajectory", "--runs", "0"], "runs: expected a number of at least 1"),
         (["trajectory", "--trajectory", "spiral"], "circle, lissajous, square"),
         (["trajectory", "--controllers", "pid"], "expected some of tracking, waypoint, velocity"),
+        (["trajectory", "--lost", "0,-1"], "lost: expected numbers from 0, got -1"),
         (["trajectory", "--plot", "paths.doc"], "ends in .png, .svg, .pdf"),
         (["faults", "--methods", ","], "methods: expected names"),
         (["velocity", "--duration", "5"], "more than 10 s"),
