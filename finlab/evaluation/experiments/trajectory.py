@@ -101,7 +101,7 @@ def _picture(rows: Sequence[Row]) -> "Figure":
 def _printed(rows: Sequence[Row]) -> list[Row]:
     figures, swum = paper_figures(), {row["layout"] for row in rows}
     about = {"controller": "waypoint", "method": "paper's method, printed"}
-    healthy = [{"layout": name, "lost": (0,)} | about | row for name, row in figures["trajectory"].items()]
+    healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
     pool = [
         {"layout": "in the pool", "lost": count} | about | table["ours"]
         for count, table in enumerate(figures["fault_tolerance"].values())
