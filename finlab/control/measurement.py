@@ -1,4 +1,4 @@
-"""What controllers are given, and what they are: measurements and a setpoint in, a wrench out."""
+"""Measurements, setpoints, and the protocols of controllers and learners."""
 
 import math
 from collections.abc import Sequence

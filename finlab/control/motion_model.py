@@ -1,4 +1,4 @@
-"""What a robot's velocities should do next, from what its actuators do: the model behind `FaultMonitor`.
+"""The model behind `FaultMonitor`: a robot's next velocities, from what its actuators do.
 
 Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current, torques
 that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds

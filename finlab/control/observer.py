@@ -1,4 +1,4 @@
-"""Where a robot is and how it moves, and what disturbs it: from sensors and from its own model.
+"""Place, motion and disturbances of a robot, from sensors and from its own model.
 
 An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge, heave and
 yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the current, which shows in

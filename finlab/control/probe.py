@@ -1,4 +1,4 @@
-"""What keeps fins known that would rest: a small steady push, and short beats of those called lost."""
+"""Pushes that keep resting fins known: small steady ones, and short beats of those called lost."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the robot knows of itself: samples at each sensor's own rate, with noise, bias, delay and losses."""
+"""The robot's sensors: samples at each one's own rate, with noise, bias, delay and losses."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""What a robot is to do: follow a path over time, shipped or from a file, or keep a place."""
+"""Paths over time that a robot follows, shipped or from a file, and places that it keeps."""
 
 import math
 import os
