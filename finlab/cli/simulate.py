@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from tyro.conf import Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from finlab.cli.shared_options import open_robot
 from finlab.errors import FinlabError
@@ -20,135 +21,168 @@ if TYPE_CHECKING:
     from finlab.sim import ClosedLoop, RunLog
 
 
-def simulate(
-    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
-    trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
-    scale: Annotated[float, arg(metavar="X")] = 1.0,
-    excite: bool = False,
-    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
-    announced: bool = True,
-    monitor: bool = False,
-    learn: bool = False,
-    method: Annotated[str, arg(metavar="NAME")] = "dual",
-    controller: Annotated[str, arg(metavar="NAME")] = "tracking",
-    duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
-    truth: Annotated[str | None, arg(metavar="LAYOUT")] = None,
-    current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
-    noise: bool = True,
-    seed: Annotated[int, arg(metavar="N")] = 0,
-    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
-    output: Annotated[Path | None, arg(metavar="FOLDER", aliases=["-o"])] = None,
-) -> None:
-    """Let a robot follow a trajectory in simulation, and say how well it did.
+@dataclass(frozen=True)
+class Options:
+    """Of one swim."""
 
-    Example: finlab simulate A --trajectory circle --fail front_left@30 -o swim
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")]
+    """layout file, bundle, or the name of a shipped layout."""
+    trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous"
+    """circle, lissajous, square, dive, straight, station, or a CSV file with the columns t, x, y, z."""
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """how many times larger the path is to be, in the same time; a torpedo needs speed."""
+    controller: Annotated[str, arg(metavar="NAME")] = "tracking"
+    """tracking; or one of the paper's: waypoint, or velocity, which keeps speed and depth of the path, but no
+    course."""
+    excite: bool = False
+    """shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and attitude;
+    `finlab fit robot` learns the robot from the log."""
+    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = ()
+    """a fin and when it is lost, such as front_left@30; or what else becomes of it: front_left@30:torn=0.5
+    (half of its thrust is left), front_left@30:stuck (it no longer turns), front_left@60:whole (it is
+    repaired)."""
+    announced: bool = True
+    """whether what happens to fins is announced to the allocator."""
+    monitor: bool = False
+    """let a FaultMonitor watch the robot and tell the allocator what it finds."""
+    learn: bool = False
+    """every minute fit the actuators' strengths and directions to the last four minutes of the swim, and
+    allocate with them from then on; for methods that take any shaft, and fins of a law."""
+    method: Annotated[str, arg(metavar="NAME")] = "dual"
+    """dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt."""
+    duration: Annotated[float | None, arg(metavar="SECONDS")] = None
+    """time for a shipped trajectory."""
+    truth: Annotated[str | None, arg(metavar="LAYOUT")] = None
+    """the robot that really swims, a layout with the same actuators; the one that is believed by default."""
+    current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0)
+    """velocity of the water in the world [m/s]."""
+    noise: bool = True
+    """whether the sensors are noisy."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """of the noise."""
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None
+    """trained checkpoint; the shipped one of the method by default."""
+    output: Annotated[Path | None, arg(metavar="FOLDER", aliases=["-o"])] = None
+    """folder for the log (log.npz); without it only the summary is printed."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """file for a picture of the path, .png, .svg or .pdf (needs matplotlib, extra plot)."""
 
-    Args:
-        layout: layout file, bundle, or the name of a shipped layout.
-        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
-        scale: how many times larger the path is to be, in the same time; a torpedo needs speed.
-        excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
-            attitude; `finlab fit robot` learns the robot from the log.
-        fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:
-            front_left@30:torn=0.5 (half of its thrust is left), front_left@30:stuck (it no longer turns),
-            front_left@60:whole (it is repaired).
-        announced: whether what happens to fins is announced to the allocator.
-        monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        learn: every minute fit the actuators' strengths and directions to the last four minutes of the swim,
-            and allocate with them from then on; for methods that take any shaft, and fins of a law.
-        method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
-        controller: tracking, or of the paper waypoint, or velocity, which holds the path's speed and depth.
-        duration: time for a shipped trajectory.
-        truth: the robot that really swims, a layout with the same actuators; the one that is believed by
-            default.
-        current: velocity of the water in the world [m/s].
-        noise: whether the sensors are noisy.
-        seed: of the noise.
-        checkpoint: trained checkpoint; the shipped one of the method by default.
-        output: folder for the log (log.npz); without it only the summary is printed.
-    """
+
+def simulate(options: OmitArgPrefixes[Options]) -> None:
+    """Let a robot follow a trajectory in simulation, and say how well it did."""
     from tqdm import tqdm
 
-    if output is not None:
-        make_folder(output)
+    if options.output is not None:
+        make_folder(options.output)
     tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
     with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
-        from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
+        from finlab.evaluation.plots import check_picture, write_picture
 
-        sensors = None if noise else NO_NOISE
-        robot, lost = open_robot(layout)
-        true = None if truth is None else open_robot(truth)[0]
-        faults = [*(FinFault(name, 0.0) for name in lost), *map(FinFault.parse, fail)]
-        if excite:
-            if fail or monitor or learn:
-                raise FinlabError(
-                    "--excite: a robot is learned with the fins that it has; leave --fail, --monitor and "
-                    "--learn out"
-                )
-            from finlab.sim.excite import LONGEST_S, excitation
-
-            learner = None
-            whole, seconds = robot.without(lost), LONGEST_S if duration is None else duration
-            loop = excitation(whole, seconds, truth=true, sensors=sensors, current=current, seed=seed)
-        else:
-            from finlab.control import FaultMonitor, controller_of
-            from finlab.evaluation.method_specs import load_method_spec
-            from finlab.vehicle.righting import righting_words
-
-            allocator = load_method_spec(method, checkpoint).on(robot)
-            learner = _learner(allocator) if learn else None
-            loop = ClosedLoop(
-                robot,
-                allocator,
-                in_worker(make_trajectory, trajectory, duration, scale),
-                controller_of(controller, robot),
-                truth=true,
-                sensors=sensors,
-                current=current,
-                failures=faults,
-                announced=announced,
-                monitor=FaultMonitor(robot) if monitor else None,
-                learner=learner,
-                seed=seed,
-            )
-            overturns = righting_words(robot)
-            if overturns is not None and "Ty" not in loop.controller.axes:
-                bar.write(f"finlab: {robot.name}: {overturns}", file=sys.stderr)
-        found = [(0.0, monitored(loop))]
+        check_picture(options.plot)
+        loop = _excitation(options) if options.excite else _swim(options)
+        overturns = None if options.excite else _overturns(loop)
+        if overturns is not None:
+            bar.write(f"finlab: {loop.layout.name}: {overturns}", file=sys.stderr)
+        seen = [(0.0, monitored(loop))]
         bar.reset(round(loop.task.duration_s, 1))
         bar.bar_format = "{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]"
         while not loop.done:
             loop.step()
-            if (now := monitored(loop)) != found[-1][1]:
-                found.append((loop.time - loop.period_s, now))
+            if (now := monitored(loop)) != seen[-1][1]:
+                seen.append((loop.time - loop.period_s, now))
             bar.update(loop.period_s)
-    written = []
-    if output is not None:
-        loop.log.save(output / "log.npz")
-        written = [f"\n{output}: written log.npz."]
-    told = excitation_summary(loop.log) if excite else summary(loop.log)
-    changes = [] if learner is None else learner.notes
-    changes += [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
-    print("\n".join([told, *changes, *written]))
+    lines = [excitation_summary(loop.log) if options.excite else summary(loop.log)]
+    lines += [] if loop.learner is None else cast("OnlineFit", loop.learner).notes
+    lines += [f"{time:.1f} s: the monitor takes {what}" for time, what in seen[1:]]
+    if options.output is not None:
+        loop.log.save(options.output / "log.npz")
+        lines.append(f"\n{options.output}: written log.npz.")
+    if options.plot is not None:
+        from finlab.sim.plot import swim_picture
+
+        write_picture(lambda _: swim_picture(loop.log), (), options.plot)
+        lines.append(f"\n{options.plot}: written.")
+    print("\n".join(lines))
+
+
+def _excitation(options: Options) -> ClosedLoop:
+    """The swim of a robot that is shaken on the spot."""
+    from finlab.sim.excite import LONGEST_S, excitation
+
+    robot, lost = open_robot(options.layout)
+    if options.fail or options.monitor or options.learn or options.controller != "tracking":
+        raise FinlabError(
+            "--excite: a robot is learned with the fins that it has, by a controller of its own; leave "
+            "--controller, --fail, --monitor and --learn out"
+        )
+    seconds = LONGEST_S if options.duration is None else options.duration
+    return excitation(robot.without(lost), seconds, **_world(options))
+
+
+def _swim(options: Options) -> ClosedLoop:
+    """The swim along a trajectory, at its start."""
+    from finlab.control import FaultMonitor, make_controller
+    from finlab.evaluation.method_specs import load_method_spec
+    from finlab.sim import ClosedLoop, FinFault, make_trajectory
+
+    robot, lost = open_robot(options.layout)
+    world = _world(options)
+    faults = [*(FinFault(name, 0.0) for name in lost), *map(FinFault.parse, options.fail)]
+    allocator = load_method_spec(options.method, options.checkpoint).on(robot)
+    return ClosedLoop(
+        robot,
+        allocator,
+        in_worker(make_trajectory, options.trajectory, options.duration, options.scale),
+        make_controller(options.controller, robot),
+        failures=faults,
+        announced=options.announced,
+        monitor=FaultMonitor(robot) if options.monitor else None,
+        learner=_learner(allocator) if options.learn else None,
+        **world,
+    )
+
+
+def _world(options: Options) -> dict[str, Any]:
+    """The robot that really swims, its sensors, the water and the seed."""
+    from finlab.sim import NO_NOISE
+
+    return {
+        "truth": None if options.truth is None else open_robot(options.truth)[0],
+        "sensors": None if options.noise else NO_NOISE,
+        "current": options.current,
+        "seed": options.seed,
+    }
+
+
+def _overturns(loop: ClosedLoop) -> str | None:
+    """From which speed on nothing rights a robot that does not dive by its pitch."""
+    from finlab.vehicle.righting import righting_words
+
+    return None if "Ty" in loop.controller.axes else righting_words(loop.layout)
 
 
 def summary(log: RunLog) -> str:
     """The run in a few lines."""
-    from finlab.evaluation.experiments.closed_loop import LOST_M, RTE_DELTA_S, follow_row
+    from finlab.evaluation.experiments.closed_loop import LOST_M, RTE_DELTA_S, follow_row, speed_error
 
     row = follow_row(log)
+    keeps_course = log.controller != "velocity"
     lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]
+    place = (
+        f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
+        f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
+    )
+    speed = f"MAE of the speed {speed_error(log).mean():.4f} m/s   depth RMSE {row['depth_rmse']:.4f} m"
     lines = [
         f"{log.layout} along {log.task} by {log.method}, {log.time[-1]:.0f} s"
         + (f", lost: {', '.join(lost)}" if lost else ""),
-        f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
-        f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m",
+        place if keeps_course else speed,
         f"power {row['driving_w']:.2f} W with motor losses, {row['inertial_w']:.2f} W inertial   "
         f"allocation {row['solve_ms']:.2f} ms (median)",
     ]
     if (when := log.capsized_s) is not None:
         lines.append(f"the robot capsized at {when:.1f} s")
-    if row["max"] >= LOST_M:
+    if keeps_course and row["max"] >= LOST_M:
         lines.append(f"the robot lost its reference: it was more than {LOST_M:g} m away")
     return "\n".join(lines)
 

@@ -4,18 +4,21 @@ Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
 from finlab.control.body_frame import CONTROLLERS as CONTROLLERS
-from finlab.control.body_frame import controller_of as controller_of
+from finlab.control.body_frame import VelocityController as VelocityController
+from finlab.control.body_frame import WaypointController as WaypointController
+from finlab.control.body_frame import make_controller as make_controller
 from finlab.control.completion import Completion as Completion
+from finlab.control.completion import steerable_loss as steerable_loss
+from finlab.control.completion import steers as steers
 from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
+from finlab.control.hypotheses import MonitorSettings as MonitorSettings
 from finlab.control.measurement import Controller as Controller
 from finlab.control.measurement import Foresighted as Foresighted
 from finlab.control.measurement import Learner as Learner
 from finlab.control.measurement import Measurement as Measurement
 from finlab.control.measurement import Setpoint as Setpoint
-from finlab.control.monitor_settings import MonitorSettings as MonitorSettings
 from finlab.control.observer import MotionObserver as MotionObserver
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for
-from finlab.control.tracking_controller import steers as steers

@@ -1,162 +1,222 @@
-"""The paper's two body-frame controllers (its section III): waypoint, and speed with depth.
+"""The paper's two body-frame controllers: waypoints, and speed with depth by PID.
 
-Both ask for surge, heave and yaw. The paper prints the laws and no gains; here these follow from the robot's
-mass and damping and from how late its actuators are, so that the laws fit any robot.
+Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated marine
+robots", section 3, whose formulas stand in its text without numbers; each docstring names its subsection.
+The paper prints no gains. Ours follow from the robot's model and from how late its actuators are, by one rule
+for all robots.
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.control.completion import Completion, axes_of
 from finlab.control.measurement import Controller, Measurement, Setpoint
-from finlab.control.observer import AXES, MotionObserver
-from finlab.control.tracking_controller import TrackingController, axes_of, gains_for
+from finlab.control.observer import MotionObserver, strongest_wrench
+from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.axes import wrapped
+from finlab.vehicle.actuator_motion import following_delay
 
-LEAD_S = 2.0
-"""How far ahead on the path the waypoint runs [s]; surge that balances the damping over it leaves no lag."""
+SLOW, TURN, SPEED = 0.4, 0.75, 0.6
+"""Bandwidths of position and depth, of the heading and of the speed, times the delay."""
+DAMPING = 0.7
+"""Damping ratio of position, depth and heading."""
+CRUISE = 0.15
+"""Speed at which the water's drag counts [m/s]; the middle one of the paper's."""
 NEAR_M = 0.15
-"""Within this distance of the waypoint the heading counts in proportion to it [m]."""
-HEAVE, HEADING = 0.39, 0.66
-"""Natural frequencies of the waypoint's loops over the bandwidth of velocities."""
-SPEED, DEPTH, TURNING = 0.3, 0.25, 0.5
-"""Poles of the speed's and the depth's loop, and the damping of yaw, over the bandwidth of velocities."""
-CRUISE = 0.2
-"""Speed at which the gains balance the damping [m/s]."""
+"""Within this distance of a waypoint the heading counts in proportion to it: above it there is none."""
 FILTER_S = 0.3
-"""Time constant of the filter of the DVL's speed [s]."""
+"""Time constant of the filters of the measured speed and of derivatives [s]."""
 
 
-class _BodyFrame:
-    """What both share: a robot's axes, its model and the largest wrench."""
+def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]:
+    """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the inertia (4,),
+    the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
+    observer = MotionObserver(layout, period_s)
+    drag = observer.inertia * observer.slowed_by(np.full(4, CRUISE)) / CRUISE
+    return (
+        1.0 / (following_delay(layout) + BEHIND_S),
+        observer.inertia,
+        drag,
+        LARGEST * strongest_wrench(layout),
+    )
 
-    name = "body frame"
+
+class WaypointController:
+    """Heads for a waypoint (section 3, "Trajectory tracking controller").
+
+    Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint,
+    Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e, here with damping of speed, climb and yaw
+    rate (`damping`; zeros are the printed law). The waypoint runs `lead_s` ahead on the path; odometry is
+    `MotionObserver`'s.
+
+    Gains: surge and heave are damped oscillators of `SLOW`, or quicker where the drag alone damps more, and
+    the heading one of `TURN`. The lead makes up for damping and drag: no steady lag.
+    """
+
+    name = "waypoint"
     period_s = 0.1
 
     def __init__(self, layout: Layout) -> None:
-        """Takes the robot as its designer knows it. Raises FinlabError: it dives by its pitch."""
-        own, gains = axes_of(layout), gains_for(layout)
-        if "Ty" in own:
-            text = f"{layout.name!r:.60} dives by its pitch, which controller {self.name} does not command"
-            raise FinlabError(f"controller: {text}; take tracking")
+        """Takes the robot; errors as `make_controller`."""
         self.layout = layout
-        self.axes: tuple[str, ...] = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in own)
-        self.free: tuple[str, ...] = () if "Fy" in own else ("Fy",)
-        self.most = np.array(gains.max_wrench)
-        """Largest wrench that is asked for (6,) [N, N m]."""
-        self.pace = gains.velocity
-        """Bandwidth of the robot's velocities [rad/s]."""
-        self.observer = MotionObserver(layout, self.period_s)
-        self.mass = self.observer.inertia[[0, 2, 3]]
-        """Of surge, heave and yaw, with the water's [kg, kg m^2]."""
-        model = self.observer.dynamics
-        linear, quadratic = (np.array(part)[AXES][[0, 2, 3]] for part in (model.linear, model.quadratic))
-        self.damping = linear + CRUISE * quadratic * [1.0, 0.0, 0.0]
-        """Of surge, heave and yaw [N s/m, N m s]."""
+        self.axes, self.free = _axes(layout, self.name)
+        pace, inertia, drag, self.most = _model(layout, self.period_s)
+        slow, turn = SLOW * pace, TURN * pace
+        self.lead_s = 2.0 * DAMPING / slow
+        """How far ahead of now the waypoint is [s]."""
+        spring = np.maximum(inertia * slow**2, drag / self.lead_s)
+        damping = spring * self.lead_s - drag
+        self.gains = float(spring[0]), float(spring[2]), float(inertia[3]) * turn**2
+        """k_d [N/m], k_z [N/m] and k_psi [N m/rad]."""
+        yaw = max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0)
+        self.damping = float(damping[0]), float(damping[2]), yaw
+        """Against the speed ahead [N s/m], the climb [N s/m] and the yaw rate [N m s/rad]."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget all that was seen."""
-        self.observer = MotionObserver(self.layout, self.period_s)
+        """Forget the pose."""
+        self._observer = MotionObserver(self.layout, self.period_s)
 
-    def limited(self, surge: float, heave: float, yaw: float) -> Array:
-        """The wrench (6,) of three components, each at most as large as the robot is asked for."""
-        return np.array([surge, 0.0, heave, 0.0, 0.0, yaw]).clip(-self.most, self.most)
-
-
-class WaypointController(_BodyFrame):
-    """To a waypoint: Fx = k_x d max(0, cos e_psi), Fz = k_z dz, Tz = k_psi e_psi (section III-A), from the
-    odometry that the sensors give. Climbing and yaw rate are damped in addition: fins answer too late for
-    the water alone to do it. Where the waypoint moves it is taken `LEAD_S` ahead."""
-
-    name = "waypoint"
-
-    def __init__(self, layout: Layout) -> None:
-        """Takes the robot as its designer knows it. Raises FinlabError: it dives by its pitch."""
-        super().__init__(layout)
-        heave, yaw = HEAVE * self.pace, HEADING * self.pace
-        self.gains = np.array([self.damping[0] / LEAD_S, self.mass[1] * heave**2, self.mass[2] * yaw**2])
-        """k_x, k_z [N/m] and k_psi [N m/rad]."""
-        own = [self.gains[1] * LEAD_S, 1.4 * self.mass[2] * yaw] - self.damping[1:]
-        self.damped = np.maximum(own, 0.0)
-        """What is added to the water's damping of heave [N s/m] and yaw [N m s]."""
-
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
-        """Returns the wrench (6,) [N, N m] to the setpoint's waypoint; `given` is that of the actuators until
-        now."""
-        now = self.observer.step(measurement, given)
-        away = setpoint.position + LEAD_S * setpoint.velocity - now.position
-        far = math.hypot(away[0], away[1])
-        turn = float(wrapped(math.atan2(away[1], away[0]) - now.yaw)) * min(far / NEAR_M, 1.0)
-        surge, heave, yaw = self.gains * [far * max(0.0, math.cos(turn)), away[2], turn]
-        climb, spin = self.damped * [now.world_velocity[2], now.yaw_rate]
-        return self.limited(surge, heave - climb, yaw - spin)
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
+        """Returns the wrench (6,) towards the waypoint [N, N m]; `delivered` is that of the fins so far."""
+        now = self._observer.step(measurement, delivered)
+        ahead = setpoint.velocity * self.lead_s + setpoint.acceleration * (0.5 * self.lead_s**2)
+        dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
+        distance = math.hypot(dx, dy)
+        e = float(wrapped(math.atan2(dy, dx) - now.yaw)) * min(1.0, distance / NEAR_M)
+        toward = distance * max(0.0, math.cos(e)), dz, e
+        motion = now.velocity[0], now.world_velocity[2], now.yaw_rate
+        wrench = np.zeros(6)
+        wrench[[0, 2, 5]] = np.multiply(self.gains, toward) - np.multiply(self.damping, motion)
+        return np.asarray(wrench.clip(-self.most, self.most))
 
 
 @dataclass
 class Pid:
-    """A PID law whose integral stands still while its output is cut off."""
+    """A PID loop in discrete time that does not wind up: its integral rests while the force is bounded and
+    the error would push further."""
 
-    gains: tuple[float, float, float]
-    """Proportional, integral and derivative."""
+    proportional: float
+    """Force [N] per error."""
+    integral: float
+    """Per integral of the error over time [s]."""
+    derivative: float
+    """Per rate of the error, which is filtered."""
     most: float
-    """Largest output."""
-    integral: float = field(default=0.0, init=False)
-    """Integral of the error."""
+    """Largest force [N]."""
+    period_s: float = 0.1
+    """Time between calls [s]."""
 
-    def step(self, error: float, slope: float, dt: float) -> float:
-        """The output for an error that changes by `slope` a second, after `dt` [s]."""
-        proportional, integral, derivative = self.gains
-        total = self.integral + error * dt
-        output = proportional * error + integral * total + derivative * slope
-        if abs(output) <= self.most or output * error < 0.0:
-            self.integral = total
-        return min(max(output, -self.most), self.most)
-
-
-class VelocityController(_BodyFrame):
-    """To a speed and a depth (section III-B): a PID law on the DVL's filtered surge velocity, one on the
-    depth by the pressure, a proportional law against the IMU's yaw rate. It holds the path's speed and depth,
-    not its place or heading."""
-
-    name = "velocity"
+    def __post_init__(self) -> None:
+        self.reset()
 
     def reset(self) -> None:
-        """Forget all that was seen."""
-        super().reset()
-        (surge, heave, self._turning), (drag, sinking, _) = self.mass, self.damping
-        w, d = SPEED * self.pace, DEPTH * self.pace
-        self.speed = Pid((2.0 * surge * w - drag, surge * w**2, 0.0), float(self.most[0]))
-        """Two poles at w."""
-        gains = (3.0 * heave * d**2, heave * d**3, max(3.0 * heave * d - sinking, 0.0))
-        self.depth = Pid(gains, float(self.most[2]))
-        """Three poles at d; a negative depth error is one upwards."""
-        self._seen: float | None = None
+        """Forget the errors."""
+        self.summed, self._rate = 0.0, 0.0
+        """What the integral gives [N], and the filtered rate."""
+        self._last: float | None = None
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
-        """Returns the wrench (6,) [N, N m] to the setpoint's speed and depth; `given` is not needed."""
-        share, surge = 1.0 - math.exp(-self.period_s / FILTER_S), float(measurement.velocity[0])
-        self._seen = surge if self._seen is None else self._seen + share * (surge - self._seen)
-        rise = float(setpoint.position[2]) + measurement.depth
-        heave = self.depth.step(rise, -float(measurement.velocity[2]), self.period_s)
-        ahead = self.speed.step(setpoint.surge - self._seen, 0.0, self.period_s)
-        return self.limited(ahead, heave, -TURNING * self.pace * self._turning * float(measurement.rates[2]))
+    def step(self, error: float) -> float:
+        """Takes an error and returns the force [N]."""
+        rate = 0.0 if self._last is None else (error - self._last) / self.period_s
+        self._rate += filter_share(self.period_s) * (rate - self._rate)
+        self._last = error
+        wanted = self.proportional * error + self.summed + self.derivative * self._rate
+        force = min(max(wanted, -self.most), self.most)
+        if force == wanted or error * wanted < 0.0:
+            self.summed += self.integral * error * self.period_s
+        return force
 
 
-CONTROLLERS: dict[str, type[TrackingController | WaypointController | VelocityController]] = {
+def filter_share(period_s: float) -> float:
+    """Share of a difference that a filter of `FILTER_S` closes in a period [s]."""
+    return 1.0 - math.exp(-period_s / FILTER_S)
+
+
+class VelocityController:
+    """Keeps a speed and a depth (section 3, "Velocity controller").
+
+    Fx by PID of the speed, DVL's after a low-pass filter; Fz by PID of the depth, from the pressure;
+    Tz = -k_r r against the IMU's yaw rate; all within bounds. It takes speed and depth of the path, not its
+    course: the robot goes where its nose points.
+
+    Gains by poles: the speed is a damped oscillator of `SPEED`, whose derivative gain adds a tenth of the
+    mass; the depth one of `SLOW` with a third pole, of its integral, at half of that.
+    """
+
+    name = "velocity"
+    period_s = 0.1
+
+    def __init__(self, layout: Layout) -> None:
+        """Takes the robot; errors as `make_controller`."""
+        self.axes, self.free = _axes(layout, self.name)
+        pace, inertia, drag, most = _model(layout, self.period_s)
+        slow, fast = SLOW * pace, SPEED * pace
+        mass, heavy = 1.1 * float(inertia[0]), float(inertia[2])
+        damped = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0)
+        self.surge = Pid(damped, fast**2 * mass, 0.1 * float(inertia[0]), float(most[0]), self.period_s)
+        a, b = 2.0 * DAMPING * slow, 0.5 * slow
+        damped = max(heavy * (a + b) - float(drag[2]), 0.0)
+        spring = heavy * (slow**2 + a * b)
+        self.depth = Pid(spring, heavy * slow**2 * b, damped, float(most[2]), self.period_s)
+        self.yaw_damping, self.max_yaw = float(inertia[3]) * TURN * pace, float(most[5])
+        """k_r [N m s/rad], and the largest torque about z [N m]."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget speed and integrals."""
+        self.surge.reset()
+        self.depth.reset()
+        self._speed: float | None = None
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
+        """Returns the wrench (6,) that keeps speed and depth [N, N m]."""
+        seen = float(measurement.velocity[0])
+        before = seen if self._speed is None else self._speed
+        self._speed = before + filter_share(self.period_s) * (seen - before)
+        wrench = np.zeros(6)
+        wrench[0] = self.surge.step(setpoint.surge - self._speed)
+        wrench[2] = self.depth.step(float(setpoint.position[2]) + measurement.depth)
+        wrench[5] = min(max(-self.yaw_damping * float(measurement.rates[2]), -self.max_yaw), self.max_yaw)
+        return wrench
+
+
+def _axes(layout: Layout, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Axes that are commanded, of surge, heave and yaw what the robot can give, and those that are free.
+
+    Raises:
+        FinlabError: it cannot surge and turn, or dives by its pitch alone.
+    """
+    able = axes_of(layout)
+    axes = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in able)
+    if "Ty" in able or not Completion(layout, (), axes).controllable:
+        raise FinlabError(
+            f"controller: {name} commands Fx, Fz and Tz, which {layout.name!r:.60} cannot give "
+            "independently; take tracking"
+        )
+    return axes, () if "Fy" in able else ("Fy",)
+
+
+CONTROLLERS: dict[str, Callable[[Layout], Controller]] = {
     "tracking": TrackingController,
     "waypoint": WaypointController,
     "velocity": VelocityController,
 }
-"""Name -> what makes the controller for the robot that is believed in; the default first."""
+"""Name -> what makes the controller of a robot; the default first."""
 
 
-def controller_of(name: str, layout: Layout) -> Controller:
-    """A controller by its name. Raises FinlabError: there is none of that name, or not for this robot."""
+def make_controller(name: str, layout: Layout) -> Controller:
+    """The controller of that name for a robot.
+
+    Raises:
+        FinlabError: no such controller, or the robot cannot give the axes that it commands.
+    """
     if name not in CONTROLLERS:
-        raise FinlabError(f"controller: expected one of {', '.join(CONTROLLERS)}, got {name!r:.40}")
+        raise FinlabError(f"controller: expected one of {', '.join(CONTROLLERS)}, got {name!r:.60}")
     return CONTROLLERS[name](layout)

@@ -1,4 +1,4 @@
-"""The axes that a controller leaves open: as near zero as the fins can hold them, or as they come.
+"""The axes that a controller commands, and those that it leaves open: held near zero, or as they come.
 
 A controller commands some axes of the wrench, holds others at zero, and may leave some free. Few fins, or few
 that are left, may not be able to hold zeros: two fins have four forces to choose for six axes. A target that
@@ -7,11 +7,12 @@ it; and free axes to what they give with the least force.
 """
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Layout
+from finlab.layout import Layout, Rudder
 from finlab.layout.axes import mask_of
 from finlab.layout.effectiveness import layout_effectiveness
 
@@ -47,5 +48,32 @@ class Completion:
 
     def __call__(self, wrench: Array) -> Array:
         """Wrenches (..., 6) whose wanted axes are asked for, whole."""
-        whole: Array = wrench @ self.matrix.T
-        return whole
+        completed: Array = wrench @ self.matrix.T
+        return completed
+
+
+def axes_of(layout: Layout) -> tuple[str, ...]:
+    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins that push
+    sideways hardly push ahead: with them sway is headed against. A robot that lifts by rudders alone dives by
+    its pitch, and one that does not lift at all is steered in the plane."""
+    lifts = ("Fx", "Fz", "Tz")
+    rudders = [part.name for part in layout.actuators if isinstance(part, Rudder)]
+    driven = layout.without(rudders) if len(rudders) < layout.n else layout
+    candidates: list[tuple[Layout, tuple[str, ...]]]
+    candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]
+    if not layout.n_fins:
+        candidates = [(driven, ("Fx", "Fy", "Fz", "Tz")), *candidates, (layout, ("Fx", "Fy", "Tz"))]
+    able = (axes for robot, axes in candidates if Completion(robot, (), axes).controllable)
+    return next(able, lifts)
+
+
+def steers(layout: Layout, failed: Sequence[str] = ()) -> bool:
+    """Whether what works of a robot can give the axes that are commanded independently, in small."""
+    return Completion(layout, failed, axes_of(layout)).controllable
+
+
+def steerable_loss(layout: Layout, count: int, failed: Sequence[str] = ()) -> tuple[str, ...] | None:
+    """The first actuators, so many besides those that failed, without which a robot can still be steered."""
+    working = [name for name in layout.names if name not in failed]
+    ways = combinations(working, count) if count < len(working) else ()
+    return next((way for way in ways if not count or steers(layout, (*failed, *way))), None)

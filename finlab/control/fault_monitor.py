@@ -4,16 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.dual.rates import Rates
 from finlab.arrays import Array
-from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses
+from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
 from finlab.control.measurement import Measurement
-from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
-from finlab.layout import Body, Layout
+from finlab.layout import Layout
 from finlab.layout.axes import TURN
 from finlab.layout.damage import Damage
 from finlab.physics import plant_of
@@ -60,46 +58,26 @@ class FaultMonitor:
     A fin that rests cannot be distinguished from one that is lost: its probability stays where it was.
     """
 
-    def __init__(
-        self,
-        layout: Layout,
-        body: Body | None = None,
-        settings: MonitorSettings | None = None,
-        *,
-        period_s: float = 0.1,
-    ) -> None:
-        """Believes that all fins are whole.
+    period_s = 0.1
+    """Time between calls [s]."""
 
-        Args:
-            layout: the robot.
-            body: its mass, damping and buoyancy; by default the layout's, completed by U-CAT's.
-            settings: noise and expectations.
-            period_s: time between calls [s].
-        """
-        self.layout, self.period_s = layout, period_s
+    def __init__(self, layout: Layout, settings: MonitorSettings | None = None) -> None:
+        """Believes that all fins of a layout are whole, with a noise and expectations."""
+        self.layout = layout
         self.settings = MonitorSettings() if settings is None else settings
-        self._model = MotionModel(layout, body, period_s)
+        self._model = MotionModel(layout, self.period_s)
         self._beliefs = Hypotheses(layout.n, self._model.inertia, self.settings)
-        self._probe = Probe(layout, self.settings, period_s)
+        self._probe = Probe(layout, self.settings, self.period_s)
         n = layout.n
-        self._torn = np.zeros(n, dtype=bool)
-        self._lost = np.zeros(n, dtype=bool)
-        self._told = np.zeros(n, dtype=bool)
-        self._back = np.zeros(n, dtype=bool)
-        self._rates = Rates(plant_of(layout), layout.rates * period_s)
-        self._sent, self._coming_back = np.full((n, 3), np.nan), np.zeros(n, dtype=bool)
+        self._torn, self._lost, self._told, self._back, self._coming_back = np.zeros((5, n), dtype=bool)
+        self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
+        self._sent = np.full((n, 3), np.nan)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.motion.direction.copy()
         self._coarse = np.ones(n)
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._velocity: Array | None = None
-
-    @property
-    def broken(self) -> tuple[str, ...]:
-        """Names of the fins that are taken for lost, torn or stuck."""
-        marked = self._lost | self._torn | ~np.isnan(self._held)
-        return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
 
     @property
     def opposed(self) -> tuple[str, ...]:
@@ -183,8 +161,8 @@ class FaultMonitor:
         broken = self._lost | self._torn | stuck
         if True in broken.tolist():
             # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
-            whole = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
-            probability = np.where(broken, 1.0 - whole, probability)
+            works = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
+            probability = np.where(broken, 1.0 - works, probability)
             damage = self._damage(strength)
         return Diagnosis(damage, probability, strength, beliefs.strength_std)
 
@@ -213,7 +191,8 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
-        back = self._pushing_back() & ~self._back
+        strength = beliefs.strength
+        back = (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * beliefs.strength_std) & ~self._back
         if back.any() and (self._lost | back).sum() < self.layout.n:
             for each in np.flatnonzero(back):
                 self._mark(int(each), -1.0, math.nan)
@@ -253,11 +232,6 @@ class FaultMonitor:
         beliefs.adopt(fin, kind)
         self._told[fin] = False
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
-
-    def _pushing_back(self) -> NDArray[np.bool_]:
-        """Which actuators (n,) surely push the other way than the layout says."""
-        strength = self._beliefs.strength
-        return (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * self._beliefs.strength_std)
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
         self._lost[fin], self._back[fin] = strength < LOST_BELOW, strength < OPPOSED_BELOW

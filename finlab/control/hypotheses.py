@@ -6,12 +6,12 @@ feeds the others.
 """
 
 import math
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, RISING, STRENGTH, TILT, TORQUE, Step
 
 LEVELS = (0.0, -1.0, 0.35, 0.7, 1.0)
@@ -24,8 +24,6 @@ TOGETHER = 0.1
 """How often two given fins are lost at one moment (a cable, a collision), as a share of how often one is."""
 APART = 0.2
 """A level this near to a fin's strength is no event."""
-
-
 EXPECTED_SURPRISE, MOST_SURPRISE = 1.0, 4.0
 """Squared distance per measured number, in variances, from which the model is trusted less; and the most."""
 ADAPTING = 0.1
@@ -37,6 +35,51 @@ MOST_MISFIT = 1e5
 ASTRAY, MOST_VARIANCE = 1e6, 100.0
 """Squared distance of a measurement, in variances, and variance of a velocity [m^2/s^2, rad^2/s^2], beyond
 which the model says nothing of the motion, as of a robot that tumbles."""
+
+
+@dataclass(frozen=True)
+class MonitorSettings:
+    """What a `FaultMonitor` takes for granted. Standard deviations, and rates per second."""
+
+    rate_noise: float = 0.01
+    """Of a measured angular rate [rad/s]."""
+    velocity_noise: float = 0.01
+    """Of a measured velocity [m/s]."""
+    tilt_noise: float = 0.01
+    """Of measured roll and pitch [rad]."""
+    force_noise: float = 0.05
+    """Of a force that the model does not know [N], per root of a second."""
+    torque_noise: float = 0.005
+    """Of such a torque [N m], per root of a second."""
+    current: float = 0.05
+    """Of the current that is expected [m/s]."""
+    current_drift: float = 0.002
+    """Of its change [m/s], per root of a second."""
+    rising_current: float = 0.01
+    """The same of a current that rises or sinks [m/s]; its drift is as much smaller."""
+    torque: float = 0.1
+    """Of a torque that stays [N m]; what a tilt sensor that sits askew makes of the hull's weight is one."""
+    torque_drift: float = 0.003
+    """Of its change [N m], per root of a second."""
+    strength: float = 0.05
+    """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that rests."""
+    new_strength: float = 0.25
+    """The same of a fin that has just been torn."""
+    strength_drift: float = 0.005
+    """Of its change, per root of a second."""
+    failures: float = 1e-5
+    """Events per fin and second that are expected."""
+    doubt_s: float = 20.0
+    """Time after which a suspicion that nothing feeds is given up [s]."""
+    settle_s: float = 6.0
+    """Time at the start in which current and trim are learnt and nothing is suspected [s]."""
+    probe_every_s: float = 20.0
+    """Time after which a fin that is taken for lost is tried again [s]; 0 for never."""
+    least_push: float = 0.5
+    """Force [N] that every fin gives at least, up or down where it would rest, so that its loss shows; 0 for
+    none. Costs power, where fins would rest."""
+    threshold: float = 0.97
+    """Probability of a fin's failure from which it is acted on, if it holds for two tenths of a second."""
 
 
 class Hypotheses:
@@ -215,8 +258,8 @@ class Hypotheses:
         best = max(0.0, *better.tolist())
         weight = self._probability * np.exp(better - best)
         total = sum(weight.tolist())
-        whole = total + (1.0 - self.doubt) * math.exp(-best)
-        self._probability, self.doubt = weight / whole, total / whole
+        every = total + (1.0 - self.doubt) * math.exp(-best)
+        self._probability, self.doubt = weight / every, total / every
 
     @property
     def settled(self) -> bool:

@@ -1,4 +1,4 @@
-"""What controllers are given, and what they are: measurements and a setpoint in, a wrench out."""
+"""Measurements, setpoints, and the protocols of controllers and learners."""
 
 import math
 from collections.abc import Sequence
@@ -71,13 +71,13 @@ class Controller(Protocol):
     def reset(self) -> None:
         """Forget everything, as before the first call."""
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) [N, N m] in the body frame.
 
         Args:
             measurement: the newest samples.
             setpoint: what to do.
-            given: wrench (6,) that the fins have given since the last call, as far as known [N, N m].
+            delivered: wrench (6,) that the fins have given since the last call, as far as known [N, N m].
         """
         ...
 

@@ -1,4 +1,4 @@
-"""What a robot's velocities should do next, from what its actuators do: the model behind `FaultMonitor`.
+"""The model behind `FaultMonitor`: a robot's next velocities, from what its actuators do.
 
 Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current, torques
 that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Body, Layout
+from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of, rotation_of_quaternion, tilt_of, to_body
@@ -47,10 +47,9 @@ class Step(NamedTuple):
 class MotionModel:
     """The model of one robot; remembers what its fins do."""
 
-    def __init__(self, layout: Layout, body: Body | None, period_s: float) -> None:
-        """Takes a layout, whose body is completed by U-CAT's where none is given, and the time of a step."""
-        body = complete_body(layout) if body is None else body
-        self._vehicle = Vehicle(body)
+    def __init__(self, layout: Layout, period_s: float) -> None:
+        """Takes a layout, whose body is completed by U-CAT's, and the time of a step [s]."""
+        self._vehicle = Vehicle(complete_body(layout))
         self._plant = plant_of(layout)
         self.inertia = np.array(self._vehicle.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""

@@ -1,4 +1,4 @@
-"""Where a robot is and how it moves, and what disturbs it: from sensors and from its own model.
+"""Place, motion and disturbances of a robot, from sensors and from its own model.
 
 An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge, heave and
 yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the current, which shows in
@@ -16,8 +16,8 @@ import numpy as np
 
 from finlab.actuators.fin.fin_response import fin_table
 from finlab.arrays import Array
-from finlab.control.measurement import Measurement
-from finlab.layout import Body, Fin, Layout, Rudder
+from finlab.control.measurement import Measurement, Setpoint
+from finlab.layout import Fin, Layout, Rudder
 from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
@@ -84,12 +84,10 @@ class Estimate(NamedTuple):
 class MotionObserver:
     """Watches one robot; to be called once a period."""
 
-    def __init__(self, layout: Layout, period_s: float, body: Body | None = None) -> None:
-        """Takes a layout, the time between calls [s] and the body; by default the layout's, completed by
-        U-CAT's."""
-        body = complete_body(layout) if body is None else body
-        self._vehicle, self._dt = Vehicle(body), period_s
-        self.dynamics = self._vehicle.dynamics
+    def __init__(self, layout: Layout, period_s: float) -> None:
+        """Takes a layout, whose body is completed by U-CAT's, and the time between calls [s]."""
+        self._vehicle, self._dt = Vehicle(complete_body(layout)), period_s
+        self._dynamics = self._vehicle.dynamics
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
@@ -149,16 +147,15 @@ class MotionObserver:
             return now
         known = np.array([now, *past])
         back = np.minimum(np.array(ages) / self._dt, len(past))
-        whole = np.minimum(back.astype(int), len(past) - 1)
-        each = np.arange(len(now))
-        after, before = known[whole, each], known[whole + 1, each]
-        found: Array = after + (back - whole) * (before - after)
-        return found
+        row, each = np.minimum(back.astype(int), len(past) - 1), np.arange(len(now))
+        after, before = known[row, each], known[row + 1, each]
+        then: Array = after + (back - row) * (before - after)
+        return then
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
         the water [m/s]."""
-        damping = damping_rates(self.dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
+        damping = damping_rates(self._dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
         pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
         return math.exp(-self._dt * damping) * sway - self._dt * pushed
 
@@ -166,8 +163,29 @@ class MotionObserver:
         """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge, sway, heave
         and yaw [m/s^2, rad/s^2]."""
         surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
-        rates = damping_rates(self.dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        rates = damping_rates(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         return np.stack([rates[k] for k in AXES], axis=-1) * motion
+
+    def wrenches_along(self, setpoints: Sequence[Setpoint], current: Array, slow: float) -> Array:
+        """Wrenches (K, 6) [N, N m] of a robot that moves as K setpoints say, at least two, nose ahead.
+
+        Args:
+            setpoints: a period apart.
+            current: horizontal velocity (2,) of the water in the world [m/s].
+            slow: speed through the water [m/s] below which turning counts less and less.
+        """
+        velocity = np.array([setpoint.velocity for setpoint in setpoints])
+        acceleration = np.array([setpoint.acceleration for setpoint in setpoints])
+        (x, y), (ax, ay) = (velocity[:, :2] - current).T, acceleration[:, :2].T
+        speed = np.hypot(x, y)
+        turning = (x * ay - y * ax) / np.maximum(speed * speed, slow * slow)
+        faster = (x * ax + y * ay) / np.maximum(speed, 1e-3)
+        rest = np.zeros(len(speed))
+        motion = np.stack([speed, rest, velocity[:, 2], turning], axis=-1)
+        changes = np.stack([faster, rest, acceleration[:, 2], np.gradient(turning, self._dt)], axis=-1)
+        result = np.zeros((len(speed), 6))
+        result[:, AXES] = self.inertia * (changes + self.slowed_by(motion))
+        return result
 
     def _seen(self, m: Measurement) -> Array:
         return np.array([*m.velocity.tolist(), float(m.rates[2])])
@@ -180,7 +198,7 @@ class MotionObserver:
         flow = state[MOTION].copy()
         flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
         surge, sway, heave, yaw = flow.tolist()
-        jacobian = damping_jacobian(self.dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        jacobian = damping_jacobian(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         kept = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
         transition[range(4), range(4)] = kept
         carried = 1.0 - kept[:2]

@@ -1,4 +1,4 @@
-"""What keeps fins known that would rest: a small steady push, and short beats of those called lost."""
+"""Pushes that keep resting fins known: small steady ones, and short beats of those called lost."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.control.monitor_settings import MonitorSettings
+from finlab.control.hypotheses import MonitorSettings
 from finlab.layout import Azimuth, Fin, Layout, Rudder
 from finlab.layout.axes import is_full_turn
 from finlab.physics import plant_of

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control.completion import Completion
-from finlab.control.feed_forward import wrenches_along
+from finlab.control.completion import axes_of
 from finlab.control.measurement import Measurement, Setpoint
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
-from finlab.layout import Layout, Rudder
+from finlab.layout import Layout
 from finlab.layout.axes import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.fossen import complete_body, dynamics_of
@@ -87,26 +86,6 @@ def gains_for(layout: Layout) -> TrackingGains:
     )
 
 
-def axes_of(layout: Layout) -> tuple[str, ...]:
-    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins that push
-    sideways hardly push ahead: with them sway is headed against. A robot that lifts by rudders alone dives by
-    its pitch, and one that does not lift at all is steered in the plane."""
-    lifts = ("Fx", "Fz", "Tz")
-    rudders = [part.name for part in layout.actuators if isinstance(part, Rudder)]
-    driven = layout.without(rudders) if len(rudders) < layout.n else layout
-    candidates: list[tuple[Layout, tuple[str, ...]]]
-    candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]
-    if not layout.n_fins:
-        candidates = [(driven, ("Fx", "Fy", "Fz", "Tz")), *candidates, (layout, ("Fx", "Fy", "Tz"))]
-    given = (axes for robot, axes in candidates if Completion(robot, (), axes).controllable)
-    return next(given, lifts)
-
-
-def steers(layout: Layout, failed: Sequence[str] = ()) -> bool:
-    """Whether what works of a robot can give the axes that are commanded independently, in small."""
-    return Completion(layout, failed, axes_of(layout)).controllable
-
-
 class TrackingController:
     """Follows a trajectory in surge, heave and yaw, and in sway where no fins have to hold it."""
 
@@ -135,10 +114,10 @@ class TrackingController:
         self._wrench, self._bound = np.zeros(6), self._most
         self.estimate: Estimate | None = None
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
-        """Returns the wrench (6,) along the trajectory [N, N m]; `given` is that of the fins until now."""
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
+        """Returns the wrench (6,) along the trajectory [N, N m]; `delivered` is that of the fins so far."""
         g = self.gains
-        now = self.estimate = self._observer.step(measurement, given)
+        now = self.estimate = self._observer.step(measurement, delivered)
         wanted = self._velocity(now, setpoint)
         u_wanted, yaw_rate = self._surge_and_turn(now, wanted, setpoint)
         cy, sy = math.cos(now.yaw), math.sin(now.yaw)
@@ -173,7 +152,7 @@ class TrackingController:
         current = np.zeros(2) if self.estimate is None else self.estimate.current
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot hardly moves
         # through the water, and there the estimated current decides it.
-        along = wrenches_along(self._observer, setpoints, current, 2.0 * self.gains.slow, self.period_s)
+        along = self._observer.wrenches_along(setpoints, current, 2.0 * self.gains.slow)
         expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound)
         return expected
 

@@ -7,11 +7,9 @@ World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
-from finlab.sim.fin_fault import FinFault as FinFault
 from finlab.sim.log import RunLog as RunLog
 from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log
-from finlab.sim.perturbed import perturbed as perturbed
 from finlab.sim.sensors import NO_NOISE as NO_NOISE
 from finlab.sim.sensors import NOISE_ALONE as NOISE_ALONE
 from finlab.sim.sensors import SensorSettings as SensorSettings
@@ -19,3 +17,5 @@ from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
 from finlab.sim.task import straight as straight
+from finlab.sim.truth import FinFault as FinFault
+from finlab.sim.truth import perturbed as perturbed

@@ -28,11 +28,10 @@ from finlab.layout import Azimuth, Layout, Rudder
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
 from finlab.sim.actuator_force import ActuatorForce
-from finlab.sim.fin_fault import FinFault, damage_of
 from finlab.sim.log import RunLog, Tick, log_of_ticks
-from finlab.sim.perturbed import checked_truth
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
+from finlab.sim.truth import FinFault, checked_truth, damage_of
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of
 from finlab.vehicle.fin_motion import FinMotion
@@ -52,6 +51,27 @@ class ClosedLoop:
 
     A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a run
     steps it at the pace of the clock.
+
+    Args:
+        layout: the robot; what its body does not say is U-CAT's.
+        allocator: of the layout, by any method.
+        task: the path, such as `make_trajectory` gives.
+        controller: by default the tracking controller of the layout.
+        policy: what the allocator does with a wrench that is out of reach; by default its own
+            `policy_under_way`, of robots with rudders `closest`.
+        sensors: rates and noise; the defaults of `SensorSettings`.
+        current: velocity (3,) of the water in the world [m/s].
+        failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
+        announced: whether what happens is announced to the allocator; else a monitor has to notice.
+        monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
+        learner: finds out what the actuators really are; allocator and monitor then work with that.
+        truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
+            only what allocator, controller and monitor believe of it; it has the same actuators.
+        seed: of the sensors' noise and of the allocator.
+
+    Raises:
+        FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time that is
+            none, or a truth that has other actuators.
     """
 
     def __init__(
@@ -71,27 +91,7 @@ class ClosedLoop:
         truth: Layout | None = None,
         seed: int = 0,
     ) -> None:
-        """Puts the robot at rest at the start of its task. Raises FinlabError: an allocator of another robot,
-        an unknown actuator or kind of failure, a time that is none, or a truth that has other actuators.
-
-        Args:
-            layout: the robot; what its body does not say is U-CAT's.
-            allocator: of the layout, by any method.
-            task: the path, such as `make_trajectory` gives.
-            controller: by default the tracking controller of the layout.
-            policy: what the allocator does with a wrench that is out of reach; by default its own
-                `policy_under_way`, of robots with rudders `closest`.
-            sensors: rates and noise; the defaults of `SensorSettings`.
-            current: velocity (3,) of the water in the world [m/s].
-            failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
-            announced: whether what happens is announced to the allocator; else it goes on as before, unless a
-                monitor notices.
-            monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
-            learner: finds out what the actuators really are; allocator and monitor then work with that.
-            truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
-                only what allocator, controller and monitor believe of it; it has the same actuators.
-            seed: of the sensors' noise and of the allocator.
-        """
+        """Puts the robot at rest at the start of its task."""
         if allocator.layout != layout:
             raise FinlabError(
                 f"allocator: expected one for layout {layout.name!r:.60}, got one for "
@@ -99,16 +99,13 @@ class ClosedLoop:
             )
         events = [FinFault(*failure).checked() for failure in failures]
         layout.indices([event.fin for event in events])
-        self.layout = layout
-        self.allocator = allocator
-        self.task = task
+        self.layout, self.allocator, self.task, self.seed = layout, allocator, task, seed
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         # Rudders that the flow leaves weak must not stop the propeller.
         steered = any(isinstance(part, Rudder) for part in layout.actuators)
         under_way = "closest" if steered else allocator.policy_under_way
         self.policy = as_policy(under_way if policy is None else policy)
-        self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth), current)
         """The body that really swims, and the current; it may be replaced on the way."""
@@ -117,15 +114,18 @@ class ClosedLoop:
         self._forces = ActuatorForce(truth, self.fins)
         self.motion = self._forces.motion
         """The motion of all actuators."""
-        self._plant = plant_of(layout)
-        self._flow: Array | None = None
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
         self.announced, self.monitor, self.learner = announced, monitor, learner
+        self._begin()
+
+    def _begin(self) -> None:
+        """The state at the start, and what is known then."""
+        layout, n = self.layout, self.layout.n
         self.broken: dict[str, FinFault] = {}
         """What is true: the actuators that are not whole now, by name."""
         self._told: dict[str, FinFault] = {}
-        self._held = np.full(layout.n, np.nan)
+        self._held = np.full(n, np.nan)
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
@@ -135,8 +135,10 @@ class ClosedLoop:
         self._answered: Allocation | None = None  # what it came from, before a monitor's pushes
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
+        self._plant = plant_of(layout)
+        self._flow: Array | None = None
         self._believed, self._gave = ActuatorMotion(layout), NO_WRENCH
-        start, heading = task.start()
+        start, heading = self.task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
         self.state[:3], self.state[3:7] = start, quaternion_of(0.0, 0.0, heading)
@@ -209,20 +211,18 @@ class ClosedLoop:
         self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
         if kind == "stuck" and index in self.motion.of_fins:
             self.fins.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
-        for known in (self.broken, self._told) if self._tells(announced) else (self.broken,):
+        tells = self.announced if announced is None else announced
+        for known in (self.broken, self._told) if tells else (self.broken,):
             known.pop(name, None)
             if kind != "whole":
                 known[name] = fault
-        if self._tells(announced) and self.monitor is not None:
+        if tells and self.monitor is not None:
             strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
             self.verdict = self.monitor.tell(name, strength, self._held[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
         """An actuator works again as it should; a `LayoutError` where there is none of that name."""
         self.fail(name, "whole", announced=announced)
-
-    def _tells(self, announced: bool | None) -> bool:
-        return self.announced if announced is None else announced
 
     def step(self) -> Tick:
         """Swims for one control period and returns what happened."""
@@ -236,26 +236,26 @@ class ClosedLoop:
         if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
             self._flow = np.concatenate([now.velocity, now.rates])
         setpoint = self.task.setpoint(time)
-        whole = self._complete()
-        asked = whole(self.controller.wrench(now, setpoint, self._given()))
+        complete = self._complete()
+        wanted = complete(self.controller.wrench(now, setpoint, self._given()))
         answer = self.allocator.allocate(
-            asked,
+            wanted,
             **self.damage._asdict(),
             flow=self._flow,
             previous=self._answered,
-            reference=self._reference(time, whole),
+            reference=self._reference(time, complete),
             policy=self.policy,
             seed=self.seed,
         )
         self._answered, command = answer, self._sent(answer.command)
         if self.monitor is not None:
             command = self.monitor.probed(command)
-        tick = self._move(now, setpoint, asked, command, answer.solve_ms)
+        tick = self._move(now, setpoint, wanted, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
-        found = None if self.learner is None else self.learner.step(tick.measured, tick.command)
-        if found is not None:
-            self._believe(found)
+        learned = None if self.learner is None else self.learner.step(tick.measured, tick.command)
+        if learned is not None:
+            self._believe(learned)
         return tick
 
     def _believe(self, layout: Layout) -> None:
@@ -272,7 +272,7 @@ class ClosedLoop:
             self.step()
         return self.log
 
-    def _reference(self, time: float, whole: Completion) -> Array | None:
+    def _reference(self, time: float, complete: Completion) -> Array | None:
         """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can tell."""
         if self._foresighted is None:
             return None
@@ -282,7 +282,7 @@ class ClosedLoop:
             self._setpoints.append(self.task.setpoint(after))
         expected = self._foresighted.ahead(self._setpoints)
         self._setpoints.popleft()
-        return whole(expected)
+        return complete(expected)
 
     def _given(self) -> Array:
         """Wrench (6,) over the last period, if the actuators that are not taken for lost do what they were
@@ -330,7 +330,7 @@ class ClosedLoop:
         return result if np.isnan(self._held).all() else self.motion.turned_to(result, self._held)
 
     def _move(
-        self, now: Measurement, setpoint: Setpoint, asked: Array, command: Array, solve_ms: float
+        self, now: Measurement, setpoint: Setpoint, wanted: Array, command: Array, solve_ms: float
     ) -> Tick:
         """Actuators and body over one period with a constant command."""
         time, before, n = self.time, self.state, self.layout.n
@@ -351,6 +351,7 @@ class ClosedLoop:
             mean += wrenches
             power += push.power
         mean, power = mean / n_steps, power / n_steps
+        beliefs = (np.full(n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
         return Tick(
             time=time,
             position=before[:3].copy(),
@@ -360,7 +361,7 @@ class ClosedLoop:
             measured=now.as_array(),
             reference=setpoint.position,
             reference_surge=setpoint.surge,
-            asked=asked,
+            asked=wanted,
             allocated=self._plant.wrench(command, flow=self._flow),
             delivered=mean.sum(axis=0),
             command=sent,
@@ -369,11 +370,8 @@ class ClosedLoop:
             inertial_power=power[0],
             driving_power=power[1],
             alive=self._alive(),
-            **self._suspicion(),
+            fault_probability=beliefs[0],
+            strength=beliefs[1],
+            strength_std=beliefs[2],
             solve_ms=solve_ms,
         )
-
-    def _suspicion(self) -> dict[str, Array]:
-        """The monitor's columns of a tick, NaN without one."""
-        found = (np.full(self.layout.n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
-        return dict(zip(("fault_probability", "strength", "strength_std"), found, strict=True))

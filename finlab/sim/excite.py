@@ -99,7 +99,7 @@ class ExcitingController:
     def reset(self) -> None:
         """Nothing is remembered."""
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) [N, N m]."""
         away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
         c, s = math.cos(measurement.yaw), math.sin(measurement.yaw)

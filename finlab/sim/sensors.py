@@ -1,4 +1,4 @@
-"""What the robot knows of itself: samples at each sensor's own rate, with noise, bias, delay and losses."""
+"""The robot's sensors: samples at each one's own rate, with noise, bias, delay and losses."""
 
 import math
 from collections import deque
@@ -53,17 +53,15 @@ class SensorSettings:
     """Roll, pitch [rad] and angular rates [rad/s]."""
 
     def __post_init__(self) -> None:
-        checked: dict[str, tuple[float, ...]] = {}
         for name in NAMES:
             sensor: Sensor = getattr(self, name)
-            if sensor.rate_hz == 0.0:
-                raise FinlabError(f"sensors: {name}: expected samples now and then, got {sensor.rate_hz} Hz")
-            if sensor.dropout >= 1.0:
-                raise FinlabError(f"sensors: {name}: expected a dropout below 1, got {sensor.dropout}")
-            checked[name] = (sensor.rate_hz, sensor.delay_s, sensor.dropout, *sensor.noise, *sensor.bias)
-        for name, values in checked.items():
-            if wrong := [value for value in values if not (math.isfinite(value) and value >= 0.0)]:
-                raise FinlabError(f"sensors: {name}: expected numbers from 0, got {wrong[0]}")
+            values = (sensor.rate_hz, sensor.delay_s, sensor.dropout, *sensor.noise, *sensor.bias)
+            from_0 = all(math.isfinite(value) and value >= 0.0 for value in values)
+            if not from_0 or sensor.rate_hz == 0.0 or sensor.dropout >= 1.0:
+                raise FinlabError(
+                    f"sensors: {name}: expected numbers from 0, a rate above it and a dropout below 1, "
+                    f"got {sensor}"
+                )
 
     def each(self, change: Callable[[Sensor], Sensor]) -> "SensorSettings":
         """The same, each sensor changed."""
@@ -92,7 +90,7 @@ class Channel:
         """What each value is off for the whole run."""
         self._due = 0.0
         self._waiting: deque[tuple[float, float, Array]] = deque()  # when it arrives, when it was taken
-        self._first = True
+        self._first, self._newest = True, self.bias
         self.taken = 0.0
         """When the newest sample that has arrived was taken [s]."""
 
@@ -110,12 +108,11 @@ class Channel:
             self._waiting.append((time if self._first else time + self._sensor.delay_s, time, sample))
         self._first = False
 
-    def arrived(self, time: float) -> Array | None:
-        """The newest sample that has arrived since the last call, if there is one."""
-        newest = None
+    def value(self, time: float) -> Array:
+        """The newest sample that has arrived; the same array as before where there is no new one."""
         while self._waiting and self._waiting[0][0] <= time + 1e-9:
-            _, self.taken, newest = self._waiting.popleft()
-        return newest
+            _, self.taken, self._newest = self._waiting.popleft()
+        return self._newest
 
 
 class Sensors:
@@ -123,39 +120,29 @@ class Sensors:
 
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         """Draws the biases of this run."""
-        self._marker, self._pressure, self._dvl, self._imu = (
-            Channel(getattr(settings, name), rng) for name in NAMES
-        )
-        zeros = np.zeros(3)
-        self._held = Measurement(0.0, zeros, 0.0, zeros, 0.0, zeros, 0.0, 0.0)
+        self._channels = [Channel(getattr(settings, name), rng) for name in NAMES]
 
     def measure(self, time: float, state: Array) -> Measurement:
         """The newest samples at `time` [s] for a state (13,); to be called in order of time."""
         self.sample(time, state)
-        held = self._held
-        if (pose := self._marker.arrived(time)) is not None:
-            held = held._replace(position=pose[:3], yaw=float(pose[3]))
-        if (depth := self._pressure.arrived(time)) is not None:
-            held = held._replace(depth=float(depth[0]))
-        if (velocity := self._dvl.arrived(time)) is not None:
-            held = held._replace(velocity=velocity)
-        if (turning := self._imu.arrived(time)) is not None:
-            held = held._replace(rates=turning[2:], roll=float(turning[0]), pitch=float(turning[1]))
-        marker, pressure, dvl, imu = (
-            time - channel.taken for channel in (self._marker, self._pressure, self._dvl, self._imu)
+        pose, depth, velocity, turning = (channel.value(time) for channel in self._channels)
+        marker, pressure, dvl, imu = (time - channel.taken for channel in self._channels)
+        roll, pitch = turning[:2].tolist()
+        ages = marker, pressure, dvl, imu
+        return Measurement(
+            time, pose[:3], float(pose[3]), velocity, float(depth[0]), turning[2:], roll, pitch, ages
         )
-        self._held = held = held._replace(time=time, ages=(marker, pressure, dvl, imu))
-        return held
 
     def sample(self, time: float, state: Array) -> None:
         """Let the sensors sample a state (13,) whose measurement is not needed yet."""
         x, y, z, qw, qx, qy, qz, *motion = state.tolist()
-        if self._marker.is_due(time):
+        marker, pressure, dvl, imu = self._channels
+        if marker.is_due(time):
             yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-            self._marker.take(time, [x, y, z, yaw])
-        if self._pressure.is_due(time):
-            self._pressure.take(time, [-z])
-        if self._dvl.is_due(time):
-            self._dvl.take(time, motion[:3])
-        if self._imu.is_due(time):
-            self._imu.take(time, [*tilt_of(rotation_of_quaternion(qw, qx, qy, qz)), *motion[3:]])
+            marker.take(time, [x, y, z, yaw])
+        if pressure.is_due(time):
+            pressure.take(time, [-z])
+        if dvl.is_due(time):
+            dvl.take(time, motion[:3])
+        if imu.is_due(time):
+            imu.take(time, [*tilt_of(rotation_of_quaternion(qw, qx, qy, qz)), *motion[3:]])

@@ -1,4 +1,4 @@
-"""What a robot is to do: follow a path over time, shipped or from a file, or keep a place."""
+"""Paths over time that a robot follows, shipped or from a file, and places that it keeps."""
 
 import math
 import os
@@ -59,10 +59,7 @@ class Trajectory:
 
     def position(self, time: float | Array) -> Array:
         """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
-        found = np.empty((*np.shape(time), 3))
-        for k in range(3):
-            found[..., k] = np.interp(time, self.time, self.samples[:, k])
-        return found
+        return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
 
     def setpoint(self, time: float) -> Setpoint:
         """Position, velocity and acceleration at `time` [s]; after the end at rest."""
@@ -143,7 +140,7 @@ def dive(duration_s: float = 60.0) -> Trajectory:
     return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
 
 
-def straight(speed: float, duration_s: float) -> Trajectory:
+def straight(duration_s: float = 60.0, speed: float = 0.15) -> Trajectory:
     """Straight ahead at 1 m depth, from rest to a speed [m/s]."""
     time, share = _eased(duration_s)
     far = speed * (duration_s - 0.5 * RAMP_S)
@@ -157,7 +154,7 @@ def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station
 
 
 SHIPPED: dict[str, Callable[..., Trajectory]] = {
-    make.__name__: make for make in (circle, lissajous, square, dive, station)
+    make.__name__: make for make in (circle, lissajous, square, dive, straight, station)
 }
 """Trajectories by name; each takes its duration [s]."""
 
@@ -167,9 +164,14 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
     duration that does not fit.
 
     Args:
-        source: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        source: circle, lissajous, square, dive, straight, station, or a CSV file with the columns t [s] and
+            x, y, z [m], in any order.
         duration_s: time for a shipped one [s]; a file brings its own.
         scale: how many times larger the path is to be, about its start, in the same time.
+
+    Raises:
+        DataError: unknown name, a duration that does not fit, or a file that cannot be read, lacks a column,
+            or holds something that is no number.
     """
     if scale != 1.0:
         if not 0.0 < scale <= MAX_SCALE:
@@ -188,14 +190,8 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
         raise DataError(f"trajectory: expected {', '.join(SHIPPED)} or a CSV file, got {name!r}")
     if duration_s is not None:
         raise DataError(f"duration: {name} brings its own times; leave it out")
-    return read_trajectory(Path(source))
-
-
-def read_trajectory(path: Path) -> Trajectory:
-    """Reads a CSV file with a header and the columns t [s], x, y, z [m], in any order. Raises DataError: it
-    cannot be read, lacks a column, or holds something that is no number."""
-    table = read_table(path, MAX_BYTES, "a CSV file of a path")
-    if missing := [name for name in COLUMNS if name not in table.header]:
-        raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
-    rows, _ = table.numbers([table.header.index(name) for name in COLUMNS])
-    return Trajectory(path.stem, rows[:, 0], rows[:, 1:])
+    table = read_table(Path(source), MAX_BYTES, "a CSV file of a path")
+    if missing := [column for column in COLUMNS if column not in table.header]:
+        raise DataError(f"{source}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
+    rows, _ = table.numbers([table.header.index(column) for column in COLUMNS])
+    return Trajectory(Path(source).stem, rows[:, 0], rows[:, 1:])

@@ -69,16 +69,40 @@ def test_a_monitor_says_what_it_finds(
     assert "monitor" not in capsys.readouterr().out
 
 
+def test_the_papers_controllers_and_a_picture(
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, out = tmp_path / "path.svg", tmp_path / "out"
+    argv = [*line, "--controller", "waypoint", "--fail", "front_left@4"]
+    assert main([*argv, "--plot", str(picture), "-o", str(out)]) == 0
+    assert load_log(out / "log.npz").controller == "waypoint"
+    assert b"front_left lost" in picture.read_bytes()
+    assert main([*line, "--controller", "velocity"]) == 0
+    printed = capsys.readouterr().out
+    assert "ATE" in printed and "MAE of the speed" in printed
+
+
+def test_without_matplotlib_a_picture_is_refused_before_the_swim(
+    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main([*line, "--plot", str(tmp_path / "path.png")]) == 2
+    said = capsys.readouterr()
+    assert "matplotlib is not installed; run: pip install" in said.err and not said.out
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
+        (["--controller", "pd"], "one of tracking, waypoint, velocity, got 'pd'"),
+        (["--plot", "path.doc"], "ends in .png, .svg, .pdf"),
         (["--fail", "front_left"], "expected NAME@SECONDS"),
         (["--fail", "front_left@3:melted"], "expected NAME@SECONDS"),
         (["--fail", "front_left@3:stuck=0.5"], "expected NAME@SECONDS"),
         (["--fail", "front_left@3:torn=2"], "expected NAME@SECONDS"),
         (["--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
-        (["--excite", "--monitor"], "leave --fail, --monitor and --learn out"),
+        (["--excite", "--monitor"], "leave --controller, --fail, --monitor and --learn out"),
         (["-o", __file__], "cannot be made a folder: File exists"),
     ],
 )

@@ -1,93 +1,111 @@
-"""The paper's two body-frame controllers, in single calls and in swims of its layouts."""
+"""The paper's two controllers in the closed loop, and their laws at a moment."""
+
+import math
 
 import numpy as np
 import pytest
 
-import finlab
-from finlab.control import Controller, Measurement, Setpoint, controller_of
+from finlab.arrays import Array
+from finlab.control import (
+    CONTROLLERS,
+    Measurement,
+    Setpoint,
+    VelocityController,
+    WaypointController,
+    make_controller,
+    steerable_loss,
+)
+from finlab.control.body_frame import Pid
+from finlab.control.measurement import NO_WRENCH
 from finlab.errors import FinlabError
-from finlab.sim import ClosedLoop, RunLog, make_trajectory, straight
-from finlab.sim.task import Trajectory, station
+from finlab.layout import load_layout
+from finlab.sim import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight
+from tests.any_robot import AnyRobot
+
+AT_REST = Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
 
 
-def swum(name: str, law: str, path: object, **options: object) -> RunLog:
-    layout = finlab.load_layout(name)
-    allocator = finlab.Allocator(layout)
-    return ClosedLoop(layout, allocator, path, controller_of(law, layout), **options).run()  # type: ignore[arg-type]
+def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: int = 0) -> RunLog:
+    robot = load_layout(name)
+    loop = ClosedLoop(
+        robot,
+        method.on(robot),
+        task,
+        make_controller(controller, robot),
+        sensors=NO_NOISE,
+        failures=[(fin, 0.0) for fin in steerable_loss(robot, lost) or ()],
+    )
+    loop.state[:3] = 0.0, 0.0, -1.0
+    return loop.run()
 
 
-def seen(yaw: float = 0.0, surge: float = 0.0, rate: float = 0.0) -> Measurement:
-    motion, rates = np.array([surge, 0.0, 0.0]), np.array([0.0, 0.0, rate])
-    return Measurement(0.0, np.array([0.0, 0.0, -1.0]), yaw, motion, 1.0, rates, 0.0, 0.0)
+@pytest.mark.parametrize(("name", "lost"), [("A", 0), ("A", 2), ("B", 0), ("C", 1), ("D", 0)])
+def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot) -> None:
+    there = np.array([0.9, -0.7, -1.4])
+    log = swim(
+        name, analytic, Trajectory("there", np.array([0.0, 45.0]), np.tile(there, (2, 1))), "waypoint", lost
+    )
+    away = np.linalg.norm(log.position - there, axis=1)
+    assert away[0] > 1.0 and away[log.time > 35.0].max() < 0.1
 
 
-def asked(law: Controller, x: float, y: float, z: float = -1.0, **now: float) -> np.ndarray:
-    law.reset()
-    return law.wrench(seen(**now), Setpoint(np.array([x, y, z]), 0.1), np.zeros(6))
+@pytest.mark.parametrize(("name", "speed"), [("A", 0.1), ("B", 0.15), ("C", 0.15), ("D", 0.2)])
+def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AnyRobot) -> None:
+    log = swim(name, analytic, straight(30.0, speed), "velocity")
+    late = log.time > 20.0
+    assert log.motion[late, 0].mean() == pytest.approx(speed, rel=0.03)
+    assert np.abs(log.position[late, 2] + 1.0).max() < 0.04
 
 
-@pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
-def test_the_waypoints_law_is_the_printed_one(yaw: float) -> None:
-    law = controller_of("waypoint", finlab.load_layout("A"))
-    side = np.array([np.cos(yaw + 0.4), np.sin(yaw + 0.4)])
-    near, far = (asked(law, *(reach * side), -0.98, yaw=yaw) for reach in (0.2, 0.3))
-    ahead = asked(law, *(0.2 * np.array([np.cos(yaw), np.sin(yaw)])), -0.98, yaw=yaw)
-    assert far[0] == pytest.approx(1.5 * near[0])  # in proportion to the distance
-    assert near[0] == pytest.approx(np.cos(0.4) * ahead[0])  # and to the cosine of the heading's error
-    assert near[5] > 0.0 and near[2] > 0.0 and ahead[5] == pytest.approx(0.0, abs=1e-12)
-    behind = asked(law, *(-0.3 * side), -1.05, yaw=yaw)
-    assert behind[0] == 0.0 and abs(behind[5]) > 0.0 > behind[2]
-    np.testing.assert_array_equal(near[[1, 3, 4]], 0.0)
+def wrench_at(controller: WaypointController, x: float, y: float, z: float) -> Array:
+    controller.reset()
+    return controller.wrench(AT_REST, Setpoint(np.array([x, y, z]), 0.0), NO_WRENCH)
 
 
-def test_a_speed_is_held_by_its_integral_and_yaw_is_damped() -> None:
-    law = controller_of("velocity", finlab.load_layout("A"))
-    law.reset()
-    setpoint = Setpoint(np.array([0.0, 0.0, -1.0]), 0.05)
-    forces = [law.wrench(seen(surge=0.02), setpoint, np.zeros(6))[0] for _ in range(30)]
-    assert np.all(np.diff(forces) > 0.0)
-    assert asked(law, 0.0, 0.0, rate=0.2)[5] < 0.0 < asked(law, 0.0, 0.0, rate=-0.2)[5]
+def test_the_printed_law_of_a_waypoint_at_rest() -> None:
+    controller = WaypointController(load_layout("A"))
+    (k_d, k_z, k_psi), most = controller.gains, controller.most
+    ahead = wrench_at(controller, 0.3, 0.1, -1.1)
+    e = math.atan2(0.1, 0.3)
+    expected = [k_d * math.hypot(0.3, 0.1) * math.cos(e), 0.0, -0.1 * k_z, 0.0, 0.0, k_psi * e]
+    np.testing.assert_allclose(ahead, expected, atol=1e-9)
+    behind = wrench_at(controller, -0.5, -0.1, -1.0)
+    assert behind[0] == 0.0 and behind[5] < 0.0
+    assert (np.abs(wrench_at(controller, 900.0, 900.0, 900.0)) <= most).all()
 
 
-def test_saturation_does_not_wind_up_the_integrals() -> None:
-    robot = finlab.load_layout("A")
-    law = controller_of("velocity", robot)
-    fast, slow = (Setpoint(np.array([0.0, 0.0, -depth]), speed) for depth, speed in ((9.0, 5.0), (1.0, 0.0)))
+def test_the_yaw_rate_is_damped_and_bounded() -> None:
+    controller = VelocityController(load_layout("A"))
+    turning = AT_REST._replace(rates=np.array([0.0, 0.0, 0.2]))
+    wrench = controller.wrench(turning, Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH)
+    np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.yaw_damping], atol=1e-9)
+    spun = AT_REST._replace(rates=np.array([0.0, 0.0, -99.0]))
+    wrench = controller.wrench(spun, Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)
+    bounds = controller.surge.most, controller.depth.most, controller.max_yaw
+    np.testing.assert_allclose(wrench[[0, 2, 5]], bounds)
+
+
+def test_a_bounded_force_does_not_wind_up_the_integral() -> None:
+    pid = Pid(2.0, 1.0, 0.0, most=3.0)
+    held = [pid.step(5.0) for _ in range(600)]  # as of a robot that is held fast for a minute
+    assert held == [3.0] * 600 and abs(pid.summed) < 3.0
+    assert pid.step(-0.1) < 3.0 and pid.summed < 3.0
+
+
+def test_an_integral_makes_up_for_a_force_that_stays() -> None:
+    pid, height, climb = Pid(2.0, 1.0, 3.0, most=5.0), 0.0, 0.0
     for _ in range(600):
-        most = law.wrench(seen(), fast, np.zeros(6))
-    after = law.wrench(seen(surge=0.1), slow, np.zeros(6))
-    assert most[0] > 0.0 > most[2]  # held at its bound for a minute
-    assert after[0] < 0.0 and abs(after[2]) < 0.05 * abs(most[2])
+        climb += 0.1 * (pid.step(-height) - 1.5 - climb)
+        height += 0.1 * climb
+    assert height == pytest.approx(0.0, abs=1e-3) and pid.summed == pytest.approx(1.5, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_layouts_of_the_paper_come_to_a_waypoint_and_stay(name: str) -> None:
-    place = np.array([[0.0, 0.0, -1.0], [2.0, 1.0, -1.3], [2.0, 1.0, -1.3]])
-    log = swum(name, "waypoint", Trajectory("one waypoint", np.array([0.0, 0.1, 60.0]), place))
-    distance = np.linalg.norm(log.position - log.reference, axis=1)
-    assert distance[log.time > 40.0].max() < 0.15
+@pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "tracking"])
+def test_what_dives_by_its_pitch_is_refused(name: str) -> None:
+    with pytest.raises(FinlabError, match="'torpedo' cannot give"):
+        make_controller(name, load_layout("torpedo"))
 
 
-@pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_layouts_of_the_paper_hold_speed_and_depth(name: str) -> None:
-    log = swum(name, "velocity", straight(0.15, 30.0), current=(0.0, 0.02, 0.0))
-    settled = log.time >= 10.0
-    assert np.abs(log.motion[settled, 0] - 0.15).mean() < 0.04 * 0.15 + 0.004  # the beat is in it
-    assert np.abs(log.position[:, 2] + 1.0).max() < 0.05
-
-
-def test_a_lost_fin_does_not_end_it() -> None:
-    log = swum("A", "waypoint", make_trajectory("circle"), failures=[("front_left", 20.0)])
-    assert np.linalg.norm(log.position - log.reference, axis=1).max() < 0.5
-
-
-def test_robots_of_thrusters_have_them_too() -> None:
-    log = swum("bluerov2_heavy", "waypoint", station(20.0))
-    assert np.linalg.norm(log.position - log.reference, axis=1).max() < 0.15
-
-
-def test_what_cannot_be_controlled_so_is_said() -> None:
-    with pytest.raises(FinlabError, match="torpedo.* dives by its pitch.*take tracking"):
-        controller_of("waypoint", finlab.load_layout("torpedo"))
-    with pytest.raises(FinlabError, match="expected one of tracking, waypoint, velocity, got 'pid'"):
-        controller_of("pid", finlab.load_layout("A"))
+def test_an_unknown_controller_is_a_sentence() -> None:
+    with pytest.raises(FinlabError, match="one of tracking, waypoint, velocity, got 'pd'"):
+        make_controller("pd", load_layout("A"))

@@ -11,6 +11,7 @@ from finlab.control import FaultMonitor, Measurement, MonitorSettings
 from finlab.errors import LayoutError
 from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout
+from finlab.layout.damage import Damage
 from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, make_trajectory, perturbed
 from tests.any_robot import AnyRobot
 from tests.ripple import rippled
@@ -152,9 +153,9 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
         if sure:
             beliefs.probability[2, 0] = beliefs.doubt = 0.99
         monitor._judge(nowhere)
-        assert monitor.broken == ()
+        assert monitor.verdict().damage == Damage()
     monitor._judge(nowhere)
-    assert monitor.broken == (layout_a.names[2],), "the second in a row decides"
+    assert monitor.verdict().damage.failed == (layout_a.names[2],), "the second in a row decides"
 
 
 @pytest.mark.parametrize("truth", ["ripple", "askew"])

@@ -13,7 +13,7 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
     """Period by period in a current, against the simulated body; slopes by differences, Munk's moments among
     them: that of water that sinks past a robot under way is the largest of all."""
     vehicle = Vehicle(complete_body(layout_a), (0.05, -0.03, 0.0))
-    model = MotionModel(layout_a, None, 0.1)
+    model = MotionModel(layout_a, 0.1)
     body = np.array([0.0, 0.0, 0.0, 1.0, *np.zeros(9)])
     z = np.zeros(FIRST_FIN + 4)
     z[FIRST_FIN:], z[8:10] = 1.0, (0.05, -0.03)
@@ -43,7 +43,7 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
 
 def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) -> None:
     """For a second its force may be the opposite of what is expected."""
-    model, free = MotionModel(layout_a, None, 0.1), np.full(4, np.nan)
+    model, free = MotionModel(layout_a, 0.1), np.full(4, np.nan)
     z = np.zeros(FIRST_FIN + 4)
     z[FIRST_FIN:] = 1.0
     ahead = np.tile([0.5, 1.5, 0.0], (4, 1))

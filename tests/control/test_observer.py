@@ -9,8 +9,9 @@ from finlab import load_layout
 from finlab.control import Measurement, MotionObserver
 from finlab.control.observer import Estimate
 from finlab.layout import Layout
-from finlab.sim.perturbed import perturbed
-from finlab.vehicle.attitude import euler
+from finlab.sim import make_trajectory
+from finlab.sim.truth import perturbed
+from finlab.vehicle.attitude import euler, quaternion_of_yaw
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -82,3 +83,20 @@ def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
         sway = observer.swayed(sway, 0.1, 0.5)
     assert sway < 0.0
     assert 100.7 * sway - 260.0 * sway**2 == pytest.approx(-59.0 * 0.1 * 0.5, rel=0.02)
+
+
+def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
+    """Straight ahead from rest, the wrenches move the whole body model by the path's length."""
+    robot, path = load_layout("A"), make_trajectory("dive")
+    times = np.arange(0.0, 12.0, 0.1)
+    flat = [path.setpoint(float(t)) for t in times]
+    flat = [
+        s._replace(velocity=s.velocity * [1, 1, 0], acceleration=s.acceleration * [1, 1, 0]) for s in flat
+    ]
+    along = MotionObserver(robot, 0.1).wrenches_along(flat, np.zeros(2), 0.08)
+    vehicle, state = Vehicle(complete_body(robot)), np.zeros(13)
+    state[3:7] = quaternion_of_yaw(0.0)
+    for wrench in along:
+        for _ in range(5):
+            state = vehicle.step(state, wrench.tolist(), 0.02)
+    assert state[0] == pytest.approx(path.position(12.0)[0], rel=0.03)

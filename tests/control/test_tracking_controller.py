@@ -15,9 +15,10 @@ from finlab.control import (
     gains_for,
 )
 from finlab.control.tracking_controller import BEHIND_S
+from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo
 from finlab.sim import ClosedLoop, make_trajectory
-from finlab.sim.perturbed import perturbed
+from finlab.sim.truth import perturbed
 from tests.any_robot import AnyRobot
 
 
@@ -95,3 +96,11 @@ def test_it_stays_near_to_a_path(robot: Layout, damping: float, current: float, 
 @pytest.mark.exhaustive
 def test_it_stops_at_corners_and_sets_off_again(robot: Layout) -> None:
     assert error(robot, TrackingController(robot), path="square") < 0.04
+
+
+def test_fins_that_turn_before_the_wrench_comes_keep_nearer_to_a_square() -> None:
+    robot, error = load_layout("A"), {}
+    for name in ("analytic", "dual"):
+        log = ClosedLoop(robot, load_method_spec(name).on(robot), make_trajectory("square"), seed=3).run()
+        error[name] = np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean())
+    assert error["dual"] < 0.93 * error["analytic"]

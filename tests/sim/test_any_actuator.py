@@ -31,7 +31,7 @@ def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
 
 def test_a_torpedo_follows_a_path_at_speed() -> None:
     torpedo = load_layout("torpedo")
-    log = ClosedLoop(torpedo, Allocator(torpedo), straight(1.5, 20.0), seed=1).run()
+    log = ClosedLoop(torpedo, Allocator(torpedo), straight(20.0, 1.5), seed=1).run()
     assert log.motion[-1, 0] > 1.4 and error(log) < 0.5
 
 

@@ -56,7 +56,7 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
 
 
 def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRobot) -> None:
-    log = swum(ClosedLoop(layout_a, analytic.on(layout_a), straight(0.15, 30.0), sensors=NO_NOISE), 20.0)
+    log = swum(ClosedLoop(layout_a, analytic.on(layout_a), straight(30.0, 0.15), sensors=NO_NOISE), 20.0)
     late = log.time > 15.0
     assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.02

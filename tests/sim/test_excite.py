@@ -57,4 +57,4 @@ def test_what_cannot_be_shaken_is_refused(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(DataError, match="30 to 300 s, got 301"):
         excitation(layout, 301.0)
     assert main(["simulate", "A", "--excite", "--fail", "front_left@3"]) == 2
-    assert "leave --fail, --monitor and --learn out" in capsys.readouterr().err
+    assert "leave --controller, --fail, --monitor and --learn out" in capsys.readouterr().err

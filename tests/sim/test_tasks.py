@@ -67,7 +67,7 @@ def test_bad_files_are_one_sentence(tmp_path: Path, content: str, message: str) 
 
 
 def test_unknown_names_and_durations(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="circle, lissajous, square, dive, station or a CSV file"):
+    with pytest.raises(DataError, match="circle, lissajous, square, dive, straight, station or a CSV file"):
         make_trajectory("spiral")
     with pytest.raises(DataError, match="12 to 3600"):
         make_trajectory("circle", 1.0)

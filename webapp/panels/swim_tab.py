@@ -10,10 +10,8 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.control import CONTROLLERS
 from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
-from finlab.sim import SHIPPED
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
 from webapp.markup.plot import Axis, Plot, cost_axis, exact_axis, positive
@@ -21,7 +19,7 @@ from webapp.markup.swim_card import swim_card
 from webapp.markup.words import righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
-from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings
+from webapp.session.swim_plan import CHOICES, SCENARIOS, SPEEDS, SwimSettings
 from webapp.session.targets import axis_reach
 from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, SURGE, TIME, Moment
 from webapp.tasks.swimmer import Swimmer
@@ -39,9 +37,9 @@ def add_scenario(page: Page) -> None:
     days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
     _bind(page, "scenario", days)
     page.add_html(_about)
-    _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
-    law = "Follows the path; or as in the paper: steers to waypoints, or holds the path's speed and depth."
-    _bind(page, "controller", gui.add_dropdown("Controller", tuple(CONTROLLERS), hint=law))
+    _bind(page, "path", gui.add_dropdown("Path", CHOICES["path"], hint="Where to swim."))
+    laws = "The paper's two beside ours: towards a waypoint; speed and depth by PID, which keeps no course."
+    _bind(page, "controller", gui.add_dropdown("Controller", CHOICES["controller"], hint=laws))
 
 
 def _about(swim: SwimSettings, method: str) -> str:

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import CONTROLLERS, steers
+from finlab.control import CONTROLLERS, make_controller, steerable_loss
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
@@ -26,6 +25,8 @@ SCENARIOS: dict[str, HardDay] = {
     for day in (*HARD_DAYS, LOST_IN_CURRENT)
     if not day.mixed_fins and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
 }
+CHOICES = {"path": tuple(SHIPPED), "controller": tuple(CONTROLLERS)}
+"""Settings that are one of several."""
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
 
@@ -52,8 +53,8 @@ class SwimSettings:
             raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
         if key == "speed":
             value = number(value, key, *SPEEDS)
-        elif key in ("path", "controller"):
-            chosen(value, key, SHIPPED if key == "path" else CONTROLLERS)
+        elif key in CHOICES:
+            chosen(value, key, CHOICES[key])
         elif key != "announced":
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: value})
@@ -64,9 +65,15 @@ class SwimSettings:
         return SCENARIOS[self.scenario]
 
     def plan(self, state: State) -> "Plan":
-        """The plan for the robot as it is now. FinlabError: the scenario takes away more than it has."""
+        """The plan for the robot as it is now.
+
+        Raises:
+            FinlabError: the scenario takes more fins away than the robot has, or the controller is not for
+                this robot.
+        """
         day, layout = self.day, state.able
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
+        make_controller(self.controller, layout)
         affected = _affected(layout, state.failed, day)
         return Plan(
             layout,
@@ -92,8 +99,7 @@ def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[st
     if count and count >= len(working):
         text = f"{day.name} takes {count} of the {len(working)} working fins away"
         raise FinlabError(f"{text}; choose another scenario, or a robot with more fins")
-    ways = list(combinations(working, count))
-    return next((way for way in ways if not count or steers(layout, (*failed, *way))), ways[0])
+    return steerable_loss(layout, count, failed) or tuple(working[:count])
 
 
 class Plan(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import FaultMonitor, controller_of
+from finlab.control import FaultMonitor, make_controller
 from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
 from finlab.sim.log import lies_over, log_of_ticks
 from webapp.session.swim_plan import Plan
@@ -98,7 +98,7 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
         layout,
         allocator,
         plan.path,
-        controller_of(plan.controller, layout),
+        make_controller(plan.controller, layout),
         sensors=plan.sensors,
         current=plan.current,
         failures=plan.losses,

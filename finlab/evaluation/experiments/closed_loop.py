@@ -5,23 +5,52 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Mapping, Sequence
-from itertools import combinations
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control import steers
+from finlab.control import make_controller, steerable_loss
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
+from finlab.evaluation.method_specs import MethodSpec
+from finlab.executor import map_parts
 from finlab.layout import Layout
-from finlab.sim import RunLog
+from finlab.sim import ClosedLoop, RunLog, Trajectory
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
 LOST_M = 1.0
 """A robot that is ever farther than this from its reference has lost it."""
+
+
+class Swim(NamedTuple):
+    """One robot along one path."""
+
+    layout: Layout
+    path: Trajectory
+    method: str
+    controller: str
+    seed: int
+    lost: tuple[str, ...] = ()
+    """Names of the actuators that are lost, announced."""
+    lost_s: float = 0.0
+    """When they are lost [s]."""
+
+
+def swum(
+    methods: Mapping[str, MethodSpec], swims: Sequence[Swim], what: str, row_of: Callable[[RunLog], Row]
+) -> list[Row]:
+    """What `row_of` makes of each swim, in order, on the cluster where there is one."""
+    return list(map_parts(partial(_row, methods, row_of), swims, what, "swim"))
+
+
+def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: Swim) -> Row:
+    allocator, law = methods[swim.method].on(swim.layout), make_controller(swim.controller, swim.layout)
+    lost = [(name, swim.lost_s) for name in swim.lost]
+    return row_of(ClosedLoop(swim.layout, allocator, swim.path, law, failures=lost, seed=swim.seed).run())
 
 
 def absolute_error(position: Array, reference: Array) -> float:
@@ -43,6 +72,12 @@ def depth_error(position: Array, reference: Array) -> float:
     return float(np.sqrt(np.square(position[:, 2] - reference[:, 2]).mean()))
 
 
+def speed_error(log: RunLog) -> Array:
+    """Size of the error of the speed ahead at each tick (N,) [m/s]."""
+    error: Array = np.abs(log.motion[:, 0] - log.reference_surge)
+    return error
+
+
 def follow_row(log: RunLog) -> Row:
     """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the piece of
     the relative error counts as one piece."""
@@ -55,15 +90,6 @@ def follow_row(log: RunLog) -> Row:
         "max": float(np.linalg.norm(position - reference, axis=1).max()),
         **power_row(log),
     }
-
-
-def first_lost(layout: Layout, count: int) -> tuple[str, ...]:
-    """The first `count` actuators in order without which the others still give surge, heave and yaw. Raises
-    DataError: none such are there."""
-    for names in combinations(layout.names, count):
-        if count == 0 or (count < layout.n and steers(layout, names)):
-            return names
-    raise DataError(f"lost: without {count} of its {layout.n} actuators {layout.name} cannot be steered")
 
 
 def power_row(log: RunLog) -> Row:
@@ -84,23 +110,22 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-def mean_rows(key: str, done: Mapping[tuple[Any, str, str], Sequence[Row]], last: Any) -> list[Row]:
-    """One row for each value under `key`, method and controller, of the rows of its runs; the value `last` at
-    the end."""
-    order = sorted(done, key=lambda case: case[0] == last)
+def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]) -> list[Row]:
+    """One row for each case, a value for each key, of the rows of its runs."""
     return [
-        {key: case[0], "method": case[1], "controller": case[2]}
-        | {"runs": len(done[case]), **over_seeds(done[case])}
-        for case in order
+        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}
+        for case, rows in done.items()
     ]
 
 
-WHO = (
-    Column("method", "method", "code"),
-    Column("controller", "controller", "code"),
-    Column("runs", "runs", "count"),
-)
-"""Columns of who swam: what allocates, and what asks for the wrench."""
+def losses_of(layout: Layout, counts: Sequence[int]) -> dict[int, tuple[str, ...] | None]:
+    """For each number of fins the first that may be lost so that the robot can be steered; None where all are
+    needed. Numbers that leave no fin are left out. Raises DataError: a negative number."""
+    if min(counts) < 0:
+        raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
+    return {count: steerable_loss(layout, count) for count in counts if count < layout.n}
+
+
 POWER = (
     Column("inertial_w", "inertial power", "three", unit="W"),
     Column("driving_w", "with motor losses", "three", unit="W"),

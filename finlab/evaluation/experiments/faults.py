@@ -1,11 +1,10 @@
 """The paper's fault experiment: a trajectory with fins lost from the start, or on the way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations, product
 
-from finlab.control import controller_of, steers
+from finlab.control import steers
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
@@ -13,14 +12,15 @@ from finlab.evaluation.experiments.closed_loop import (
     ERRORS,
     LOST_M,
     POWER,
+    Swim,
     follow_row,
     over_seeds,
+    swum,
 )
-from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.executor import map_parts
+from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
-from finlab.sim import ClosedLoop, Trajectory, make_trajectory
+from finlab.sim import make_trajectory
 
 HEALTHY = "healthy"
 ALLOWED = 1.15  # growth of the error over the healthy robot's that one lost fin should not exceed
@@ -76,9 +76,9 @@ def run(
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}
-    swims = list(product(cases, range(seed, seed + runs)))
-    errors = map_parts(partial(_swim, robot, path, specs, controller), swims, "faults", "swim")
-    for (case, _), row in zip(swims, errors, strict=True):
+    parts = list(product(cases, range(seed, seed + runs)))
+    swims = [Swim(robot, path, name, controller, k, fault.fins, fault.time_s) for (fault, name), k in parts]
+    for (case, _), row in zip(parts, swum(specs, swims, "faults", follow_row), strict=True):
         done.setdefault(case, []).append(row)
     rows: list[Row] = []
     for (fault, name), errors_of in done.items():
@@ -87,20 +87,6 @@ def run(
         row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
         rows.append(row)
     return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
-
-
-def _swim(
-    robot: Layout,
-    path: Trajectory,
-    methods: Mapping[str, MethodSpec],
-    controller: str,
-    swim: tuple[tuple[Fault, str], int],
-) -> Row:
-    """Errors of one swim: its fault and method, and its seed."""
-    (fault, name), seed = swim
-    lost = [(fin, fault.time_s) for fin in fault.fins]
-    law, method = controller_of(controller, robot), methods[name].on(robot)
-    return follow_row(ClosedLoop(robot, method, path, law, failures=lost, seed=seed).run())
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

@@ -1,26 +1,36 @@
-"""Several layouts follow a trajectory with one checkpoint, by the paper's controller and by ours."""
+"""Several layouts, whole and with fins lost, follow a trajectory by the paper's controller and by ours."""
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
+from typing import TYPE_CHECKING
 
-from finlab.control import controller_of
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.control import CONTROLLERS
 from finlab.evaluation.document import Column, Row
-from finlab.evaluation.experiment import Experiment, paper_figures
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
     POWER,
-    WHO,
-    first_lost,
+    Swim,
     follow_row,
+    losses_of,
     mean_rows,
+    swum,
 )
-from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.executor import map_parts
+from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
-from finlab.layout import Layout, load_layout
-from finlab.sim import ClosedLoop, Trajectory, make_trajectory
+from finlab.layout import load_layout
+from finlab.sim import RunLog, make_trajectory
+from finlab.sim.plot import paths_picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PATH_EVERY = 5
+"""Ticks between the points of a path that a row has."""
 
 
 def run(
@@ -28,67 +38,98 @@ def run(
     trajectory: str = "lissajous",
     methods: tuple[str, ...] = ("dual", "paper"),
     controllers: tuple[str, ...] = ("tracking", "waypoint"),
-    lost: int = 0,
-    runs: int = 3,
+    lost: tuple[int, ...] = (0, 1, 2),
+    runs: int = 1,
     checkpoint: str | None = None,
+    paths: bool = False,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout, method and controller, and one for each over all layouts.
+    """One row for each layout, number of lost fins, controller and method, and one over all layouts.
 
     Args:
         layouts: names or files.
-        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, straight, station, or a CSV file with t, x, y, z.
         methods: names as in eval wrench.
-        controllers: tracking, waypoint (the paper's), velocity.
-        lost: so many fins are lost from the start, the first without which it can still be steered.
+        controllers: tracking, waypoint (the paper's), velocity (the paper's, which keeps no course).
+        lost: how many fins are lost, announced from the start; a robot that needs them is left out.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
+        paths: whether rows have the first run's path (in the JSON alone).
         seed: of the first run's noise.
     """
+    check_names("controllers", controllers, CONTROLLERS)
     robots = [in_worker(load_layout, name) for name in layouts]
-    path = in_worker(make_trajectory, trajectory)
-    specs = load_method_specs(methods, checkpoint)
-    done: dict[tuple[str, str, str], list[Row]] = {}
-    swims = list(product(robots, specs, controllers, range(seed, seed + runs)))
-    errors = map_parts(partial(_swim, path, specs, lost), swims, "trajectory", "swim")
-    for (robot, name, control, _), row in zip(swims, errors, strict=True):
-        for group in (robot.name, "all"):
-            done.setdefault((group, name, control), []).append(row)
-    return mean_rows("layout", done, "all")
+    path, specs = in_worker(make_trajectory, trajectory), load_method_specs(methods, checkpoint)
+    cases = [(robot, *loss) for robot in robots for loss in losses_of(robot, lost).items()]
+    able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
+    parts = list(product(able, controllers, specs, range(seed, seed + runs)))
+    swims = [Swim(robot, path, name, law, k, fins) for (robot, _, fins), law, name, k in parts]
+    done: dict[tuple[str, int, str, str], list[Row]] = {}
+    shown: dict[tuple[str, int, str, str], Row] = {}
+    every: dict[tuple[str, int, str, str], list[Row]] = {}
+    errors = swum(specs, swims, "trajectory", _with_path if paths else follow_row)
+    for ((robot, count, _), law, name, _), row in zip(parts, errors, strict=True):
+        case = robot.name, count, law, name
+        shown.setdefault(case, {key: row.pop(key) for key in ("path",) if key in row})
+        done.setdefault(case, []).append(row)
+        every.setdefault(("all", *case[1:]), []).append(row)
+    keys = "layout", "lost", "controller", "method"
+    rows = [row | shown[case] for row, case in zip(mean_rows(keys, done), done, strict=True)]
+    hopeless: list[Row] = [
+        {"layout": robot.name, "lost": count, "method": "cannot be steered"}
+        for robot, count, fins in cases
+        if fins is None
+    ]
+    return [*rows, *hopeless, *mean_rows(keys, dict(sorted(every.items(), key=lambda each: each[0][1])))]
 
 
-def _swim(
-    path: Trajectory, methods: Mapping[str, MethodSpec], lost: int, swim: tuple[Layout, str, str, int]
-) -> Row:
-    """Errors of one swim: its robot, method, controller and seed."""
-    robot, name, control, seed = swim
-    gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
-    controller = controller_of(control, robot)
-    loop = ClosedLoop(robot, methods[name].on(robot), path, controller, failures=gone, seed=seed)
-    return follow_row(loop.run())
+def _with_path(log: RunLog) -> Row:
+    """Errors, with times [s], and where the robot was and should have been [m]."""
+    columns = {"t": log.time, "position": log.position, "reference": log.reference}
+    path = {name: np.round(each[::PATH_EVERY], 4).tolist() for name, each in columns.items()}
+    return follow_row(log) | {"path": path}
+
+
+def _picture(rows: Sequence[Row]) -> "Figure":
+    """The paths of all rows that have one, a column for each layout."""
+    swims: dict[str, tuple[Array, Array, dict[str, tuple[Array, Array]]]] = {}
+    for row in [row for row in rows if "path" in row]:
+        time, position, reference = (np.array(row["path"][key]) for key in ("t", "position", "reference"))
+        paths = swims.setdefault(row["layout"], (time, reference, {}))[2]
+        paths[f"{row['controller']} by {row['method']}, {row['lost']} lost"] = time, position
+    return paths_picture(swims)
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
-    table, swum = paper_figures()["trajectory"], {row["layout"] for row in rows}
-    return [
-        {"layout": name, "method": "paper's method, printed", "controller": "waypoint", **row}
-        for name, row in table.items()
-        if name in swum
+    figures, layouts = paper_figures(), {row["layout"] for row in rows}
+    about = {"controller": "waypoint", "method": "paper's method, printed"}
+    healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
+    pool = [
+        {"layout": "in the pool", "lost": count} | about | table["ours"]
+        for count, table in enumerate(figures["fault_tolerance"].values())
     ]
+    return [row for row in healthy if row["layout"] in layouts] + pool
 
 
 experiment = Experiment(
     name="trajectory",
-    question="How closely do the paper's layouts follow a path, with the same controller for all?",
+    question="How closely do the paper's layouts follow a path, whole and with fins lost, by its waypoint "
+    "controller and by ours?",
     columns=(
         Column("layout", "layout"),
-        *WHO,
+        Column("lost", "fins lost", "count"),
+        Column("controller", "controller", "code"),
+        Column("method", "method", "code"),
+        Column("runs", "runs", "count"),
         *ERRORS,
         *POWER,
     ),
     run=run,
-    note=f"{ABOUT_ERRORS} The paper's runs took place in another simulator, on paths that it does not print.",
-    quick={"layouts": ("A", "C"), "methods": ("dual",), "runs": 1},
-    full={"runs": 2},
+    note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with lost fins "
+    "in a pool, on paths that it does not print. Lost are the first fins without which a robot can be "
+    "steered.",
+    quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": (0, 1)},
     printed=_printed,
+    picture=_picture,
+    for_picture={"paths": True},
 )

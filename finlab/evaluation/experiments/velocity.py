@@ -1,56 +1,54 @@
-"""A robot keeps a speed and a depth, for power and error of the speed, as in the paper."""
+"""Robots, whole and with fins lost, keep a speed and a depth by the paper's PID controller and by ours."""
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
 
-import numpy as np
-
-from finlab.control import controller_of
+from finlab.control import CONTROLLERS
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
-from finlab.evaluation.experiment import Experiment, paper_figures
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     POWER,
-    WHO,
+    Swim,
     depth_error,
-    first_lost,
+    losses_of,
     mean_rows,
     power_row,
+    speed_error,
+    swum,
 )
-from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.executor import map_parts
+from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
-from finlab.layout import Layout, load_layout
-from finlab.sim import ClosedLoop, RunLog, straight
+from finlab.layout import load_layout
+from finlab.sim import RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
+KEYS = ("layout", "lost", "speed", "controller", "method")
+"""What a row is of."""
 SETTLED_S = 10.0
 """After this time the start from rest is over [s]."""
-
-
 BASELINE = "fixed_frequency"
 """Method that stands for the paper's baseline, of which it does not say whether the frequency varies."""
 
 
 def run(
-    layout: str = "A",
+    layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     methods: tuple[str, ...] = ("dual", "mdn", "analytic", BASELINE),
     controllers: tuple[str, ...] = ("tracking", "velocity"),
-    lost: int = 0,
-    runs: int = 5,
+    lost: tuple[int, ...] = (0, 1, 2),
+    runs: int = 1,
     duration: float = 30.0,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each speed, method and controller, and one for each over all speeds.
+    """One row for each layout, number of lost fins, speed, controller and method, and one over all speeds.
 
     Args:
-        layout: a layout file or shipped name.
+        layouts: names or files.
         methods: names as in eval wrench.
-        controllers: tracking, velocity (the paper's).
-        lost: so many fins are lost from the start, the first without which it can still be steered.
+        controllers: tracking, velocity (the paper's), waypoint (the paper's of paths).
+        lost: how many fins are lost, announced from the start; a robot that needs them is left out.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -58,38 +56,33 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, specs = in_worker(load_layout, layout), load_method_specs(methods, checkpoint)
-    done: dict[tuple[float | None, str, str], list[Row]] = {}
-    swims = list(product(SPEEDS, specs, controllers, range(seed, seed + runs)))
-    errors = map_parts(partial(_swim, robot, specs, duration, lost), swims, "velocity", "swim")
-    for (speed, name, control, _), row in zip(swims, errors, strict=True):
-        for group in (speed, None):
-            done.setdefault((group, name, control), []).append(row)
-    rows = mean_rows("speed", done, None)
-    base = {(row["speed"], row["controller"]): row["inertial_w"] for row in rows if row["method"] == BASELINE}
-    for row in rows if base else ():
-        row["over_baseline"] = row["inertial_w"] / base[row["speed"], row["controller"]]
+    check_names("controllers", controllers, CONTROLLERS)
+    robots = [in_worker(load_layout, name) for name in layouts]
+    specs = load_method_specs(methods, checkpoint)
+    cases = [(robot, *loss) for robot in robots for loss in losses_of(robot, lost).items()]
+    able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
+    parts = list(product(able, SPEEDS, controllers, specs, range(seed, seed + runs)))
+    swims = [
+        Swim(robot, straight(duration, speed), name, law, k, fins)
+        for (robot, _, fins), speed, law, name, k in parts
+    ]
+    done: dict[tuple[str, int, float | None, str, str], list[Row]] = {}
+    for ((robot, count, _), speed, law, name, _), row in zip(
+        parts, swum(specs, swims, "velocity", _row), strict=True
+    ):
+        for shown in (speed, None):
+            done.setdefault((robot.name, count, shown, law, name), []).append(row)
+    order = sorted(done, key=lambda case: (case[:2], case[2] is None))
+    rows = mean_rows(KEYS, {case: done[case] for case in order})
+    base = {case[:4]: row["inertial_w"] for case, row in zip(order, rows, strict=True) if case[4] == BASELINE}
+    for case, row in zip(order, rows, strict=True) if base else ():
+        row["over_baseline"] = row["inertial_w"] / base[case[:4]]
     return rows
-
-
-def _swim(
-    robot: Layout,
-    methods: Mapping[str, MethodSpec],
-    duration: float,
-    lost: int,
-    swim: tuple[float, str, str, int],
-) -> Row:
-    """Errors and power of one swim: its speed, method, controller and seed."""
-    speed, name, control, seed = swim
-    gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
-    path, controller = straight(speed, duration), controller_of(control, robot)
-    loop = ClosedLoop(robot, methods[name].on(robot), path, controller, failures=gone, seed=seed)
-    return _row(loop.run())
 
 
 def _row(log: RunLog) -> Row:
     """Errors of one run [m/s, m] and power [W]."""
-    error = np.abs(log.motion[:, 0] - log.reference_surge)
+    error = speed_error(log)
     return {
         "mae": float(error.mean()),
         "mae_settled": float(error[log.time >= SETTLED_S].mean()),
@@ -100,10 +93,11 @@ def _row(log: RunLog) -> Row:
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+    about = {"layout": "in the pool", "lost": 0, "controller": "velocity"}
     figures = paper_figures()["velocity"]
     base = figures["baseline"]["inertial_w"]
     return [
-        {"method": names[key], "controller": "velocity", "over_baseline": row["inertial_w"] / base, **row}
+        {**about, "method": names[key], "over_baseline": row["inertial_w"] / base, **row}
         for key, row in figures.items()
     ]
 
@@ -112,8 +106,12 @@ experiment = Experiment(
     name="velocity",
     question="What power does it take to keep a speed and a depth, and how well are they kept?",
     columns=(
+        Column("layout", "layout"),
+        Column("lost", "fins lost", "count"),
         Column("speed", "speed", "ratio", unit="m/s"),
-        *WHO,
+        Column("controller", "controller", "code"),
+        Column("method", "method", "code"),
+        Column("runs", "runs", "count"),
         Column("mae", "MAE of the speed", "metres", unit="m/s"),
         Column("mae_std", "spread", "error", unit="m/s"),
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),
@@ -123,8 +121,8 @@ experiment = Experiment(
     ),
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's sum of I "
-    "alpha omega, of its magnitudes. The paper's runs took place in a pool; `fixed_frequency` stands for its "
-    "baseline, of which it does not say whether the frequency varies.",
-    quick={"runs": 1},
+    "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
+    quick={"layouts": ("A",), "lost": (0,)},
+    full={"layouts": ("A",), "lost": (0,), "runs": 5},
     printed=_printed,
 )

@@ -23,13 +23,22 @@ def line(tmp_path: Path) -> str:
 
 def test_trajectory(line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
-    argv = ["eval", "trajectory", "--layouts", "A", "--trajectory", line, "--methods", "analytic"]
-    assert main([*argv, "--runs", "2", "--json", str(file)]) == 0
-    one, every = json.loads(file.read_text())["rows"]
-    assert (one["layout"], one["runs"], every["layout"]) == ("A", 2, "all")
-    assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
+    argv = ["eval", "trajectory", "--layouts", "A,D", "--trajectory", line, "--methods", "analytic"]
+    picture = tmp_path / "paths.svg"
+    assert main([*argv, "--runs", "2", "--json", str(file), "--plot", str(picture)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    laws = "tracking", "waypoint"
+    cases = [
+        (name, lost, law) for name, most in (("A", 2), ("D", 1)) for lost in range(most + 1) for law in laws
+    ]
+    cases += [("D", 2, None), *(("all", lost, law) for lost in range(3) for law in laws)]
+    assert [(row["layout"], row["lost"], row.get("controller")) for row in rows] == cases
+    assert all(0.0 < row["ate"] < 0.3 and row["ate_std"] > 0.0 for row in rows if "ate" in row)
+    first = rows[0]["path"]
+    assert len(first["t"]) == len(first["position"]) == len(first["reference"]) == 16
     shown = capsys.readouterr().out
-    assert "paper's method, printed" in shown and "0.1335" in shown
+    assert "paper's method, printed" in shown and "0.1335" in shown and "0.2514" in shown
+    assert b"waypoint by analytic, 2 lost" in picture.read_bytes()
 
 
 def test_faults(layout_a: Layout, line: str) -> None:
@@ -48,12 +57,14 @@ def test_faults(layout_a: Layout, line: str) -> None:
 
 
 def test_velocity() -> None:
-    rows = load_experiment("velocity").rows(methods=("fixed_frequency", "dual"), runs=1, duration=12.0)
-    assert [row["speed"] for row in rows] == [0.1, 0.1, 0.15, 0.15, 0.2, 0.2, None, None]
-    assert rows[-2]["mae"] == pytest.approx(np.mean([row["mae"] for row in rows[:6:2]]))
-    baseline, dual = rows[-2:]
-    assert baseline["over_baseline"] == 1.0 and dual["over_baseline"] < 0.9
-    assert dual["over_baseline"] == pytest.approx(dual["inertial_w"] / baseline["inertial_w"])
+    rows = load_experiment("velocity").rows(layouts=("A",), methods=("analytic",), lost=(0, 1), duration=12.0)
+    assert [(row["lost"], row["speed"], row["controller"]) for row in rows] == [
+        (lost, speed, law)
+        for lost in (0, 1)
+        for speed in (0.1, 0.15, 0.2, None)
+        for law in ("tracking", "velocity")
+    ]
+    assert rows[6]["mae"] == pytest.approx(np.mean([row["mae"] for row in rows[:6:2]]))
 
 
 @pytest.mark.parametrize(
@@ -61,6 +72,9 @@ def test_velocity() -> None:
     [
         (["trajectory", "--runs", "0"], "runs: expected a number of at least 1"),
         (["trajectory", "--trajectory", "spiral"], "circle, lissajous, square"),
+        (["trajectory", "--controllers", "pid"], "expected some of tracking, waypoint, velocity"),
+        (["trajectory", "--lost", "0,-1"], "lost: expected numbers from 0, got -1"),
+        (["trajectory", "--plot", "paths.doc"], "ends in .png, .svg, .pdf"),
         (["faults", "--methods", ","], "methods: expected names"),
         (["velocity", "--duration", "5"], "more than 10 s"),
         (["swims", "--seeds", "0"], "seeds: expected a number of at least 1"),

@@ -1,0 +1,137 @@
+"""The robot that really swims, where its layout is not quite right, and what breaks on the way.
+
+    ClosedLoop(layout, allocator, task, truth=perturbed(layout, damping=2.0))
+
+Controllers, gains and allocators go on believing the layout; only the simulated body is another one.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, NamedTuple, cast
+
+import numpy as np
+from msgspec import Meta
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError, LayoutError
+from finlab.files.schema import checked
+from finlab.layout import Layout
+from finlab.layout.damage import Damage, Kind
+from finlab.layout.directions import rotation, with_axes
+from finlab.vehicle.fossen import complete_body
+from finlab.vehicle.vehicle import Vehicle
+
+Factor = Annotated[float, Meta(gt=0.0, le=100.0)]
+
+
+def perturbed(
+    layout: Layout,
+    *,
+    damping: float = 1.0,
+    added_mass: float = 1.0,
+    inertia: float = 1.0,
+    buoyancy: float = 1.0,
+    askew: float = 0.0,
+    center: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Layout:
+    """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
+    Raises LayoutError: a factor is not above 0.
+
+    Args:
+        layout: what is believed.
+        damping: factor of linear and quadratic damping.
+        added_mass: factor of the added mass.
+        inertia: factor of the moments of inertia; the mass stays, and with it the weight.
+        buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
+        askew: how far actuators are turned about the vertical [rad], one this way and the next that way.
+        center: the true centre of gravity as the layout's frame sees it (3,) [m]; the robot is ballasted to
+            lie level all the same, so its centre of buoyancy is where the layout says, seen from there.
+    """
+    factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
+    for name, factor in factors.items():
+        checked(factor, Factor, key=name)
+    body = complete_body(layout)
+    changed = replace(
+        body,
+        linear_damping=_scaled(body.linear_damping, damping),
+        quadratic_damping=_scaled(body.quadratic_damping, damping),
+        added_mass=_scaled(body.added_mass, added_mass),
+        inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
+        buoyancy_n=buoyancy * Vehicle(body).lift,
+    )
+    swum = replace(layout, body=changed)
+    if askew == 0.0 and not any(center):
+        return swum
+    parts = []
+    for k, part in enumerate(layout.actuators):
+        turn = rotation((0.0, 0.0, 1.0), askew * (-1.0) ** k)
+        parts.append(with_axes(part, np.array(part.frame) @ turn.T, np.subtract(part.position, center)))
+    return replace(swum, actuators=tuple(parts))
+
+
+def checked_truth(layout: Layout, truth: Layout) -> Layout:
+    """The true robot; a `LayoutError` where it does not have the actuators of the layout that is believed."""
+    if [(part.name, part.type) for part in truth.actuators] != [(p.name, p.type) for p in layout.actuators]:
+        known, names = ", ".join(layout.names), ", ".join(truth.names)
+        raise LayoutError(f"truth: expected the actuators of {layout.name}, {known}, got {names}")
+    return truth
+
+
+def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] | None:
+    return None if values is None else tuple(factor * value for value in values)
+
+
+KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
+"""What can become of a fin in a swim: it hangs still; it gives a share of its thrust; it beats but
+no longer turns; it works again as it should."""
+
+
+class FinFault(NamedTuple):
+    """One event of a swim; `("front_left", 30.0)` is a fin that is lost."""
+
+    fin: str
+    time_s: float
+    """When [s]."""
+    kind: Kind = "lost"
+    share: float = 0.5
+    """Share of the thrust that is left of a torn fin, above 0 and below 1; of no meaning for the others."""
+
+    @classmethod
+    def parse(cls, text: str) -> "FinFault":
+        """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:torn=SHARE` says; else
+        a `FinlabError`."""
+        name, at, rest = text.rpartition("@")
+        number, _, what = rest.partition(":")
+        kind, equals, share = what.partition("=")
+        try:
+            known = cast(Kind, kind or "lost")
+            fault = cls(name, float(number), known, float(share) if equals else 0.5).checked()
+        except (ValueError, FinlabError):
+            fault = None
+        if not at or not name or fault is None or (equals and kind != "torn"):
+            raise FinlabError(
+                "--fail: expected NAME@SECONDS such as front_left@30, with :torn=0.5, :stuck or :whole after "
+                f"it for what is no loss, got {text!r:.60}"
+            )
+        return fault
+
+    def checked(self) -> "FinFault":
+        """Itself; a `FinlabError` where a time, a kind or a share is none."""
+        if not (math.isfinite(self.time_s) and self.time_s >= 0.0):
+            raise FinlabError(f"failure of {self.fin}: expected a time of 0 s or more, got {self.time_s}")
+        if self.kind not in KINDS:
+            raise FinlabError(f"failure of {self.fin}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
+        if not 0.0 < self.share < 1.0:
+            raise FinlabError(
+                f"failure of {self.fin}: expected a share of the thrust between 0 and 1, got {self.share}"
+            )
+        return self
+
+
+def damage_of(layout: Layout, faults: Mapping[str, FinFault], held: Array) -> Damage:
+    """What faults, by name, leave of a robot; `held` (n,) is where actuators are stuck."""
+    torn = {name: fault.share for name, fault in faults.items() if fault.kind == "torn"}
+    stuck = {name: float(held[layout.index(name)]) for name, fault in faults.items() if fault.kind == "stuck"}
+    lost = [name for name, fault in faults.items() if fault.kind == "lost"]
+    return Damage.of(layout, lost, torn, stuck)
