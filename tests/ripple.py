@@ -31,7 +31,7 @@ class RippleForce(ActuatorForce):
         """See `ActuatorForce`."""
         motion, length = self._beat, self.blade.length
         force = super().of_fins(dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
-        angle, speed = motion.angle + math.pi, motion.speed
+        angle, speed = motion.angle + math.pi, motion.speed_and_acceleration()[0]
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
         drag = self.blade.drag_per_length * length**3 / 3.0 * speed * np.abs(speed)

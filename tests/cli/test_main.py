@@ -174,7 +174,7 @@ def keys(value: Any) -> Any:
     [
         "eval wrench R",
         "eval faults R",
-        "eval velocity R",
+        "eval velocity --layouts R",
         "eval trajectory --layouts R",
         "app --layout R",
     ]

@@ -11,7 +11,7 @@ from finlab.control.observer import Estimate
 from finlab.layout import Layout
 from finlab.sim import make_trajectory
 from finlab.sim.truth import perturbed
-from finlab.vehicle.attitude import euler, quaternion_of_yaw
+from finlab.vehicle.attitude import euler, quaternion_of
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -95,7 +95,7 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
     ]
     along = MotionObserver(robot, 0.1).wrenches_along(flat, np.zeros(2), 0.08)
     vehicle, state = Vehicle(complete_body(robot)), np.zeros(13)
-    state[3:7] = quaternion_of_yaw(0.0)
+    state[3:7] = quaternion_of(0.0, 0.0, 0.0)
     for wrench in along:
         for _ in range(5):
             state = vehicle.step(state, wrench.tolist(), 0.02)
