@@ -106,7 +106,7 @@ class NetworkConfig:
 
 
 class Mixture(NamedTuple):
-    """A mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets."""
+    """A mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets (Eq. 2)."""
 
     logits: Values
     """Unnormalized log weights (B, n, M)."""
@@ -130,7 +130,7 @@ class Mixture(NamedTuple):
 
     def sample(self, uniform: Values, normal: Values, temperature: float = 1.0) -> Values:
         """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the power 1/T, the
-        Gaussians keep their deviations (paper, command generation).
+        Gaussians keep their deviations (Eq. 3).
 
         Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the rest.
         """

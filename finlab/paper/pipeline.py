@@ -137,7 +137,7 @@ class Paper(LeastErrorMethod):
         return np.asarray(mixture.sample(uniform, normal, self.settings.temperature))
 
     def _score(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
-        """J = J_norm + gamma J_en (N, K) of commands (N, K, n, 3), by the surrogate."""
+        """J = J_norm (Eq. 8) + gamma J_en (Eq. 9) (N, K) of commands (N, K, n, 3), by the surrogate."""
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
         force = self.surrogate.force(flat).reshape(rows, k, -1)

@@ -70,7 +70,7 @@ class SurrogateConfig:
 
 
 class LayoutSurrogate:
-    """A surrogate on one layout of n fins, with the gradient of its forces; in single precision."""
+    """A surrogate (Eq. 4) on one layout of n fins, with the gradient of its forces; in single precision."""
 
     def __init__(self, layout: Layout, weights: TrainedWeights) -> None:
         """Take over the surrogate of a checkpoint; a `CheckpointError` where it holds none."""

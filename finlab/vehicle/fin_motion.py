@@ -135,7 +135,7 @@ class FinMotion(FinLag):
 
     @property
     def angle(self) -> Array:
-        """The fins' angles [rad]: theta = A sin(phase) + zero direction."""
+        """The fins' angles [rad]: theta = A sin(phase) + zero direction (the paper's Eq. 1)."""
         return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
 
     def speed_and_acceleration(self) -> tuple[Array, Array]:
