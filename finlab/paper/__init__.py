@@ -11,6 +11,6 @@ Where each of its equations stands:
 (8) J_norm, and J = J_norm + gamma J_en: `pipeline.py`, `Paper._score`
 (9) J_en: `finlab/physics/objective.py`, `command_effort`
 
-QP and SQP of its section on baselines: `finlab/allocation/baselines/linear.py`; its two body-frame controllers
-(section III): `finlab/control/body_frame.py`; its tables and figures: `finlab/evaluation/experiments`.
+QP and SQP of its section on baselines: `finlab/allocation/baselines/linear.py`; its two body-frame
+controllers: `finlab/control/body_frame.py`; its tables and figures: `finlab/evaluation/experiments`.
 """

@@ -106,7 +106,7 @@ class NetworkConfig:
 
 
 class Mixture(NamedTuple):
-    """A mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets (Eq. 2)."""
+    """Mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets: Eq. 2."""
 
     logits: Values
     """Unnormalized log weights (B, n, M)."""

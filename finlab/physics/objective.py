@@ -41,7 +41,8 @@ def fin_effort(command: Values, upper: Values) -> Values:
 
 
 def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
-    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
+    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN)
+    count nothing."""
     effort = fin_effort(command, upper)
     return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
 
