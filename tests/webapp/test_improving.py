@@ -30,7 +30,7 @@ def test_search_is_cancelled_and_what_it_found_is_offered(worker: Worker) -> Non
     improver.start(State(NO_YAW), request)
     with pytest.raises(FinlabError, match="running already"):
         improver.start(State(NO_YAW), request)
-    until(lambda: improver.progress is not None)
+    until(lambda: improver.progress is not None and improver.progress.best > improver.progress.before)
     improver.cancel()
     until(lambda: improver.findings is not None)
     assert improver.findings is not None and improver.findings.cancelled and not improver.busy
