@@ -24,8 +24,7 @@ from finlab.layout.layout import Actuator
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
-PROBE = 0.1
-"""Share of its bounds by which a number is changed to see what it costs."""
+PROBE = 0.1  # share of its bounds by which a number is changed to see what it costs
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,7 @@ def least_power(
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
 
 
-UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
-"""Wrench along each axis whose least power is given [N, N m]."""
+UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)  # wrench along each axis whose least power is given [N, N m]
 
 
 @dataclass(frozen=True)

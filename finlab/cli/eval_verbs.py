@@ -137,8 +137,7 @@ def report(
     print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
 
 
-QUICK = ("id", "ood", "limits", "failure")
-"""Splits of a quick run."""
+QUICK = ("id", "ood", "limits", "failure")  # splits of a quick run
 
 
 def bench(

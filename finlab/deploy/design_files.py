@@ -25,8 +25,7 @@ from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, robot_of
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
-TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
-"""Where files are kept, inside a folder."""
+TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"  # where files are kept, inside a folder
 A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 

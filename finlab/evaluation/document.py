@@ -94,8 +94,7 @@ class Table:
         )
 
 
-Block = str | Table
-"""A string is Markdown."""
+Block = str | Table  # a string is Markdown
 
 
 def to_markdown(*blocks: Block) -> str:

@@ -27,8 +27,7 @@ EXPERIMENTS = (
     *("trajectory", "faults", "velocity", "swims"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
-MOST, MOST_SEED = 1_000_000, 2**63 - 1
-"""Largest whole number of an option, and of a seed."""
+MOST, MOST_SEED = 1_000_000, 2**63 - 1  # largest whole number of an option, and of a seed
 Item = TypeVar("Item")
 
 

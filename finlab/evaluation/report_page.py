@@ -18,8 +18,7 @@ from finlab.evaluation.document import Block, Row, to_markdown
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment, progress
 from finlab.whole_file import make_folder, write_whole
 
-PAGE, TABLES = "report.md", "tables.json"
-"""What a report's folder holds."""
+PAGE, TABLES = "report.md", "tables.json"  # what a report's folder holds
 SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "

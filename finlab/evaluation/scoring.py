@@ -20,12 +20,10 @@ from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.physics import plant_of
 from finlab.physics.objective import command_effort
 
-Columns = dict[str, AnyArray]
-"""Arrays of N entries by name."""
+Columns = dict[str, AnyArray]  # arrays of N entries by name
 LEVEL = 0.994426  # share of a normal variable within sqrt(2) times 1.96 standard deviations
 REPLICATES = 2000
-Interval = tuple[float, float]
-"""Its low and its high end."""
+Interval = tuple[float, float]  # its low and its high end
 
 
 def run_method(

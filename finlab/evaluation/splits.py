@@ -28,10 +28,8 @@ from finlab.physics import Plant, TableLaw, make_law, write_table
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
-OOD_FINS = (6, 8)
-"""Least and most fins in split `ood-fins`."""
-MANY_FINS = (9, 12)
-"""Least and most fins in split `many-fins`."""
+OOD_FINS = (6, 8)  # least and most fins in split `ood-fins`
+MANY_FINS = (9, 12)  # least and most fins in split `many-fins`
 NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005

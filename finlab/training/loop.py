@@ -24,19 +24,13 @@ from finlab.networks.trained import State
 from finlab.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
-LOG_FILE = "log.csv"
-"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
-STATE_FILE = "resume.pt"
-"""What a run goes on from."""
+LOG_FILE = "log.csv"  # one row per logged step: step, samples, seconds, learning rate and every loss term
+STATE_FILE = "resume.pt"  # what a run goes on from
 CURVES_FILE = "curves.png"
-APART = ("step", "samples", "seconds")
-"""Columns of the log that are no curves."""
-LOG_EVERY = 20
-"""Steps after which a row is logged."""
-SAVE_EVERY_S = 15.0
-"""Seconds after which state, log and checkpoint are written."""
-CLIP = 1.0
-"""Longest gradient."""
+APART = ("step", "samples", "seconds")  # columns of the log that are no curves
+LOG_EVERY = 20  # steps after which a row is logged
+SAVE_EVERY_S = 15.0  # seconds after which state, log and checkpoint are written
+CLIP = 1.0  # longest gradient
 
 Terms = Callable[[int], dict[str, Tensor]]
 """Loss terms of a step of training, `loss` among them, as means over the batch."""

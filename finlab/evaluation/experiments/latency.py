@@ -22,8 +22,7 @@ from finlab.layout.random_layouts import random_robot, random_thruster
 from finlab.physics import plant_of
 
 DOMAIN = 0xF1257  # leads the seed of every robot
-REFERENCE = "dual"
-"""The method that the others are compared with, where it takes part."""
+REFERENCE = "dual"  # the method that the others are compared with, where it takes part
 LAYOUTS = 5  # robots of each kind whose calls are timed
 TARGETS = 40  # directions of wrenches on each of them
 WARM_UP = 2  # first calls on each robot that are not counted; a robot keeps its layout for long

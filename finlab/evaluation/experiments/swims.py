@@ -29,8 +29,7 @@ GAP_N = 0.1
 of reach [N]."""
 FIGURES = ("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "cpu_s_per_min", "turn")
 """All figures of a swim."""
-LARGEST = ("turn", "peak_w")
-"""Those of which a row has the largest of its swims, not the mean."""
+LARGEST = ("turn", "peak_w")  # those of which a row has the largest of its swims, not the mean
 
 
 def run(

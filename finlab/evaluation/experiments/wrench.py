@@ -18,8 +18,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
 
-SUCCESS_LEVELS = (0.01, 0.5, 1.0)
-"""Levels t of `success_t`, the share of targets with `err_norm <= t`."""
+SUCCESS_LEVELS = (0.01, 0.5, 1.0)  # levels t of `success_t`, the share of targets with `err_norm <= t`
 OWN_DOMAIN = 0x0711  # leads the seed of the draws on a user's own layout
 HARD = ("id", "ood", "ood-fins", "limits", "failure", "near-singular", "fins-mixed", "tables", "many-fins")
 """Splits of the report."""
