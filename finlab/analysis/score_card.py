@@ -10,26 +10,14 @@ from numpy.typing import ArrayLike
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
 from finlab.allocation.yardstick import REACHED
-from finlab.analysis.authority import (
-    AXES,
-    Authority,
-    HeldAxes,
-    Loss,
-    authority,
-    held_axes,
-    losses,
-)
+from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.arrays import Array
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
 
 
 def least_power(
-    layout: Layout,
-    wrenches: ArrayLike,
-    *,
-    failed: Collection[str] = (),
-    flow: ArrayLike | None = None,
+    layout: Layout, wrenches: ArrayLike, *, failed: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Array:
     """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
     as for an allocator. Raises LayoutError: there is no actuator of a name in `failed`."""

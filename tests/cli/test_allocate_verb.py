@@ -207,10 +207,7 @@ def hostile_files() -> dict[str, bytes]:
 
 @pytest.mark.parametrize("name", sorted(hostile_files()))
 def test_hostile_files_end_in_one_sentence(
-    name: str,
-    allocate: Callable[..., tuple[int, str, str]],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    name: str, allocate: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "hostile.yaml"
