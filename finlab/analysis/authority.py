@@ -97,14 +97,8 @@ def losses(
     flow: ArrayLike | None = None,
 ) -> tuple[Loss, ...]:
     """Returns what the loss of each working actuator, on top of `failed`, would cost; none when only one is
-    left. Raises LayoutError: there is no actuator of a name in `failed`.
-
-    Args:
-        layout: the robot.
-        failed: actuators that are lost already.
-        before: what the working actuators hold, if that is known.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-    """
+    left. What these hold `before` may be known; `flow` is the velocity (6,) of the body relative to the water
+    [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no actuator of a name in `failed`."""
     held = authority(layout, failed, flow) if before is None else before
     working = [name for name in layout.names if name not in failed]
     if len(working) < 2:

@@ -106,12 +106,11 @@ class Moves:
         grid: tuple[float, float] = (0.0, 0.0),
         flow: Array | None = None,
     ) -> None:
-        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the first.
-
-        One that is moved along with its twin needs no bounds of its own. Free coordinates and angles are
-        multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow`
-        as for `force_sets`. Raises LayoutError: an actuator is unknown, none is named, one has no bounds, a
-        pair is not mirrored or shares one with another pair, or nothing is free to move."""
+        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the first: one
+        that moves along with its twin needs no bounds of its own. Free coordinates and angles are multiples
+        of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow` as for
+        `force_sets`. Raises LayoutError: an actuator is unknown, none is named, one has no bounds, a pair is
+        not mirrored or shares one with another pair, or nothing is free to move."""
         kind = "fin" if layout.is_of_fins else "actuator"
         if not names:
             raise LayoutError(f"expected at least one {kind} to move, got none")
@@ -211,7 +210,6 @@ def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
 
 
 def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Who is whose twin, both ways."""
     twins: dict[str, str] = {}
     kind = "a fin" if layout.is_of_fins else "an actuator"
     for pair in pairs:

@@ -68,14 +68,9 @@ class ScoreCard:
 
 
 def score_card(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `failed` push nothing. Raises LayoutError:
-    there is no actuator of a name in `failed`; CommandError: `flow` is not six finite numbers.
-
-    Args:
-        layout: the robot.
-        failed: actuators that are lost.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-    """
+    """Returns the score card of a layout whose actuators called `failed` push nothing, in a flow as for
+    `losses`. Raises LayoutError: there is no actuator of a name in `failed`; CommandError: `flow` is not six
+    finite numbers."""
     water = check_flow(flow)
     held = authority(layout, failed, water)
     power = least_power(layout, np.diag(UNIT), failed=failed, flow=water)
@@ -102,7 +97,6 @@ def _left(loss: Loss) -> tuple[float, ...]:
 
 
 def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple[str, ...]:
-    """What is not exact, and what is without effect."""
     sets = force_sets(layout, failed, flow)
     notes = []
     n_wide = len(wide_arcs(sets))

@@ -7,7 +7,7 @@ writes its files before it prints, so that a reader that goes away (`finlab ... 
 
 import io
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 
 from tyro.extras import SubcommandApp
@@ -28,7 +28,6 @@ EXAMPLES = {
     "layout convert": "finlab layout convert robot.urdf my_robot.yaml",
     "data": "finlab data generate -o runs/data --layouts 200 --commands 500",
     "train": "finlab train mdn -o runs/mine --preset smoke",
-    "train mdn": "finlab train mdn -o runs/mine --preset smoke",
     "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
     "train allocator": "finlab train allocator -o runs/paper --surrogate runs/surrogate --preset smoke",
     "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods dual,sqp",
@@ -36,7 +35,6 @@ EXAMPLES = {
     "bench": "finlab bench dual analytic --quick --json bench.json",
     "fit": "finlab fit fin cell.csv -o fin.csv",
     "fit actuator": "finlab fit actuator bench.csv -o thruster.csv",
-    "fit fin": "finlab fit fin cell.csv -o fin.csv",
     "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
     "simulate": "finlab simulate A --duration 30 -o swim",
     "export": "finlab export A -o my_robot",
@@ -46,11 +44,8 @@ EXAMPLES = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0, or 2 after one plain sentence on stderr.
-
-    Args:
-        argv: the arguments after the program's name; those of this process by default.
-    """
+    """Run one command, by the arguments after the program's name, those of this process by default; the exit
+    code, 0, or 2 after one plain sentence on stderr."""
     return exit_code("finlab", lambda: _run(list(sys.argv[1:] if argv is None else argv)))
 
 
@@ -59,8 +54,10 @@ def _run(argv: list[str]) -> int:
         print(f"finlab {__version__}")
         return 0
     if not {"--help", "-h"}.isdisjoint(argv):
-        code, page = help_page(argv, lambda: _parsed(argv))
-        print(page)
+        caught = io.StringIO()
+        with redirect_stdout(caught):  # what is no terminal gets no boxes
+            code = _parsed(argv)
+        print(f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}")
         return code
     try:
         return _parsed(with_json_file(argv))
@@ -73,14 +70,12 @@ def _run(argv: list[str]) -> int:
 
 def _parsed(argv: list[str]) -> int:
     """Parse and run; turn the parser's exit into a code."""
+    about = "Control allocation for underwater robots: a target wrench in, commands out."
     try:
-        code: int | None = _command_line(argv).cli(prog="finlab", description=_DESCRIPTION, args=argv)
+        code: int | None = _command_line(argv).cli(prog="finlab", description=about, args=argv)
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else FAILED
     return code or 0
-
-
-_DESCRIPTION = "Control allocation for underwater robots: a target wrench in, commands out."
 
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
@@ -99,14 +94,6 @@ def _command_line(argv: Sequence[str]) -> SubcommandApp:
     root.command(robot_verbs.export)
     root.command(robot_verbs.app)
     return root
-
-
-def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
-    """The page that `write` prints for arguments, with its example; before it the exit code."""
-    caught = io.StringIO()
-    with redirect_stdout(caught):  # what is no terminal gets no boxes
-        code = write()
-    return code, f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}"
 
 
 def example(argv: Sequence[str]) -> str:

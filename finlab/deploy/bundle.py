@@ -84,14 +84,10 @@ class Bundle:
 
 
 def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
-    """Prepare what a robot runs: the robot, method and settings of an allocator. Raises LayoutError: an
-    unknown failed fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a force
-    table cannot be read, or something is too large to travel.
-
-    Args:
-        allocator: of method `dual`, `mdn` or `paper`; networks that do not come with finlab travel.
-        failed: names of fins that do not work.
-    """
+    """Prepare what a robot runs: the robot, method (`dual`, `mdn` or `paper`) and settings of an allocator,
+    and the names of fins that do not work; networks that do not come with finlab travel. Raises LayoutError:
+    an unknown failed fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a
+    force table cannot be read, or something is too large to travel."""
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"

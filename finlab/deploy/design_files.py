@@ -107,17 +107,11 @@ def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
-    """A layout from a stranger, and the files that came along kept in a folder; no other file is opened.
-    Raises LayoutError: it names a force table that did not come along; FinlabError: a file cannot be kept, or
-    is no hull.
-
-    Args:
-        layout: it may name any path.
-        parts: contents of what came along, by the paths by which the layout can name it; a file of the
-            same name does where there is no other, since files that are sent at once have lost their folders.
-        folder: where to keep them.
-        source: what to call the layout in errors.
-    """
+    """A layout from a stranger, which may name any path, and the parts that came along kept in a folder; no
+    other file is opened. These have the paths by which the layout can name them; a file of the same name does
+    where there is no other, since files that are sent at once have lost their folders. Raises LayoutError:
+    the layout, called `source`, names a force table that did not come along; FinlabError: a file cannot be
+    kept, or is no hull."""
     by_name = {Path(path).name: path for path in parts}
     actuators, missing = [], []
     for part in layout.actuators:

@@ -67,17 +67,10 @@ class Case(NamedTuple):
 
 
 def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
-    """The test cases of a split.
+    """The test cases of a split, one of `SPLITS`: layouts, and targets for each of them.
 
     Layout k and its first targets depend on the split, the seed and k alone, so that a small run is the
-    beginning of a large one. Raises DataError: unknown split, or a number out of range.
-
-    Args:
-        name: one of `SPLITS`.
-        n_layouts: how many layouts, at least 1.
-        n_targets: targets per layout, at least 1.
-        seed: not negative.
-    """
+    beginning of a large one. Raises DataError: unknown split, fewer than one, or a negative seed."""
     if name not in SPLITS:
         raise DataError(f"split: expected one of {', '.join(SPLITS)}, got {name!r}")
     for value, what, least in ((n_layouts, "layouts", 1), (n_targets, "targets", 1), (seed, "seed", 0)):
@@ -140,13 +133,11 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
 
 
 def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    """All fins of one random model."""
     layout, model = random_layout(rng, name), random_fin_model(rng)
     return replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins)), ()
 
 
 def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    """Each fin of a random model of its own."""
     layout = random_layout(rng, name)
     fins = (replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
     return replace(layout, actuators=tuple(fins)), ()

@@ -79,15 +79,8 @@ class Training:
         identity: dict[str, Any],
         place: Workplace,
     ) -> None:
-        """Prepare a run.
-
-        Args:
-            weights: what is trained, by name; changed in place.
-            settings: of the loop.
-            folder: for log, curves and state; made if need be.
-            identity: settings that a resumed run must share, as plain values.
-            place: where it runs; of several processes the first one writes.
-        """
+        """Takes weights by name, which are changed in place; a folder, made if need be, for log, curves and
+        state; and the settings that a resumed run must share, as plain values."""
         self.weights, self.settings, self.place = weights, settings, place
         self.folder, self.identity = make_folder(folder), identity
         self.optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate)
@@ -124,13 +117,8 @@ class Training:
             )
 
     def run(self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0) -> None:
-        """Minimize the term `loss` to the end of the run.
-
-        Args:
-            terms_of: see `Terms`.
-            save: takes the weights to ship and how far the run is, now and then and at the end.
-            spent: seconds that this call has taken so far, on other work of the run.
-        """
+        """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how far it is,
+        now and then and at the end; `spent` are seconds that this call took so far, on other work."""
         settings, first = self.settings, self.done
         limit = math.inf if settings.seconds is None else settings.seconds
         started = time.monotonic() - self.seconds - spent
@@ -176,10 +164,7 @@ class Training:
         return values["loss"]
 
     def _write(self, save: Callable[[State, dict[str, Any]], None]) -> float:
-        """Write all that the run leaves; the state last, so that a run killed in between only repeats steps.
-
-        Returns the time at which it was done.
-        """
+        """Write all that the run leaves, the state last, as it may be killed in between; the time of it."""
         if self.place.rank == 0:
             samples = self.done * self.settings.batch_size
             made = {"steps_done": self.done, "samples": samples, "processes": self.place.world}

@@ -122,7 +122,7 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
     ("arguments", "message"),
     [
         ("-o README.md", "out: expected a folder, got the file README.md"),
-        ("-o somewhere --sections nothing", "sections: expected all or some of wrench, "),
+        ("-o somewhere --sections nothing", "sections: expected some of all, wrench, "),
     ],
 )
 def test_bad_input_is_one_sentence(

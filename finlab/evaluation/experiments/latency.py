@@ -118,15 +118,9 @@ def _rows(
 def call_times(
     method: MethodSpec, timed: Sequence[Timed], share: float | None, calls: int, budget: float
 ) -> tuple[list[float], list[Allocation]]:
-    """The processor's time of each counted call [ms], of robots visited in turn, and its answer.
-
-    Args:
-        method: who answers.
-        timed: the robots.
-        share: of reach, of the targets; None for targets that wander, with the command of the tick before.
-        calls: at most so many.
-        budget: no further call on a robot after its part of this time [s].
-    """
+    """The processor's time of each counted call [ms], at most so many, of robots visited in turn, and its
+    answer. Without a share of reach targets wander, with the command of the tick before. After its part of
+    the budget [s] a robot gets no further call."""
     times, answers, ahead = list[float](), list[Allocation](), -(-calls // len(timed))
     for robot in timed:
         allocator, spent, previous = method.on(robot.layout), 0.0, None

@@ -76,7 +76,6 @@ def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
 
 
 def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case, int]) -> Row:
-    """Figures of one swim of a day: its method, case and seed."""
     name, case, seed = part
     loop = day.swim(case, methods[name], seed)
     start = time.process_time()
@@ -85,12 +84,8 @@ def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case
 
 
 def swim_figures(log: RunLog, cpu_s: float) -> Row:
-    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and cost.
-
-    Args:
-        log: one swim along a trajectory.
-        cpu_s: processor's time that it took, simulation included [s].
-    """
+    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and cost of one
+    swim along a trajectory, which took `cpu_s` seconds of the processor, simulation included."""
     minutes = log.n_ticks * float(log.time[1] - log.time[0]) / 60.0
     gap = np.linalg.norm((log.asked - log.allocated) / [1, 1, 1, LEVER_M, LEVER_M, LEVER_M], axis=1)
     turn = command_change(log.command)[..., 2]
