@@ -36,8 +36,9 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
-    from finlab.evaluation.document import check_picture, to_text, write_picture
+    from finlab.evaluation.document import to_text
     from finlab.evaluation.experiment import begin
+    from finlab.evaluation.plots import check_picture, write_picture
     from finlab.executor import on_cluster
 
     options = experiment.options()

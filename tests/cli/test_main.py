@@ -172,7 +172,13 @@ def keys(value: Any) -> Any:
 
 @pytest.mark.parametrize(
     "line",
-    ["eval wrench R", "eval faults R", "eval velocity R", "eval trajectory --layouts R", "app --layout R"]
+    [
+        "eval wrench R",
+        "eval faults R",
+        "eval velocity R",
+        "eval trajectory --layouts R",
+        "app --layout R",
+    ]
     + [
         "eval faults --trajectory T",
         "eval trajectory --trajectory T",

@@ -18,17 +18,9 @@ import pytest
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.evaluation import report_page
-from finlab.evaluation.document import (
-    FORMATS,
-    Column,
-    Table,
-    candidates_picture,
-    fins_picture,
-    temperature_picture,
-    to_markdown,
-    to_text,
-)
+from finlab.evaluation.document import FORMATS, Column, Table, to_markdown, to_text
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+from finlab.evaluation.plots import candidates_picture, fins_picture, temperature_picture
 from finlab.evaluation.report_page import PAGE, TABLES, make_report
 
 TINY: dict[str, dict[str, Any]] = {

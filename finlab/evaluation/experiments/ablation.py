@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.methods import choose_method
-from finlab.evaluation.document import Column, Row, candidates_picture
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec
+from finlab.evaluation.plots import candidates_picture
 from finlab.evaluation.scoring import joined, mean_interval, paper_sigma, score
 from finlab.evaluation.splits import Case, make_split
 

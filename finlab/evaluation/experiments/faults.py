@@ -96,6 +96,7 @@ def _swim(
     controller: str,
     swim: tuple[tuple[Fault, str], int],
 ) -> Row:
+    """Errors of one swim: its fault and method, and its seed."""
     (fault, name), seed = swim
     lost = [(fin, fault.time_s) for fin in fault.fins]
     law, method = controller_of(controller, robot), methods[name].on(robot)

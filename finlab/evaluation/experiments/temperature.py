@@ -8,8 +8,9 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.document import Column, Row, temperature_picture
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
+from finlab.evaluation.plots import temperature_picture
 from finlab.evaluation.scoring import mean_interval, paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout

@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 
 from finlab.errors import DataError
-from finlab.evaluation.document import Column, Row, fins_picture
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.method_specs import SLOW, MethodSpec, installed_methods, load_method_specs
+from finlab.evaluation.plots import fins_picture
 from finlab.evaluation.scoring import Columns, joined, mean_interval, run_method, share_interval
 from finlab.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
 from finlab.executor import map_parts

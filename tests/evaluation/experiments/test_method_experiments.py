@@ -7,24 +7,16 @@ import numpy as np
 import pytest
 
 from finlab.allocation.baselines.analytic import Analytic
-from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution
 from finlab.errors import DataError
-from finlab.evaluation import method_specs
+from finlab.evaluation import method_specs, scoring
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.temperature import diversity
-from finlab.evaluation.experiments.thrusters import misses_more, missing_by_group
+from finlab.evaluation.experiments.thrusters import METHODS, misses_more, missing_by_group
 from finlab.evaluation.method_specs import MethodSpec, load_method_spec
-from finlab.evaluation.scoring import (
-    joined,
-    mean_interval,
-    paper_sigma,
-    ratio_interval,
-    run_method,
-    share_interval,
-)
+from finlab.evaluation.scoring import joined, mean_interval, paper_sigma, ratio_interval, run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant
@@ -186,7 +178,7 @@ def test_reruns_land_inside(kind: str) -> None:
         if kind == "mean":
             return values.mean(), mean_interval(values, group)
         if kind == "share":
-            return (values < 5.5).mean(), share_interval(values < 5.5, group)
+            return (values < 5.5).mean(), scoring.share_interval(values < 5.5, group)
         below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
         return values.sum() / below.sum(), ratio_interval(values, below, group)
 
@@ -196,7 +188,7 @@ def test_reruns_land_inside(kind: str) -> None:
 
 
 def test_no_failure_is_no_proof() -> None:
-    low, high = share_interval(np.ones(1000, bool), np.arange(1000) // 10)
+    low, high = scoring.share_interval(np.ones(1000, bool), np.arange(1000) // 10)
     assert high == 1.0 and 0.985 < low < 0.997
 
 
@@ -213,7 +205,7 @@ def test_same_seed_same_interval() -> None:
 
 def test_groups_are_compared_in_order() -> None:
     missing = np.array([[3.0, 4.0, 0.5, 0.0, 0.2, 0.1], [0.0, 0.0, 0.5, 0.0, 0.2, 0.1]])
-    sizes = missing_by_group(missing, PX4_ORDER)
+    sizes = missing_by_group(missing, METHODS["px4"][2])
     np.testing.assert_allclose(sizes, [[0.2, 0.5, 0.1, 5.0], [0.2, 0.5, 0.1, 0.0]])
     more = np.array([[0.1, 9.0, 0.0, 0.0], [0.2, 0.5, 0.2, 0.0]])
     assert misses_more(more, sizes).tolist() == [False, True]
