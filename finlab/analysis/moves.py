@@ -31,17 +31,13 @@ PROBE = 0.1  # share of its bounds by which a number is changed to see what it c
 class Bounds:
     """Where one actuator may go. Equal ends hold a number fixed. Checked on construction."""
 
-    x: tuple[float, float]
-    """Forward [m], (minimum, maximum)."""
-    y: tuple[float, float]
-    """To the left [m]."""
-    z: tuple[float, float]
-    """Up [m]."""
+    x: tuple[float, float]  # forward [m], (minimum, maximum)
+    y: tuple[float, float]  # to the left [m]
+    z: tuple[float, float]  # up [m]
     mounting_angle: tuple[float, float]
     """Azimuth of the shaft [rad]; may reach beyond half a turn, as in 170 to 190 degrees. Of an actuator
     without a mounting angle, how far it turns about the vertical from where it points."""
-    tilt: tuple[float, float] = (0.0, 0.0)
-    """How far its main axis rises [rad] from where it points."""
+    tilt: tuple[float, float] = (0.0, 0.0)  # how far its main axis rises [rad] from where it points
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "z", "mounting_angle", "tilt"):

@@ -33,10 +33,8 @@ class Progress:
 
     round: int
     n_rounds: int
-    before: float
-    """The goal's measure at the start, more is better."""
-    best: float
-    """The best so far, to about a percent."""
+    before: float  # the goal's measure at the start, more is better
+    best: float  # the best so far, to about a percent
 
 
 @dataclass(frozen=True)
@@ -47,10 +45,8 @@ class Improvement:
     improved: bool
     cancelled: bool
     goal: str
-    value_before: float
-    """The goal's measure at the start: more is better; energies are negative."""
-    value_after: float
-    """The same for `layout`."""
+    value_before: float  # the goal's measure at the start: more is better; energies are negative
+    value_after: float  # the same for `layout`
     moved: tuple[str, ...]
     axes: tuple[str, ...]
     """Those whose directions count for the goals of directions; on the others, anything may come."""

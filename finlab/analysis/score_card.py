@@ -39,20 +39,16 @@ class ScoreCard:
     failed: tuple[str, ...]
     flow: tuple[float, ...] | None
     """Velocity of the body relative to the water (6,) [m/s, rad/s], body frame; None at rest."""
-    n_actuators: int
-    """How many work."""
-    counted: str
-    """The same by type, such as `8 thrusters`."""
-    authority: Authority
-    """Rank, conditioning, largest wrenches, weakest direction."""
+    n_actuators: int  # how many work
+    counted: str  # the same by type, such as `8 thrusters`
+    authority: Authority  # rank, conditioning, largest wrenches, weakest direction
     losses: tuple[Loss, ...]
     """What losing one more actuator costs, one by one; none when but one works."""
     unit_wrench: tuple[float, ...]
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
     """Least power [W] for it along each positive axis (6,), other axes zero; None where out of reach."""
-    notes: tuple[str, ...]
-    """Sentences on where these numbers are not exact; none when they are."""
+    notes: tuple[str, ...]  # sentences on where these numbers are not exact; none when they are
 
     @property
     def worst_loss(self) -> Loss | None:

@@ -56,8 +56,7 @@ from finlab.whole_file import PART, write_together, write_whole
 class Bundle:
     """A bundle in memory."""
 
-    files: Mapping[str, bytes]
-    """Contents by name."""
+    files: Mapping[str, bytes]  # contents by name
 
     def write(self, folder: str | os.PathLike[str]) -> None:
         """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -51,12 +51,9 @@ NOISE = 0.03  # standard deviation of each component of a force, as a share of i
 class Case(NamedTuple):
     """One layout with its targets."""
 
-    layout: Layout
-    """All fins, failed ones included."""
-    targets: Array
-    """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
-    failed: tuple[str, ...]
-    """Names of the fins that do not work."""
+    layout: Layout  # all fins, failed ones included
+    targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
+    failed: tuple[str, ...]  # names of the fins that do not work
     sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
@@ -132,20 +129,17 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
     return replace(layout, actuators=(first, *fins)), ()
 
 
-def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
+def _fins(rng: np.random.Generator, name: str, mixed: bool = False) -> tuple[Layout, tuple[str, ...]]:
+    """All fins of one random model, or each of a random model of its own."""
     layout, model = random_layout(rng, name), random_fin_model(rng)
-    return replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins)), ()
-
-
-def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    layout = random_layout(rng, name)
-    fins = (replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
+    models = [model, *(random_fin_model(rng) if mixed else model for _ in layout.fins[1:])]
+    fins = (replace(fin, model=own) for fin, own in zip(layout.fins, models, strict=True))
     return replace(layout, actuators=tuple(fins)), ()
 
 
 def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """The same, each fin known by a noisy table."""
-    layout, _ = _fins_mixed(rng, name)
+    layout, _ = _fins(rng, name, mixed=True)
     noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
     fins = (_noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
     return replace(layout, actuators=tuple(fins)), ()
@@ -183,7 +177,7 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     "failure": (4, _failure),
     "near-singular": (5, _near_singular),
     "fins": (6, _fins),
-    "fins-mixed": (7, _fins_mixed),
+    "fins-mixed": (7, partial(_fins, mixed=True)),
     "tables": (8, _tables),
     "many-fins": (9, _whole(n_fins=MANY_FINS)),
     "thrusters": (18, _robots(random_thruster, count=(4, 10))),

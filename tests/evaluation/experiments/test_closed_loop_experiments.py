@@ -100,16 +100,9 @@ def evo_rmse(verb: str, folder: Path, *options: str) -> float:
     command = shutil.which(verb, path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     if command is None:
         pytest.skip(f"{verb} is not installed")
+    files = [str(folder / f"{name}.txt") for name in ("reference", "robot")]
     done = subprocess.run(
-        [
-            command,
-            "tum",
-            str(folder / "reference.txt"),
-            str(folder / "robot.txt"),
-            "-r",
-            "trans_part",
-            *options,
-        ],
+        [command, "tum", *files, "-r", "trans_part", *options],
         capture_output=True,
         text=True,
         timeout=120,
