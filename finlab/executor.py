@@ -39,17 +39,11 @@ def map_parts(
 ) -> Iterator[Made]:
     """Yields `function(part)` of each part, in order.
 
-    Inside `on_cluster` the parts run there, else in `jobs` processes; those still open are dropped when the
-    iteration ends early. Raises FinlabError: the cluster is gone, or a part ends every worker; and whatever
-    `function` raises.
-
-    Args:
-        function: of a module, or a `partial` of one, so that it can be sent.
-        parts: can be pickled.
-        what: title of a bar on a terminal's stderr; no bar without one.
-        unit: what the bar counts.
-        jobs: most processes; 1 is this one.
-    """
+    Inside `on_cluster` the parts run there, else in at most `jobs` processes, 1 being this one; those still
+    open are dropped when the iteration ends early. A function of a module, or a `partial` of one, and parts
+    that can be pickled can be sent. With a title `what` there is a bar on a terminal's stderr, which counts
+    units. Raises FinlabError: the cluster is gone, or a part ends every worker; and whatever `function`
+    raises."""
     client, count = _client.get(), len(parts)
     jobs = min(jobs, count)
     if client is not None:

@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from finlab.evaluation.document import Table, to_markdown
-from finlab.evaluation.experiment import Experiment, begin, load_experiment
+from finlab.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
@@ -48,16 +48,7 @@ def table_of(name: str, keys: list[str]) -> str:
     shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
     made = to_markdown(shown)
-    return f"\n`{command_of(experiment)}`:\n\n{made.rstrip()}\n\n"
-
-
-def command_of(experiment: Experiment) -> str:
-    """The command line that prints the table."""
-    words = ["finlab eval", experiment.name]
-    for key, value in experiment.quick.items():
-        listed = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-        words += [f"--{key.replace('_', '-')}", listed]
-    return " ".join(words)
+    return f"\n`{experiment.command(experiment.quick)}`:\n\n{made.rstrip()}\n\n"
 
 
 if __name__ == "__main__":

@@ -27,12 +27,9 @@ class HeldAxes:
     rank: int
     condition: float | None
     """Largest over smallest singular value; None below the rank of all axes that count."""
-    free: tuple[str, ...]
-    """Axes that the robot does not command, which do not count."""
-    without_authority: tuple[str, ...]
-    """Axes that are commanded and that no actuator pushes at all."""
-    coupled: tuple[str, ...]
-    """Axes that are pushed, but never without pushing others too."""
+    free: tuple[str, ...]  # axes that the robot does not command, which do not count
+    without_authority: tuple[str, ...]  # axes that are commanded and that no actuator pushes at all
+    coupled: tuple[str, ...]  # axes that are pushed, but never without pushing others too
 
     @property
     def alone(self) -> tuple[str, ...]:
@@ -54,8 +51,7 @@ class Authority(HeldAxes):
     axes count."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
-    most_negative: tuple[float, ...]
-    """The same along the negative axes, as a size (6,) [N, N m]."""
+    most_negative: tuple[float, ...]  # the same along the negative axes, as a size (6,) [N, N m]
     weakest: float
     """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below that rank."""
     weakest_direction: tuple[float, ...]
@@ -74,15 +70,12 @@ class Loss:
 
     actuator: str
     rank: int
-    reachable: tuple[str, ...]
-    """Axes still reachable alone."""
-    lost: tuple[str, ...]
-    """Axes that were and no longer are."""
+    reachable: tuple[str, ...]  # axes still reachable alone
+    lost: tuple[str, ...]  # axes that were and no longer are
     share_left: tuple[float | None, ...]
     """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where
     there was nothing."""
-    weakest: float
-    """Scaled wrench [N] that is within reach in every direction afterwards."""
+    weakest: float  # scaled wrench [N] that is within reach in every direction afterwards
 
 
 def authority(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> Authority:
@@ -97,14 +90,8 @@ def losses(
     flow: ArrayLike | None = None,
 ) -> tuple[Loss, ...]:
     """Returns what the loss of each working actuator, on top of `failed`, would cost; none when only one is
-    left. Raises LayoutError: there is no actuator of a name in `failed`.
-
-    Args:
-        layout: the robot.
-        failed: actuators that are lost already.
-        before: what the working actuators hold, if that is known.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-    """
+    left. What these hold `before` may be known; `flow` is the velocity (6,) of the body relative to the water
+    [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no actuator of a name in `failed`."""
     held = authority(layout, failed, flow) if before is None else before
     working = [name for name in layout.names if name not in failed]
     if len(working) < 2:

@@ -24,25 +24,20 @@ from finlab.layout.layout import Actuator
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
-PROBE = 0.1
-"""Share of its bounds by which a number is changed to see what it costs."""
+PROBE = 0.1  # share of its bounds by which a number is changed to see what it costs
 
 
 @dataclass(frozen=True)
 class Bounds:
     """Where one actuator may go. Equal ends hold a number fixed. Checked on construction."""
 
-    x: tuple[float, float]
-    """Forward [m], (minimum, maximum)."""
-    y: tuple[float, float]
-    """To the left [m]."""
-    z: tuple[float, float]
-    """Up [m]."""
+    x: tuple[float, float]  # forward [m], (minimum, maximum)
+    y: tuple[float, float]  # to the left [m]
+    z: tuple[float, float]  # up [m]
     mounting_angle: tuple[float, float]
     """Azimuth of the shaft [rad]; may reach beyond half a turn, as in 170 to 190 degrees. Of an actuator
     without a mounting angle, how far it turns about the vertical from where it points."""
-    tilt: tuple[float, float] = (0.0, 0.0)
-    """How far its main axis rises [rad] from where it points."""
+    tilt: tuple[float, float] = (0.0, 0.0)  # how far its main axis rises [rad] from where it points
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "z", "mounting_angle", "tilt"):
@@ -107,12 +102,11 @@ class Moves:
         grid: tuple[float, float] = (0.0, 0.0),
         flow: Array | None = None,
     ) -> None:
-        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the first.
-
-        One that is moved along with its twin needs no bounds of its own. Free coordinates and angles are
-        multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow`
-        as for `force_sets`. Raises LayoutError: an actuator is unknown, none is named, one has no bounds, a
-        pair is not mirrored or shares one with another pair, or nothing is free to move."""
+        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the first: one
+        that moves along with its twin needs no bounds of its own. Free coordinates and angles are multiples
+        of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow` as for
+        `force_sets`. Raises LayoutError: an actuator is unknown, none is named, one has no bounds, a pair is
+        not mirrored or shares one with another pair, or nothing is free to move."""
         kind = "fin" if layout.is_of_fins else "actuator"
         if not names:
             raise LayoutError(f"expected at least one {kind} to move, got none")
@@ -212,7 +206,6 @@ def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
 
 
 def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Who is whose twin, both ways."""
     twins: dict[str, str] = {}
     kind = "a fin" if layout.is_of_fins else "an actuator"
     for pair in pairs:

@@ -18,12 +18,9 @@ from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
-CLEARANCE = 0.10
-"""Least distance between two actuators [m], or what there is now if that is less."""
-CHUNK = 16
-"""Variants that are looked at together: places of 64 actuators take much room."""
-PENALTY = 1e3
-"""Cost of actuators that are too close or break another rule, per metre; far beyond any goal."""
+CLEARANCE = 0.10  # least distance between two actuators [m], or what there is now if that is less
+CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
+PENALTY = 1e3  # cost of actuators that are too close or break another rule, per metre; far beyond any goal
 
 Rule = Callable[[Array, Array], Array]
 """How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they
@@ -36,10 +33,8 @@ class Progress:
 
     round: int
     n_rounds: int
-    before: float
-    """The goal's measure at the start, more is better."""
-    best: float
-    """The best so far, to about a percent."""
+    before: float  # the goal's measure at the start, more is better
+    best: float  # the best so far, to about a percent
 
 
 @dataclass(frozen=True)
@@ -50,10 +45,8 @@ class Improvement:
     improved: bool
     cancelled: bool
     goal: str
-    value_before: float
-    """The goal's measure at the start: more is better; energies are negative."""
-    value_after: float
-    """The same for `layout`."""
+    value_before: float  # the goal's measure at the start: more is better; energies are negative
+    value_after: float  # the same for `layout`
     moved: tuple[str, ...]
     axes: tuple[str, ...]
     """Those whose directions count for the goals of directions; on the others, anything may come."""

@@ -10,26 +10,14 @@ from numpy.typing import ArrayLike
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
 from finlab.allocation.yardstick import REACHED
-from finlab.analysis.authority import (
-    AXES,
-    Authority,
-    HeldAxes,
-    Loss,
-    authority,
-    held_axes,
-    losses,
-)
+from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.arrays import Array
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
 
 
 def least_power(
-    layout: Layout,
-    wrenches: ArrayLike,
-    *,
-    failed: Collection[str] = (),
-    flow: ArrayLike | None = None,
+    layout: Layout, wrenches: ArrayLike, *, failed: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Array:
     """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
     as for an allocator. Raises LayoutError: there is no actuator of a name in `failed`."""
@@ -40,8 +28,7 @@ def least_power(
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
 
 
-UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
-"""Wrench along each axis whose least power is given [N, N m]."""
+UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)  # wrench along each axis whose least power is given [N, N m]
 
 
 @dataclass(frozen=True)
@@ -52,20 +39,16 @@ class ScoreCard:
     failed: tuple[str, ...]
     flow: tuple[float, ...] | None
     """Velocity of the body relative to the water (6,) [m/s, rad/s], body frame; None at rest."""
-    n_actuators: int
-    """How many work."""
-    counted: str
-    """The same by type, such as `8 thrusters`."""
-    authority: Authority
-    """Rank, conditioning, largest wrenches, weakest direction."""
+    n_actuators: int  # how many work
+    counted: str  # the same by type, such as `8 thrusters`
+    authority: Authority  # rank, conditioning, largest wrenches, weakest direction
     losses: tuple[Loss, ...]
     """What losing one more actuator costs, one by one; none when but one works."""
     unit_wrench: tuple[float, ...]
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
     """Least power [W] for it along each positive axis (6,), other axes zero; None where out of reach."""
-    notes: tuple[str, ...]
-    """Sentences on where these numbers are not exact; none when they are."""
+    notes: tuple[str, ...]  # sentences on where these numbers are not exact; none when they are
 
     @property
     def worst_loss(self) -> Loss | None:
@@ -81,14 +64,9 @@ class ScoreCard:
 
 
 def score_card(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `failed` push nothing. Raises LayoutError:
-    there is no actuator of a name in `failed`; CommandError: `flow` is not six finite numbers.
-
-    Args:
-        layout: the robot.
-        failed: actuators that are lost.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-    """
+    """Returns the score card of a layout whose actuators called `failed` push nothing, in a flow as for
+    `losses`. Raises LayoutError: there is no actuator of a name in `failed`; CommandError: `flow` is not six
+    finite numbers."""
     water = check_flow(flow)
     held = authority(layout, failed, water)
     power = least_power(layout, np.diag(UNIT), failed=failed, flow=water)
@@ -115,7 +93,6 @@ def _left(loss: Loss) -> tuple[float, ...]:
 
 
 def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple[str, ...]:
-    """What is not exact, and what is without effect."""
     sets = force_sets(layout, failed, flow)
     notes = []
     n_wide = len(wide_arcs(sets))

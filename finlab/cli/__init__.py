@@ -7,7 +7,7 @@ writes its files before it prints, so that a reader that goes away (`finlab ... 
 
 import io
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 
 from tyro.extras import SubcommandApp
@@ -46,11 +46,8 @@ EXAMPLES = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0, or 2 after one plain sentence on stderr.
-
-    Args:
-        argv: the arguments after the program's name; those of this process by default.
-    """
+    """Run one command, by the arguments after the program's name, those of this process by default; the exit
+    code, 0, or 2 after one plain sentence on stderr."""
     return exit_code("finlab", lambda: _run(list(sys.argv[1:] if argv is None else argv)))
 
 
@@ -59,8 +56,10 @@ def _run(argv: list[str]) -> int:
         print(f"finlab {__version__}")
         return 0
     if not {"--help", "-h"}.isdisjoint(argv):
-        code, page = help_page(argv, lambda: _parsed(argv))
-        print(page)
+        caught = io.StringIO()
+        with redirect_stdout(caught):  # what is no terminal gets no boxes
+            code = _parsed(argv)
+        print(f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}")
         return code
     try:
         return _parsed(with_json_file(argv))
@@ -73,14 +72,12 @@ def _run(argv: list[str]) -> int:
 
 def _parsed(argv: list[str]) -> int:
     """Parse and run; turn the parser's exit into a code."""
+    about = "Control allocation for underwater robots: a target wrench in, commands out."
     try:
-        code: int | None = _command_line(argv).cli(prog="finlab", description=_DESCRIPTION, args=argv)
+        code: int | None = _command_line(argv).cli(prog="finlab", description=about, args=argv)
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else FAILED
     return code or 0
-
-
-_DESCRIPTION = "Control allocation for underwater robots: a target wrench in, commands out."
 
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
@@ -99,14 +96,6 @@ def _command_line(argv: Sequence[str]) -> SubcommandApp:
     root.command(robot_verbs.export)
     root.command(robot_verbs.app)
     return root
-
-
-def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
-    """The page that `write` prints for arguments, with its example; before it the exit code."""
-    caught = io.StringIO()
-    with redirect_stdout(caught):  # what is no terminal gets no boxes
-        code = write()
-    return code, f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}"
 
 
 def example(argv: Sequence[str]) -> str:

@@ -29,13 +29,9 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
     made, wanted = SubcommandApp(), argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
         known = name == wanted or wanted.startswith("-")
-        made.command(name=name)(verb_of(load_experiment(name)) if known else _not_named)
+        made.command(name=name)(verb_of(load_experiment(name)) if known else lambda: None)
     made.command(report)
     return made
-
-
-def _not_named() -> None:
-    """An experiment that is not imported."""
 
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
@@ -99,7 +95,6 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
 
 
 def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
-    """What `run` gets for what was typed."""
     from finlab.evaluation.experiment import item_type
 
     kind, several = item_type(option.annotation)
@@ -137,8 +132,7 @@ def report(
     print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
 
 
-QUICK = ("id", "ood", "limits", "failure")
-"""Splits of a quick run."""
+QUICK = ("id", "ood", "limits", "failure")  # splits of a quick run
 
 
 def bench(

@@ -114,6 +114,5 @@ def robot(
 
 
 def _tell(words: str) -> None:
-    """Says on stderr what comes next, where that is a terminal."""
     if sys.stderr.isatty():
         print(f"{words} ...", file=sys.stderr, flush=True)

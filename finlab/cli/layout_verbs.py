@@ -111,7 +111,6 @@ def convert_layout(
 
 
 def _converted(file: str, output: Path, to: str | None, exchange: Exchange) -> tuple[Layout, Exchange]:
-    """The layout that went from one file into the other, and what there is to say of it."""
     from finlab.exchange import convert
 
     return convert(file, output, to, exchange), exchange

@@ -107,7 +107,7 @@ def export(
         raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
     robot, failed = open_robot(layout, failed)  # before a network is loaded
     if graph is not None:
-        from finlab.deploy.graph_file import write_graph
+        from finlab.deploy.bundle import write_graph
 
         write_graph(robot.without(failed) if failed else robot, graph)
         print(f"{graph}: {robot.counted}, {len(robot.names) - len(failed)} nodes")

@@ -19,10 +19,8 @@ JSON = "file for one JSON object; it is printed in place of the table where no f
 LAYOUT = "layout file, bundle, or the name of a shipped layout"
 FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
 CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://desk:8786"
-STDOUT = Path("-")
-"""What stands for stdout."""
-JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]
-"""Where one JSON object goes."""
+STDOUT = Path("-")  # what stands for stdout
+JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]  # where one JSON object goes
 Wrench = tuple[float, float, float, float, float, float]
 Flow = Annotated[Wrench | None, arg(metavar="VX VY VZ WX WY WZ", help=FLOW)]
 Robot = Annotated[Positional[str], arg(metavar="LAYOUT", help=LAYOUT)]

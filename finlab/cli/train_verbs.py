@@ -100,7 +100,6 @@ def allocator(
 
 
 def _report(output: Path, made: TrainedWeights) -> None:
-    """Say where the result lies and what was measured."""
     if os.environ.get("RANK", "0") != "0":  # of several processes the first one speaks
         return
     print(f"{output}: checkpoint {made.name}, preset {made.preset}, sha256 {made.sha256}")

@@ -1,7 +1,10 @@
-"""The bundle that a robot runs: the robot, the fins' physics, settings, a README and checksums.
+"""The bundle that a robot runs: the robot, the fins' physics, settings, a README and checksums; its graph.
 
-`finlab.load_layout` and `finlab.Allocator.from_bundle` read it, so the robot runs the library itself. The
-same layout and settings give the same bytes, as a folder and as a zip archive.
+`finlab.load_layout` and `finlab.Allocator.from_bundle` read a bundle, so the robot runs the library itself.
+The same layout and settings give the same bytes, as a folder and as a zip archive. The layout graph file is
+the robot as the complete graph that the networks see, which `networkx.node_link_graph` opens: features of a
+fin with a horizontal shaft are the paper's ten (x_i in R^10: position, mounting angle, limits), those of
+other actuators have two of their own axes in place of the angle.
 """
 
 import hashlib
@@ -12,9 +15,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
 
+from msgspec import to_builtins
+
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
+from finlab.allocation.yardstick import yardstick
 from finlab.assets import NAME, shipped_checkpoints
 from finlab.bundle_files import (
     ABOUT,
@@ -31,13 +37,18 @@ from finlab.bundle_files import (
     table_name,
 )
 from finlab.deploy.deployed_robot import self_tests
-from finlab.errors import AllocationError, DataError
+from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.archive import packed
-from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout import Actuator, Fin, FinModelSpec, Layout
+from finlab.layout.axes import AXES
+from finlab.layout.file import FORMAT as LAYOUT_FORMAT
+from finlab.layout.file import layout_to_dict
+from finlab.layout.file_form import plain
 from finlab.layout.force_table_file import table_bytes
-from finlab.layout.load import Robot, robot_bytes
+from finlab.layout.load import Data, Edge, Graph, Normalization, Robot, edges_of, robot_bytes
 from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_checkpoint
 from finlab.networks.trained import TrainedWeights
+from finlab.paper.network import POSITION_SCALE, SCALES
 from finlab.whole_file import PART, write_together, write_whole
 
 
@@ -45,8 +56,7 @@ from finlab.whole_file import PART, write_together, write_whole
 class Bundle:
     """A bundle in memory."""
 
-    files: Mapping[str, bytes]
-    """Contents by name."""
+    files: Mapping[str, bytes]  # contents by name
 
     def write(self, folder: str | os.PathLike[str]) -> None:
         """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the
@@ -84,14 +94,10 @@ class Bundle:
 
 
 def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
-    """Prepare what a robot runs: the robot, method and settings of an allocator. Raises LayoutError: an
-    unknown failed fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a force
-    table cannot be read, or something is too large to travel.
-
-    Args:
-        allocator: of method `dual`, `mdn` or `paper`; networks that do not come with finlab travel.
-        failed: names of fins that do not work.
-    """
+    """Prepare what a robot runs: the robot, method (`dual`, `mdn` or `paper`) and settings of an allocator,
+    and the names of fins that do not work; networks that do not come with finlab travel. Raises LayoutError:
+    an unknown failed fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a
+    force table cannot be read, or something is too large to travel."""
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
@@ -162,3 +168,64 @@ def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
         actuators=", ".join(allocator.layout.names),
         failed=list(failed),
     )
+
+
+_FORCE = ("force", "N")
+_ANGLE = ("angle", "rad")
+COMMANDS = {
+    "fin": (("A", "rad"), ("f", "Hz"), ("phi", "rad")),
+    "thruster": (_FORCE,),
+    "azimuth": (_ANGLE, _FORCE),
+    "tilt": (_ANGLE, _FORCE),
+    "rudder": (("deflection", "rad"),),
+}
+"""Numbers of a command and their units, by type of actuator."""
+
+
+def features_of(part: Actuator) -> dict[str, float]:
+    """Returns the features of an actuator by name and unit."""
+    found = dict(zip(("x [m]", "y [m]", "z [m]"), part.position, strict=True))
+    if isinstance(part, Fin) and part.mounting_angle is not None:
+        found["alpha [rad]"] = part.mounting_angle
+    else:
+        for name, axis in zip(("first axis", "second axis"), part.frame, strict=False):
+            found |= {f"{name} {one}": float(value) for one, value in zip("xyz", axis, strict=True)}
+    for (name, unit), low, high in zip(COMMANDS[part.type], part.lower, part.upper, strict=False):
+        found |= {f"{name}_min [{unit}]": float(low), f"{name}_max [{unit}]": float(high)}
+    return found
+
+
+def graph_of(layout: Layout) -> Graph:
+    """Returns a robot as a graph; tables of fins' forces that it names are kept by their paths."""
+    about = {key: value for key, value in layout_to_dict(layout).items() if key not in ("fins", "actuators")}
+    parts = plain(layout.actuators)
+    nodes = [
+        {"id": part.pop("name"), **part, "features": features_of(own)}
+        for part, own in zip(parts, layout.actuators, strict=True)
+    ]
+    scales = [POSITION_SCALE] * 3 + [SCALES[2]] + [scale for scale in SCALES for _ in range(2)]
+    names = features_of(Fin("fin", (0.0, 0.0, 0.0), 0.0))
+    wrench = dict(zip(AXES, yardstick(layout).tolist(), strict=True))
+    return Graph(
+        directed=False,
+        multigraph=False,
+        graph=Data(
+            layout={**about, "format": LAYOUT_FORMAT, "version": 2},
+            normalization=Normalization(dict(zip(names, scales, strict=True)), wrench),
+        ),
+        nodes=nodes,
+        edges=[Edge(*pair) for pair in edges_of(list(layout.names))],
+    )
+
+
+def graph_text(layout: Layout) -> str:
+    """Returns the text of a robot's graph file; the same robot gives the same text."""
+    return json.dumps(to_builtins(graph_of(layout)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:
+    """Writes a graph file; an existing file is replaced whole. LayoutError: the name does not end in
+    `.json`, or the file cannot be written."""
+    if Path(path).suffix.lower() != ".json":
+        raise LayoutError("expected the name of a file that ends in .json", source=str(path))
+    write_whole(path, graph_text(layout))

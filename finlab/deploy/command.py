@@ -94,7 +94,6 @@ def serve(arguments: argparse.Namespace) -> int:
 
 
 def _seconds(text: str) -> float:
-    """What reads the watchdog's time."""
     try:
         value = float(text)
     except ValueError:

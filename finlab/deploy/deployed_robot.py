@@ -40,10 +40,8 @@ FAR = 10.0  # size of an extreme target in yardsticks: beyond the reach of any r
 class DeployedRobot:
     """What `finlab-runtime` works with."""
 
-    allocator: Allocator
-    """Made of the bundle's settings and, where there are any, networks."""
-    failed: tuple[str, ...] = ()
-    """Actuators that the bundle names as failed."""
+    allocator: Allocator  # made of the bundle's settings and, where there are any, networks
+    failed: tuple[str, ...] = ()  # actuators that the bundle names as failed
     self_test: tuple[Case, ...] = ()
     """Targets with the answers of the computer that made the bundle."""
 
@@ -103,12 +101,9 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
 class Finding(NamedTuple):
     """One question and its answer."""
 
-    question: str
-    """What was compared."""
-    value: float
-    """Largest difference found; NaN where an answer was no number."""
-    limit: float
-    """Largest difference allowed."""
+    question: str  # what was compared
+    value: float  # largest difference found; NaN where an answer was no number
+    limit: float  # largest difference allowed
 
     @property
     def good(self) -> bool:

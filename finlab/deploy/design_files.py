@@ -25,8 +25,7 @@ from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, robot_of
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
-TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
-"""Where files are kept, inside a folder."""
+TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"  # where files are kept, inside a folder
 A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
@@ -57,10 +56,8 @@ class Opened(NamedTuple):
     """Every file that it names is kept in that folder, under a name made from its content."""
     missing: tuple[str, ...] = ()
     """Files that it named and that did not come with it, though the layout makes sense without."""
-    failed: tuple[str, ...] = ()
-    """Actuators that a bundle says are lost."""
-    notes: tuple[str, ...] = ()
-    """What was taken where a robot description is silent."""
+    failed: tuple[str, ...] = ()  # actuators that a bundle says are lost
+    notes: tuple[str, ...] = ()  # what was taken where a robot description is silent
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
@@ -108,17 +105,11 @@ def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
-    """A layout from a stranger, and the files that came along kept in a folder; no other file is opened.
-    Raises LayoutError: it names a force table that did not come along; FinlabError: a file cannot be kept, or
-    is no hull.
-
-    Args:
-        layout: it may name any path.
-        parts: contents of what came along, by the paths by which the layout can name it; a file of the
-            same name does where there is no other, since files that are sent at once have lost their folders.
-        folder: where to keep them.
-        source: what to call the layout in errors.
-    """
+    """A layout from a stranger, which may name any path, and the parts that came along kept in a folder; no
+    other file is opened. These have the paths by which the layout can name them; a file of the same name does
+    where there is no other, since files that are sent at once have lost their folders. Raises LayoutError:
+    the layout, called `source`, names a force table that did not come along; FinlabError: a file cannot be
+    kept, or is no hull."""
     by_name = {Path(path).name: path for path in parts}
     actuators, missing = [], []
     for part in layout.actuators:

@@ -114,7 +114,6 @@ class Server:
                 transport.send(_line(reply))
 
     def _is_late(self, since: float, now: float) -> bool:
-        """Whether more time has passed than the watchdog allows."""
         return now - since > (math.inf if self._watchdog is None else self._watchdog)
 
     def answers(self, line: bytes) -> list[dict[str, Any]]:
@@ -160,7 +159,6 @@ class Server:
 
 
 def _about(answer: Allocation) -> dict[str, Any]:
-    """What a reply tells of an answer beside its commands."""
     return {
         "target": plain_target(answer.target),
         "wrench": answer.wrench.tolist(),

@@ -29,8 +29,7 @@ class Line(NamedTuple):
     """A request on its way."""
 
     text: bytes
-    since: float
-    """Monotonic time [s] after which its first byte has come."""
+    since: float  # monotonic time [s] after which its first byte has come
 
 
 class Unsent(FinlabError):

@@ -60,10 +60,8 @@ class Column:
     key: str
     title: str
     format: str = "text"
-    interval: str | None = None
-    """Key of an interval [low, high] that stands behind the number."""
-    unit: str = ""
-    """Of the numbers; none where they are shares, ratios or counts."""
+    interval: str | None = None  # key of an interval [low, high] that stands behind the number
+    unit: str = ""  # of the numbers; none where they are shares, ratios or counts
 
     @property
     def heading(self) -> str:
@@ -94,8 +92,7 @@ class Table:
         )
 
 
-Block = str | Table
-"""A string is Markdown."""
+Block = str | Table  # a string is Markdown
 
 
 def to_markdown(*blocks: Block) -> str:

@@ -27,8 +27,7 @@ EXPERIMENTS = (
     *("trajectory", "faults", "velocity", "swims"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
-MOST, MOST_SEED = 1_000_000, 2**63 - 1
-"""Largest whole number of an option, and of a seed."""
+MOST, MOST_SEED = 1_000_000, 2**63 - 1  # largest whole number of an option, and of a seed
 Item = TypeVar("Item")
 
 
@@ -36,10 +35,8 @@ Item = TypeVar("Item")
 class Experiment:
     """A question, and how it is answered."""
 
-    name: str
-    """Of the verb and of the report's section."""
-    question: str
-    """One sentence, in Markdown, which is the help of the verb, too."""
+    name: str  # of the verb and of the report's section
+    question: str  # one sentence, in Markdown, which is the help of the verb, too
     columns: tuple[Column, ...]
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
     `<key>_interval`."""
@@ -49,8 +46,7 @@ class Experiment:
     their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
     parameter `layout` is given by position. Times depend on the machine; all other values on the options
     alone."""
-    note: str = ""
-    """How the columns are to be read, in Markdown."""
+    note: str = ""  # how the columns are to be read, in Markdown
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)

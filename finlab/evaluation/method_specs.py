@@ -36,13 +36,11 @@ from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-NEEDS = {"ipopt": "casadi"}
-"""Packages without which a method cannot run."""
+NEEDS = {"ipopt": "casadi"}  # packages without which a method cannot run
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
 method long before."""
-KNOWN = ("targets", "layout", "sigma", "previous")
-"""Parameters that a function may have."""
+KNOWN = ("targets", "layout", "sigma", "previous")  # parameters that a function may have
 TOLERANCE = 1e-6
 """By how much a command may leave its limits, as a share of what they span and of one of its unit."""
 
@@ -83,14 +81,9 @@ def load_method_specs(
     *,
     patient: bool = False,
 ) -> dict[str, MethodSpec]:
-    """Methods by name, in the order of the names. Raises AllocationError: an unknown method; DataError: a
-    function that is none.
-
-    Args:
-        names: of methods; checkpoint and objective as in `load_method_spec`.
-        patient: whether methods that stop after a time get `PATIENCE_S` for each target, so that the same
-            question has the same answer on a busy machine.
-    """
+    """Methods by name, in the order of the names; arguments and errors as for `load_method_spec`. Those that
+    stop after a time get `PATIENCE_S` for each target where `patient`, so that the same question has the same
+    answer on a busy machine."""
     specs = [load_method_spec(name, checkpoint, objective) for name in dict.fromkeys(names)]
     if patient:
         specs = [spec.with_settings(time_limit_s=PATIENCE_S) for spec in specs]
@@ -100,14 +93,9 @@ def load_method_specs(
 def load_method_spec(
     name: str, checkpoint: str | Path | None = None, objective: Name | None = None
 ) -> MethodSpec:
-    """The method of a specification. Raises AllocationError: unknown method; DataError: a function that is
-    none.
-
-    Args:
-        name: a method, or `file.py:function`, as this module says.
-        checkpoint: of learned methods, as for `finlab.Allocator`.
-        objective: what the methods that can choose keep least; each one's default where None.
-    """
+    """The method of a name, or of `file.py:function` as this module says; learned ones with a checkpoint as
+    for `finlab.Allocator`, those that can choose with an objective, if there is one. Raises AllocationError:
+    unknown method; DataError: a function that is none."""
     if ":" in name:
         kind = own_method(name)
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))

@@ -18,14 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg", ".pdf")
-"""Kinds of files that are written."""
+FORMATS = (".png", ".svg", ".pdf")  # kinds of files that are written
 DPI = 150
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Okabe and Ito's, which most people can tell apart."""
 MARKERS = "osD^v<>"
-LEAST_ERROR = 1e-12
-"""Errors below this one are drawn there: a logarithmic axis has no 0."""
+LEAST_ERROR = 1e-12  # errors below this one are drawn there: a logarithmic axis has no 0
 
 
 def check_picture(path: Path | None) -> None:

@@ -15,11 +15,10 @@ from threadpoolctl import threadpool_limits
 import finlab
 from finlab.errors import DataError
 from finlab.evaluation.document import Block, Row, to_markdown
-from finlab.evaluation.experiment import EXPERIMENTS, load_experiment, progress
+from finlab.evaluation.experiment import EXPERIMENTS, check_names, load_experiment, progress
 from finlab.whole_file import make_folder, write_whole
 
-PAGE, TABLES = "report.md", "tables.json"
-"""What a report's folder holds."""
+PAGE, TABLES = "report.md", "tables.json"  # what a report's folder holds
 SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
@@ -33,20 +32,10 @@ Size = Literal["quick", "full"]
 
 def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)) -> Path:
     """Make the report. Page and rows are written after each experiment, so that they are there if it is
-    stopped; each runs on one thread, so that times are of one core. Raises DataError: an unknown name, or a
-    file that cannot be written.
-
-    Args:
-        out: folder for the report, made if need be.
-        size: how much of everything: minutes, or a quarter of an hour.
-        seed: of all draws.
-        names: experiments, or all.
-
-    Returns:
-        The page.
-    """
-    if unknown := [name for name in names if name not in (*EXPERIMENTS, "all")]:
-        raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
+    stopped; each runs on one thread, so that times are of one core. Returns the page in the folder `out`,
+    which is made if need be. Raises DataError: an unknown name of an experiment, or a file that cannot be
+    written."""
+    check_names("sections", names, ("all", *EXPERIMENTS))
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
     start, rows, blocks = time.process_time(), dict[str, list[Row]](), list[Block]()
@@ -54,6 +43,8 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += "" if "all" in names else f" --sections {','.join(chosen)}"
     command += f" --seed {seed}" if seed != SEED else ""
+    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
+    head = ["# finlab evaluation", f"Allocation methods and simulated swims, side by side.{note}", ABOUT]
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
         options = dict(experiment.quick if size == "quick" else experiment.full)
@@ -64,7 +55,7 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
         blocks.append(f"Made by `{experiment.command(options)}` at {commit}.")
         minutes = (time.process_time() - start) / 60.0
         made = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
-        write_whole(out / PAGE, to_markdown(*_head(size), *blocks, *_end(made)), DataError)
+        write_whole(out / PAGE, to_markdown(*head, *blocks, *_end(made)), DataError)
         write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE
 
@@ -75,28 +66,13 @@ def _commit() -> str:
     tree = Path(finlab.__file__).parents[1]
     if not (tree / ".git").exists():
         return version
-    line = [
-        "git",
-        "-C",
-        str(tree),
-        "describe",
-        "--always",
-        "--abbrev=12",
-        "--exclude=*",
-        "--dirty= and changes",
-    ]
+    describe = ["describe", "--always", "--abbrev=12", "--exclude=*"]
+    line = ["git", "-C", str(tree), *describe, "--dirty= and changes"]
     described = subprocess.run(line, capture_output=True, text=True)
     return version if described.returncode else f"commit {described.stdout.strip()}"
 
 
-def _head(size: Size) -> list[Block]:
-    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
-    about = f"Allocation methods and simulated swims, side by side.{note}"
-    return ["# finlab evaluation", about, ABOUT]
-
-
-def _end(made: str) -> list[Block]:
-    """How the page was made."""
+def _end(made: str) -> list[str]:
     versions = {"finlab": finlab, "numpy": np, "scipy": scipy}
     lines = [
         made,

@@ -20,49 +20,27 @@ from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.physics import plant_of
 from finlab.physics.objective import command_effort
 
-Columns = dict[str, AnyArray]
-"""Arrays of N entries by name."""
+Columns = dict[str, AnyArray]  # arrays of N entries by name
 LEVEL = 0.994426  # share of a normal variable within sqrt(2) times 1.96 standard deviations
 REPLICATES = 2000
-Interval = tuple[float, float]
-"""Its low and its high end."""
+Interval = tuple[float, float]  # its low and its high end
 
 
 def run_method(
     method: MethodSpec, case: Case, *, number: int = 0, seed: int = 0, first: int | None = None
 ) -> Columns:
-    """What a method does on a case, all targets of which are solved together.
-
-    Args:
-        method: who answers.
-        case: a layout with targets.
-        number: of the layout in its split.
-        seed: passed to the method.
-        first: only the first so many targets.
-
-    Returns:
-        The columns of `score`.
-    """
+    """The columns of `score` of a method's answers to a case, whose targets, or only the first so many, are
+    solved together; `number` is that of the layout in its split."""
     targets = case.targets[:first]
     answer = method.on(case.layout).allocate_batch(targets, failed=case.failed, seed=seed)
     return score(case, targets, answer.command, answer.solve_ms, number=number)
 
 
 def score(case: Case, targets: Array, command: Array, solve_ms: Array, *, number: int = 0) -> Columns:
-    """Scores of answers to targets (N, 6) of a case, the wrench computed by the plant.
-
-    Args:
-        case: the layout.
-        targets: desired wrenches (N, 6).
-        command: the method's answers (N, n, 3).
-        solve_ms: what each took (N,) [ms].
-        number: of the layout in its split.
-
-    Returns:
-        Arrays (N,): `layout`, its number; `fins`, how many it has; `err_norm`, the norm of what is missing
-        over `sigma_of`, without axes that are free; `err_phys`, the same in N and N m; `effort`, the
-        paper's J_en; `power` [W]; `solve_ms`.
-    """
+    """Scores of answers (N, n, 3), which took `solve_ms` (N,), to targets (N, 6) of a case, whose wrench the
+    plant computes: arrays (N,) `layout`, its number in its split; `fins`, how many it has; `err_norm`, the
+    norm of what is missing over `sigma_of`, without axes that are free; `err_phys`, the same in N and N m;
+    `effort`, the paper's J_en; `power` [W]; `solve_ms`."""
     plant = plant_of(case.layout)
     missing = (plant.wrench(command) - targets) * case.layout.commanded
     return {

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -28,10 +28,8 @@ from finlab.physics import Plant, TableLaw, make_law, write_table
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
-OOD_FINS = (6, 8)
-"""Least and most fins in split `ood-fins`."""
-MANY_FINS = (9, 12)
-"""Least and most fins in split `many-fins`."""
+OOD_FINS = (6, 8)  # least and most fins in split `ood-fins`
+MANY_FINS = (9, 12)  # least and most fins in split `many-fins`
 NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005
@@ -53,12 +51,9 @@ NOISE = 0.03  # standard deviation of each component of a force, as a share of i
 class Case(NamedTuple):
     """One layout with its targets."""
 
-    layout: Layout
-    """All fins, failed ones included."""
-    targets: Array
-    """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
-    failed: tuple[str, ...]
-    """Names of the fins that do not work."""
+    layout: Layout  # all fins, failed ones included
+    targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
+    failed: tuple[str, ...]  # names of the fins that do not work
     sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
@@ -69,17 +64,10 @@ class Case(NamedTuple):
 
 
 def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
-    """The test cases of a split.
+    """The test cases of a split, one of `SPLITS`: layouts, and targets for each of them.
 
     Layout k and its first targets depend on the split, the seed and k alone, so that a small run is the
-    beginning of a large one. Raises DataError: unknown split, or a number out of range.
-
-    Args:
-        name: one of `SPLITS`.
-        n_layouts: how many layouts, at least 1.
-        n_targets: targets per layout, at least 1.
-        seed: not negative.
-    """
+    beginning of a large one. Raises DataError: unknown split, fewer than one, or a negative seed."""
     if name not in SPLITS:
         raise DataError(f"split: expected one of {', '.join(SPLITS)}, got {name!r}")
     for value, what, least in ((n_layouts, "layouts", 1), (n_targets, "targets", 1), (seed, "seed", 0)):
@@ -141,22 +129,17 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
     return replace(layout, actuators=(first, *fins)), ()
 
 
-def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    """All fins of one random model."""
+def _fins(rng: np.random.Generator, name: str, mixed: bool = False) -> tuple[Layout, tuple[str, ...]]:
+    """All fins of one random model, or each of a random model of its own."""
     layout, model = random_layout(rng, name), random_fin_model(rng)
-    return replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins)), ()
-
-
-def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    """Each fin of a random model of its own."""
-    layout = random_layout(rng, name)
-    fins = (replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
+    models = [model, *(random_fin_model(rng) if mixed else model for _ in layout.fins[1:])]
+    fins = (replace(fin, model=own) for fin, own in zip(layout.fins, models, strict=True))
     return replace(layout, actuators=tuple(fins)), ()
 
 
 def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """The same, each fin known by a noisy table."""
-    layout, _ = _fins_mixed(rng, name)
+    layout, _ = _fins(rng, name, mixed=True)
     noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
     fins = (_noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
     return replace(layout, actuators=tuple(fins)), ()
@@ -194,7 +177,7 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     "failure": (4, _failure),
     "near-singular": (5, _near_singular),
     "fins": (6, _fins),
-    "fins-mixed": (7, _fins_mixed),
+    "fins-mixed": (7, partial(_fins, mixed=True)),
     "tables": (8, _tables),
     "many-fins": (9, _whole(n_fins=MANY_FINS)),
     "thrusters": (18, _robots(random_thruster, count=(4, 10))),

@@ -43,11 +43,8 @@ class Workplace:
             distributed.barrier()
 
     def autocast(self) -> torch.autocast:
-        """Matrix products in bfloat16 where the device multiplies it faster than float32.
-
-        The CPU is asked, not timed: a timing may differ from run to run, and a resumed run would go on in
-        another precision.
-        """
+        """Matrix products in bfloat16 where the device multiplies it faster than float32. The CPU is asked,
+        not timed: a resumed run would go on in another precision."""
         kind = self.device.type
         fast = kind == "cuda" or (kind == "cpu" and torch.cpu._is_avx512_bf16_supported())
         return torch.autocast(kind, torch.bfloat16, enabled=fast)
@@ -55,13 +52,9 @@ class Workplace:
 
 @contextmanager
 def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
-    """The workplace of this process. Raises CommandError: there is no such device, or the batch cannot be
-    shared equally.
-
-    Args:
-        name: a device of torch such as cpu or cuda:1; by default a graphics card where there is one.
-        batch_size: samples of a step, which all processes share.
-    """
+    """The workplace of this process, on a device of torch such as cpu or cuda:1, by default a graphics card
+    where there is one. Raises CommandError: there is no such device, or the processes cannot share the batch,
+    the samples of a step, equally."""
     world, rank = (int(os.environ.get(key, default)) for key, default in (("WORLD_SIZE", 1), ("RANK", 0)))
     if batch_size % world:
         raise CommandError(f"batches of {batch_size} samples cannot be shared by {world} processes equally")

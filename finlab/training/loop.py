@@ -24,19 +24,13 @@ from finlab.networks.trained import State
 from finlab.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
-LOG_FILE = "log.csv"
-"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
-STATE_FILE = "resume.pt"
-"""What a run goes on from."""
+LOG_FILE = "log.csv"  # one row per logged step: step, samples, seconds, learning rate and every loss term
+STATE_FILE = "resume.pt"  # what a run goes on from
 CURVES_FILE = "curves.png"
-APART = ("step", "samples", "seconds")
-"""Columns of the log that are no curves."""
-LOG_EVERY = 20
-"""Steps after which a row is logged."""
-SAVE_EVERY_S = 15.0
-"""Seconds after which state, log and checkpoint are written."""
-CLIP = 1.0
-"""Longest gradient."""
+APART = ("step", "samples", "seconds")  # columns of the log that are no curves
+LOG_EVERY = 20  # steps after which a row is logged
+SAVE_EVERY_S = 15.0  # seconds after which state, log and checkpoint are written
+CLIP = 1.0  # longest gradient
 
 Terms = Callable[[int], dict[str, Tensor]]
 """Loss terms of a step of training, `loss` among them, as means over the batch."""
@@ -50,10 +44,8 @@ class LoopSettings:
     steps: int
     batch_size: int
     learning_rate: float
-    warmup: int = 0
-    """Steps over which it rises linearly, if there are as many."""
-    cosine: bool = True
-    """Whether it falls to a hundredth along a cosine, or stays."""
+    warmup: int = 0  # steps over which it rises linearly, if there are as many
+    cosine: bool = True  # whether it falls to a hundredth along a cosine, or stays
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None
@@ -85,15 +77,8 @@ class Training:
         identity: dict[str, Any],
         place: Workplace,
     ) -> None:
-        """Prepare a run.
-
-        Args:
-            weights: what is trained, by name; changed in place.
-            settings: of the loop.
-            folder: for log, curves and state; made if need be.
-            identity: settings that a resumed run must share, as plain values.
-            place: where it runs; of several processes the first one writes.
-        """
+        """Takes weights by name, which are changed in place; a folder, made if need be, for log, curves and
+        state; and the settings that a resumed run must share, as plain values."""
         self.weights, self.settings, self.place = weights, settings, place
         self.folder, self.identity = make_folder(folder), identity
         self.optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate)
@@ -130,13 +115,8 @@ class Training:
             )
 
     def run(self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0) -> None:
-        """Minimize the term `loss` to the end of the run.
-
-        Args:
-            terms_of: see `Terms`.
-            save: takes the weights to ship and how far the run is, now and then and at the end.
-            spent: seconds that this call has taken so far, on other work of the run.
-        """
+        """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how far it is,
+        now and then and at the end; `spent` are seconds that this call took so far, on other work."""
         settings, first = self.settings, self.done
         limit = math.inf if settings.seconds is None else settings.seconds
         started = time.monotonic() - self.seconds - spent
@@ -182,10 +162,7 @@ class Training:
         return values["loss"]
 
     def _write(self, save: Callable[[State, dict[str, Any]], None]) -> float:
-        """Write all that the run leaves; the state last, so that a run killed in between only repeats steps.
-
-        Returns the time at which it was done.
-        """
+        """Write all that the run leaves, the state last, as it may be killed in between; the time of it."""
         if self.place.rank == 0:
             samples = self.done * self.settings.batch_size
             made = {"steps_done": self.done, "samples": samples, "processes": self.place.world}

@@ -6,15 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.analysis import (
-    GOALS,
-    Bounds,
-    Progress,
-    authority,
-    least_power,
-    mirror_pairs,
-    optimize_layout,
-)
+from finlab.analysis import GOALS, Bounds, Progress, authority, least_power, mirror_pairs, optimize_layout
 from finlab.analysis.optimize import CHUNK
 from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError

@@ -1,13 +1,18 @@
-"""The score card: complete, consistent, fit for JSON, and free of torch."""
+"""The score card and the quick check; least power against closed forms and what solvers find."""
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from finlab.analysis import authority, score_card
+from finlab.actuators.fin.blade import Blade
+from finlab.analysis import authority, losses, score_card
+from finlab.analysis.score_card import least_power, quick_check
 from finlab.errors import LayoutError
-from finlab.layout import Layout
+from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.layout.axes import AXES
 
 Layouts = Callable[[str], Layout]
 
@@ -37,3 +42,58 @@ def test_failed_fins_are_left_out(shipped: Layouts) -> None:
 
 def test_wide_arcs_are_noted(wide: Layout) -> None:
     assert "wider than half a turn" in score_card(wide, wide.names[2:]).notes[0]
+
+
+@pytest.mark.parametrize("name", ["A", "B", "ucat", "pair", "no_yaw", "hexa", "asymmetric"])
+def test_quick_check_agrees_with_the_whole_analysis(shipped: Layouts, name: str) -> None:
+    layout = shipped(name)
+    quick, whole = quick_check(layout), authority(layout)
+    assert (quick.rank, quick.without_authority, quick.coupled) == (
+        whole.rank,
+        whole.without_authority,
+        whole.coupled,
+    )
+    assert quick.condition == pytest.approx(whole.condition)
+    assert dict(quick.lost) == {loss.actuator: loss.lost for loss in losses(layout) if loss.lost}
+
+
+WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
+
+
+def least_for(force: float, blade: Blade) -> float:
+    """The least power [W] of U-CAT's fin that gives a force [N], by brute force."""
+    amplitude = np.linspace(0.05, 0.6, 20001)
+    frequency = np.sqrt(force / 4.737410112522892) / np.sin(amplitude)
+    power = blade.power(amplitude, frequency)
+    return float(power[(frequency >= 0.1) & (frequency <= 2.1)].min())
+
+
+def test_a_pair_shares_heave_evenly() -> None:
+    layout = replace(load_layout("pair"), axes=AXES)
+    power = least_power(layout, [[0, 0, 4.0, 0, 0, 0], [0, 0, 0, 0, 0.5, 0], [0, 0, 40.0, 0, 0, 0]])
+    assert power[0] == pytest.approx(2 * least_for(2.0, Blade()), rel=3e-3)
+    assert np.isnan(power[1:]).all()  # a torque it has not, a force beyond its reach
+
+
+def test_failures() -> None:
+    layout, wrench = load_layout("A"), [[0.5, 0.0, 0.5, 0.0, 0.0, 0.05]]
+    assert np.isfinite(least_power(layout, wrench)).all()
+    assert np.isnan(least_power(layout, wrench, failed=layout.names[:3])).all()
+
+
+def test_nothing_costs_nothing_even_without_fins() -> None:
+    layout = load_layout("A")
+    power = least_power(layout, [np.zeros(6), np.eye(6)[0]], failed=layout.names)
+    assert power[0] == 0.0 and np.isnan(power[1])
+
+
+def test_it_grows_faster_than_the_wrench() -> None:
+    power = least_power(load_layout("A"), np.outer([0.25, 0.5, 1.0, 2.0], WRENCHES[-1]))
+    assert (power[1:] > 2.0 * power[:-1]).all() and (power[1:] < 4.0 * power[:-1]).all()
+
+
+def test_larger_blades_of_the_same_thrust_take_more_power() -> None:
+    layout = load_layout("A")
+    long = FinModelSpec("drag", (("area", 0.02 / 1.44), ("lever", 0.12)))
+    other = replace(layout, actuators=tuple(replace(fin, model=long) for fin in layout.fins))
+    assert (least_power(other, WRENCHES) > 1.02 * least_power(layout, WRENCHES)).all()

@@ -1,5 +1,6 @@
-"""`finlab train mdn`: a few steps, then an allocation with the result."""
+"""`finlab train mdn`, then an allocation with the result; what `finlab fit fin` says on a terminal."""
 
+import io
 import json
 import resource
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
+from tests.fit.cell import columns_of, commands, measured, soft, write
 
 WITHOUT_TORCH = """
 import sys
@@ -74,3 +76,26 @@ def test_a_full_disk_is_one_sentence_with_the_path(tmp_path: Path) -> None:
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert f"{out}/" in done.stderr and "cannot be written: File too large" in done.stderr
     assert not list(out.rglob("*.part"))
+
+
+class Terminal(io.StringIO):
+    """A stderr that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_steps_are_told_on_terminals_alone(
+    terminal: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = commands(40)
+    data = write(tmp_path / "cell.csv", columns_of(command, measured(soft(), command)))
+    stderr = Terminal() if terminal else io.StringIO()
+    monkeypatch.setattr("sys.stderr", stderr)
+    assert main(["fit", "fin", str(data), "-o", str(tmp_path / "fin.csv")]) == 0
+    if terminal:
+        assert "fitting the thrust" in stderr.getvalue()
+    else:
+        assert stderr.getvalue() == ""
+    assert "cross-validated error" in capsys.readouterr().out

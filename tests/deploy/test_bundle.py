@@ -47,23 +47,19 @@ def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
     return rest | {CHECKSUMS: checksums(rest)}
 
 
-def test_folder_and_archive_hold_the_same_and_come_back(bundle: Bundle, tmp_path: Path) -> None:
+def test_folder_and_archive_hold_the_same_and_come_back(
+    bundle: Bundle, shipped_allocator: AnyRobot, tmp_path: Path
+) -> None:
+    truth = shipped_allocator.allocate(finlab.load_layout("A"), WRENCH)
     bundle.write(tmp_path / "A")
     bundle.write_zip(tmp_path / "A.zip")
     for place in (tmp_path / "A", tmp_path / "A.zip"):
         assert read_bundle_files(place) == dict(bundle.files)
         assert finlab.load_layout(place) == finlab.load_layout(str(place)) == finlab.load_layout("A")
         assert load_robot(place).layout == finlab.load_layout("A")
+        assert Allocator.from_bundle(place).allocate(WRENCH) == truth
     bundle.write(tmp_path / "A")  # an earlier bundle is replaced
     assert sorted(path.name for path in tmp_path.iterdir()) == ["A", "A.zip"], "nothing else is left behind"
-
-
-def test_the_library_reads_it(bundle: Bundle, shipped_allocator: AnyRobot, tmp_path: Path) -> None:
-    bundle.write(tmp_path / "A")
-    bundle.write_zip(tmp_path / "A.zip")
-    truth = shipped_allocator.allocate(finlab.load_layout("A"), WRENCH)
-    for place in (tmp_path / "A", str(tmp_path / "A.zip")):
-        assert Allocator.from_bundle(place).allocate(WRENCH) == truth
 
 
 def test_the_method_with_networks_answers_with_those_of_this_finlab(of_mdn: Bundle, tmp_path: Path) -> None:

@@ -423,8 +423,7 @@ def test_without_streams_it_ends_with_a_sentence(closed: str, full: str, folder:
 
 
 @pytest.mark.parametrize(
-    "option",
-    [f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")],
+    "option", [f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")]
 )
 def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixture[str]) -> None:
     from finlab.deploy.command import main

@@ -14,10 +14,7 @@ from finlab.layout import Limits
 from finlab.physics import plant_of
 
 N = 60
-FINS = {
-    "ood-fins": (6, 8),
-    "many-fins": (9, 12),
-}
+FINS = {"ood-fins": (6, 8), "many-fins": (9, 12)}
 """Least and most fins where they are not two and five."""
 ROBOTS = {
     "thrusters": (4, 10, {"thruster"}),
@@ -183,10 +180,7 @@ def test_targets_are_reachable(split: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ("nowhere", 1, 1, 0),
-            "expected one of id, ood, ood-fins, limits, .*, got 'nowhere'",
-        ),
+        (("nowhere", 1, 1, 0), "expected one of id, ood, ood-fins, limits, .*, got 'nowhere'"),
         (("id", 0, 1, 0), "layouts: expected a number of at least 1, got 0"),
         (("id", 1, -3, 0), "targets: expected a number of at least 1, got -3"),
         (("id", 1, 1, -1), "seed: expected a number of at least 0, got -1"),

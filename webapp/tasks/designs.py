@@ -7,9 +7,8 @@ from pathlib import PurePath
 
 import viser
 
-from finlab.deploy.bundle import make_bundle
+from finlab.deploy.bundle import graph_text, make_bundle
 from finlab.deploy.design_files import Opened
-from finlab.deploy.graph_file import graph_text
 from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES

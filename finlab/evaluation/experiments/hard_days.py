@@ -17,10 +17,8 @@ from finlab.evaluation.splits import make_split
 from finlab.layout import Body, Layout, load_layout
 from finlab.sim import ClosedLoop, FinFault, SensorSettings, Trajectory, make_trajectory, perturbed
 
-TWO = ("A", "C")
-"""Those that swim most of the days: a symmetric one and one that is not."""
-CURRENT = (0.05, -0.05, 0.0)
-"""7 cm/s across the path [m/s]."""
+TWO = ("A", "C")  # those that swim most of the days: a symmetric one and one that is not
+CURRENT = (0.05, -0.05, 0.0)  # 7 cm/s across the path [m/s]
 
 HEAVY = ("bluerov2_heavy",)
 OTHER_HEAVY = Body(

@@ -22,8 +22,7 @@ from finlab.layout.random_layouts import random_robot, random_thruster
 from finlab.physics import plant_of
 
 DOMAIN = 0xF1257  # leads the seed of every robot
-REFERENCE = "dual"
-"""The method that the others are compared with, where it takes part."""
+REFERENCE = "dual"  # the method that the others are compared with, where it takes part
 LAYOUTS = 5  # robots of each kind whose calls are timed
 TARGETS = 40  # directions of wrenches on each of them
 WARM_UP = 2  # first calls on each robot that are not counted; a robot keeps its layout for long
@@ -119,15 +118,9 @@ def _rows(
 def call_times(
     method: MethodSpec, timed: Sequence[Timed], share: float | None, calls: int, budget: float
 ) -> tuple[list[float], list[Allocation]]:
-    """The processor's time of each counted call [ms], of robots visited in turn, and its answer.
-
-    Args:
-        method: who answers.
-        timed: the robots.
-        share: of reach, of the targets; None for targets that wander, with the command of the tick before.
-        calls: at most so many.
-        budget: no further call on a robot after its part of this time [s].
-    """
+    """The processor's time of each counted call [ms], at most so many, of robots visited in turn, and its
+    answer. Without a share of reach targets wander, with the command of the tick before. After its part of
+    the budget [s] a robot gets no further call."""
     times, answers, ahead = list[float](), list[Allocation](), -(-calls // len(timed))
     for robot in timed:
         allocator, spent, previous = method.on(robot.layout), 0.0, None

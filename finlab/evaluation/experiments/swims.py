@@ -29,8 +29,7 @@ GAP_N = 0.1
 of reach [N]."""
 FIGURES = ("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "cpu_s_per_min", "turn")
 """All figures of a swim."""
-LARGEST = ("turn", "peak_w")
-"""Those of which a row has the largest of its swims, not the mean."""
+LARGEST = ("turn", "peak_w")  # those of which a row has the largest of its swims, not the mean
 
 
 def run(
@@ -77,7 +76,6 @@ def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
 
 
 def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case, int]) -> Row:
-    """Figures of one swim of a day: its method, case and seed."""
     name, case, seed = part
     loop = day.swim(case, methods[name], seed)
     start = time.process_time()
@@ -86,12 +84,8 @@ def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case
 
 
 def swim_figures(log: RunLog, cpu_s: float) -> Row:
-    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and cost.
-
-    Args:
-        log: one swim along a trajectory.
-        cpu_s: processor's time that it took, simulation included [s].
-    """
+    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and cost of one
+    swim along a trajectory, which took `cpu_s` seconds of the processor, simulation included."""
     minutes = log.n_ticks * float(log.time[1] - log.time[0]) / 60.0
     gap = np.linalg.norm((log.asked - log.allocated) / [1, 1, 1, LEVER_M, LEVER_M, LEVER_M], axis=1)
     turn = command_change(log.command)[..., 2]

@@ -17,8 +17,7 @@ from finlab.layout import Layout
 from finlab.layout.axes import is_full_turn
 from finlab.paper.pipeline import PaperSettings
 
-PAPER_TEMPERATURE = 0.02
-"""The paper's choice."""
+PAPER_TEMPERATURE = 0.02  # the paper's choice
 TEMPERATURES = (0.001, 0.01, PAPER_TEMPERATURE, 0.05, 0.1, 0.5, 1.0, 10.0)
 
 

@@ -130,7 +130,6 @@ def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
 
 
 def _figures(scored: Sequence[dict[str, Array]]) -> Row:
-    """Means over all targets of all draws."""
     by = {key: np.concatenate([np.asarray(each[key], float) for each in scored]) for key in scored[0]}
     fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
     row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}

@@ -18,8 +18,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
 
-SUCCESS_LEVELS = (0.01, 0.5, 1.0)
-"""Levels t of `success_t`, the share of targets with `err_norm <= t`."""
+SUCCESS_LEVELS = (0.01, 0.5, 1.0)  # levels t of `success_t`, the share of targets with `err_norm <= t`
 OWN_DOMAIN = 0x0711  # leads the seed of the draws on a user's own layout
 HARD = ("id", "ood", "ood-fins", "limits", "failure", "near-singular", "fins-mixed", "tables", "many-fins")
 """Splits of the report."""
@@ -79,14 +78,9 @@ def _scores(
 
 
 def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
-    """Figures of a split, or of its robots of so many fins."""
-    about = {"split": split, "method": method, "fins": fins, "n": len(scores["layout"]), "scored_by": "plant"}
-    return about | figures(scores)
-
-
-def figures(scores: Columns) -> Row:
-    """Means, quantiles and shares of scores, with their intervals."""
+    """Means, quantiles and shares of a split, or of its robots of so many fins, with their intervals."""
     error, group = scores["err_norm"], scores["layout"]
+    about = {"split": split, "method": method, "fins": fins, "n": len(group), "scored_by": "plant"}
     row: Row = {
         "err_norm_mean": error.mean(),
         "err_norm_median": np.median(error),
@@ -106,13 +100,12 @@ def figures(scores: Columns) -> Row:
         "success_0.01": share_interval(error <= 0.01, group),
     }
     plain = {key: float(value) for key, value in row.items()}
-    return plain | {f"{key}_interval": list(ends) for key, ends in intervals.items()}
+    return about | plain | {f"{key}_interval": list(ends) for key, ends in intervals.items()}
 
 
 def _cases(
     layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
 ) -> dict[str, list[Callable[[], Case]]]:
-    """What makes the cases, by the name of their set."""
     if layout is None:
         names = list(SPLITS) if split == ("all",) else split
         for name in names:

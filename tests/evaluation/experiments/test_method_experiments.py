@@ -1,4 +1,4 @@
-"""Experiments of methods at small sizes: what the figures of each say is true."""
+"""Experiments of methods at small sizes: what the figures of each say is true; intervals."""
 
 import math
 from typing import Any
@@ -11,11 +11,12 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution
 from finlab.errors import DataError
-from finlab.evaluation import method_specs
+from finlab.evaluation import method_specs, scoring
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.temperature import diversity
+from finlab.evaluation.experiments.thrusters import METHODS, misses_more, missing_by_group
 from finlab.evaluation.method_specs import MethodSpec, load_method_spec
-from finlab.evaluation.scoring import joined, paper_sigma, run_method
+from finlab.evaluation.scoring import joined, mean_interval, paper_sigma, ratio_interval, run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant
@@ -151,3 +152,88 @@ def test_the_ablation_scores_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["j_norm_mean"] for row in printed] == [3.64e-2, 1.01e-1, 3.03e-4]
     with pytest.raises(DataError, match="variants: expected some of mean_only"):
         experiment.rows(variants=("theirs",))
+
+
+GROUPS, EACH = 100, 20
+SPREAD = 1.96 * np.sqrt(2.0)
+
+
+def _draw(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Values that resemble each other within a group: the spread of groups is what counts."""
+    rng = np.random.default_rng(seed)
+    group = np.repeat(np.arange(GROUPS), EACH)
+    return 5.0 + np.repeat(rng.normal(size=GROUPS), EACH) + 0.1 * rng.normal(size=len(group)), group
+
+
+def test_the_width_is_that_of_the_groups() -> None:
+    values, group = _draw(0)
+    low, high = mean_interval(values, group)
+    assert high - low == pytest.approx(2 * SPREAD / np.sqrt(GROUPS), rel=0.15)
+
+
+@pytest.mark.parametrize("kind", ["mean", "share", "ratio"])
+def test_reruns_land_inside(kind: str) -> None:
+    def look(seed: int) -> tuple[float, object]:
+        values, group = _draw(seed)
+        if kind == "mean":
+            return values.mean(), mean_interval(values, group)
+        if kind == "share":
+            return (values < 5.5).mean(), scoring.share_interval(values < 5.5, group)
+        below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
+        return values.sum() / below.sum(), ratio_interval(values, below, group)
+
+    seen = [look(seed) for seed in range(24)]
+    inside = [low <= value <= high for value, _ in seen for _, (low, high) in seen]
+    assert np.mean(inside) > 0.88
+
+
+def test_no_failure_is_no_proof() -> None:
+    low, high = scoring.share_interval(np.ones(1000, bool), np.arange(1000) // 10)
+    assert high == 1.0 and 0.985 < low < 0.997
+
+
+def test_one_layout_is_drawn_by_its_targets() -> None:
+    values = np.random.default_rng(0).normal(size=400)
+    low, high = mean_interval(values, np.zeros(400, np.int64))
+    assert 0 < high - low == pytest.approx(2 * SPREAD / 20, rel=0.2)
+
+
+def test_same_seed_same_interval() -> None:
+    values, group = _draw(1)
+    assert mean_interval(values, group) == mean_interval(values, group)
+
+
+def test_groups_are_compared_in_order() -> None:
+    missing = np.array([[3.0, 4.0, 0.5, 0.0, 0.2, 0.1], [0.0, 0.0, 0.5, 0.0, 0.2, 0.1]])
+    sizes = missing_by_group(missing, METHODS["px4"][2])
+    np.testing.assert_allclose(sizes, [[0.2, 0.5, 0.1, 5.0], [0.2, 0.5, 0.1, 0.0]])
+    more = np.array([[0.1, 9.0, 0.0, 0.0], [0.2, 0.5, 0.2, 0.0]])
+    assert misses_more(more, sizes).tolist() == [False, True]
+    assert misses_more(sizes, more).tolist() == [True, False]
+    assert not misses_more(sizes, sizes + 1e-7).any()
+
+
+def test_beside_the_autopilots_dual_misses_no_more_and_takes_the_least() -> None:
+    """BlueROV2 Heavy, whole and with one thruster lost."""
+    sizes = {"lost": (0, 1), "reach": (0.8, 1.2, 3.0), "layouts": 2, "targets": 6, "seed": 12}
+    rows = load_experiment("thrusters").rows(robots=("bluerov2_heavy",), **sizes)
+    assert len(rows) == 2 * 3 * 5
+    for row in rows:
+        assert row["n"] == 12
+        assert row.get("dual_more_mean", 0.0) == 0.0
+        if row["method"] == "dual":
+            assert row["not_delivered"] == (0.0 if row["of_reach"] < 100.0 else 1.0)
+            assert row["of_reach"] > 100.0 or row["watts_max"] < 1.001
+    near = {(row["lost"], row["method"]): row for row in rows if row["of_reach"] == 80.0}
+    assert near[0, "pseudo-inverse"]["not_delivered"] > 0.05 and near[0, "pseudo-inverse"]["watts"] > 1.01
+    assert near[0, "ardusub"]["not_delivered"] > near[0, "pseudo-inverse"]["not_delivered"]
+
+
+def test_a_surveyed_frame_shows_the_axis_that_a_drawing_hides() -> None:
+    """Nothing drives pitch alone; thrusters a little out of place seem to, and the pseudo-inverse clips."""
+    rows = load_experiment("thrusters").rows(
+        robots=("surveyed",), lost=(0,), reach=(0.8,), layouts=2, targets=6
+    )
+    by = {row["method"]: row for row in rows}
+    assert by["dual"]["not_delivered"] == 0.0
+    assert by["pseudo-inverse"]["n"] == 12
