@@ -20,7 +20,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.handles import put
-from webapp.markup.html import html
+from webapp.markup.words import html
 from webapp.panels.frame import View
 from webapp.session.looking import DRAWERS
 from webapp.tasks.designs import Opening

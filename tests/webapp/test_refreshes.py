@@ -11,8 +11,7 @@ import webapp
 from finlab.assets import shipped_checkpoints
 from tests.webapp.test_faults import Tab
 from tests.webapp.test_other_robots import tab
-from webapp.board import Board
-from webapp.facts import Facts
+from webapp.board import Board, Facts
 
 __all__ = ["tab"]
 

@@ -29,14 +29,8 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:
-    """A closed round tube along a path (P, 3); `radius` may change along it.
-
-    Args:
-        path: points (P, 3) of the axis, no two neighbours equal.
-        radius: one radius, or one per point (P,) [m].
-        sides: corners of the cross-section.
-        across: a direction (3,) that is never along the path; chosen from the path if left out.
-    """
+    """A closed round tube along a path (P, 3) [m], no two neighbours equal, with one radius or (P,) [m];
+    `across` is never along the path, and chosen from it if left out."""
     radius = np.broadcast_to(np.asarray(radius, dtype=float), (len(path),))
     tangent = np.gradient(path, axis=0)
     # Where the path stands still (a step of the radius) the direction of travel is taken from its whole.

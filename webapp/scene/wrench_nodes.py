@@ -103,17 +103,8 @@ class WrenchNodes:
     def refresh(
         self, target: Array, got: Array, missing: Array, top: float, scale: float, turn: float, size: float
     ) -> None:
-        """Show a target (6,) and what is delivered of it (6,), zero while unknown.
-
-        Args:
-            target: asked wrench [N, N m].
-            got: delivered wrench [N, N m].
-            missing: the part (6,) of the difference that matters enough to be drawn.
-            top: height of the hull's top [m].
-            scale: length of a force arrow per newton [m/N].
-            turn: angle of a torque ring per newton metre [rad/(N m)].
-            size: how much larger all is drawn.
-        """
+        """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is missing
+        enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of rings [rad/(N m)]."""
         put(self._root, position=np.array([0.0, 0.0, top + HEIGHT * size]))
         for node in self._nodes:
             put(node, scale=size)

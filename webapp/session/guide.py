@@ -5,10 +5,9 @@ from typing import Any
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.core import Core
-from webapp.session.history import History
 from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import Desk
-from webapp.session.state import chosen
+from webapp.session.state import History, chosen
 
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
 KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
