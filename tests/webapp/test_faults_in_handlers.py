@@ -16,7 +16,7 @@ from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.panels.frame import View
 from webapp.session import Session
-from webapp.session.guide import Guide
+from webapp.session.lessons import Guide
 from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
 from webapp.tasks.fitting import Fitting

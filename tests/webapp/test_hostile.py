@@ -180,8 +180,6 @@ def test_several_files_at_once_are_refused() -> None:
         Taken().heard["dropped"]("", "")
 
 
-__all__ = ["app", "server", "view"]
-
 EVIL = "<img src=x onerror=alert(1)>'\"&amp;"
 ESCAPED = re.compile(r"&(lt|amp);")
 

@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from webapp.handles import press
 from webapp.markup.plot import EXACT, RIGHT, WIDTH, Plot, Point, cost_axis, error_axis
 from webapp.markup.words import html
-from webapp.tasks.mode_names import Modes
+from webapp.tasks.solver import Modes
 from webapp.theme import DEAD, MODE_COLORS, css
 
 LEFT = 54

@@ -17,7 +17,7 @@ from webapp.markup.words import error_digits, html, marker, source_words, three_
 from webapp.page import Page
 from webapp.session.state import DRAWING, State, least_of
 from webapp.tasks.jobs import Run
-from webapp.tasks.mode_names import Modes
+from webapp.tasks.solver import Modes
 from webapp.theme import MODE_COLORS, css
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."

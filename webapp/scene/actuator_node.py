@@ -17,7 +17,7 @@ from finlab.hull.shapes import Mesh
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes
-from webapp.scene.arrows import NOTHING, force_arrow, joined, tube
+from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, MISSING, fin_color
 

@@ -13,7 +13,7 @@ from finlab.hull import Surface, hull_of
 from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.arrows import NOTHING
+from webapp.scene.actuator_shapes import NOTHING
 from webapp.theme import LIGHT, Look, Rgb, look
 
 BELOW = 0.22
