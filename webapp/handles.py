@@ -1,11 +1,17 @@
-"""Writing to viser's handles, and hearing from them."""
+"""Inputs of the page, and words in its own markup that can be pressed (their other half is `presses.js`)."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 import viser
 from markupsafe import escape
+
+from finlab.errors import FinlabError
+from webapp.markup.words import html, marker
+from webapp.viser_internals import run_file, run_script, uuid_of
 
 
 def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
@@ -14,10 +20,8 @@ def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
 
 
 def put(handle: Any, **values: Any) -> None:
-    """Set properties of a handle, but only those that differ, so that an unchanged page gets no message.
-
-    Content that is not marked as markup is text.
-    """
+    """Set those properties of a handle that differ, so that an unchanged page gets no message; content not
+    marked as markup is text."""
     for key, value in values.items():
         if key == "content":
             value = str(escape(value))
@@ -32,11 +36,8 @@ def _same(old: Any, new: Any) -> bool:
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
-    """Call `act(value)` on the event loop when the user changes an input; our own writes are not heard.
-
-    Values of another kind than the input's own are not from our page: the input goes back to what it held.
-    Whether a number makes sense is for the session to say.
-    """
+    """Call `act(value)` on the loop when the user, not we, changes an input; a value of another kind than the
+    input's own is not from our page: it goes back to what it held."""
     honest = handle.value
     buttons = isinstance(handle, viser.GuiButtonGroupHandle)
 
@@ -71,3 +72,87 @@ def numbered(button: str, count: int) -> int | None:
     """Place that a numbered button stands for (`3`, `3 ✕`: 2), of `count`; None for any other text."""
     number, numbers = button.split(" ")[0], [str(k + 1) for k in range(count)]
     return numbers.index(number) if number in numbers else None
+
+
+MAX_MESSAGE = 100_000
+"""Longest message of the page that is read; a link with a design is the longest honest one."""
+KINDS = [int, str, str, str]
+"""Number, kind, key and text of a word."""
+
+Act = Callable[[str, str], object]
+"""Carries out what was meant with a key and a text, or raises a `FinlabError`."""
+
+
+def press(kind: str, key: str) -> str:
+    """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
+    return html("data-press='{}' data-key='{}'", kind, key)
+
+
+def placed(key: str, count: int) -> int:
+    """The place that a page names, of `count`. FinlabError: there is no such place."""
+    if not key.isdecimal() or len(key) > 6 or int(key) >= count:
+        raise FinlabError("that one is gone")
+    return int(key)
+
+
+class Presses:
+    """All of one page."""
+
+    def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None]) -> None:
+        """Listen to the page; `do` carries out what was meant."""
+        self._gui, self._do = gui, do
+        self._acts: dict[str, Act] = {}
+        self._last = 0
+        hidden = "<style>div:has(>.fl-presses) + div {{ display: none; }}</style>{}"
+        add_html(gui, html(hidden, marker("fl-presses")))
+        self._box = gui.add_text("presses", "")
+        on_user_change(self._box, self.read)
+
+    def on(self, kind: str, act: Act) -> None:
+        """Who hears of a kind."""
+        self._acts[kind] = act
+
+    def start(self) -> None:
+        """Let the page's half begin."""
+        run_file(self._gui, "presses.js", f"finlabPresses.start({json.dumps(uuid_of(self._box))});")
+
+    def read(self, message: str) -> None:
+        """Words that were not heard yet, oldest first; the page may send anything."""
+        if not 0 < len(message) <= MAX_MESSAGE:
+            return
+        try:
+            words = json.loads(message)
+        except (ValueError, RecursionError):
+            return
+        for word in words if isinstance(words, list) else []:
+            if not (isinstance(word, list) and [type(part) for part in word] == KINDS):
+                continue
+            number, kind, key, text = word
+            if number > self._last:
+                self._last = number
+                if kind in self._acts:
+                    self._do(partial(self._acts[kind], key, text))
+        run_script(self._gui, f"finlabPresses.heard({self._last});")
+
+
+class Asking:
+    """The question of one page to its user, on a card over the view that `cards.js` draws; a newer one takes
+    its place."""
+
+    def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
+        self._gui = gui
+        self._acts: list[Callable[[], object]] = []
+        presses.on("answer", self._answer)
+        run_file(gui, "cards.js")
+
+    def ask(self, title: str, text: str, answers: Mapping[str, Callable[[], object]]) -> None:
+        """Show a title, a sentence, and a button for each answer that does something; another one leaves all
+        as it is."""
+        self._acts = list(answers.values())
+        card = json.dumps([title, text, [*answers, "Cancel"]])
+        run_script(self._gui, f"finlabCards.ask(...{card});")
+
+    def _answer(self, key: str, _text: str) -> None:
+        acts, self._acts = self._acts, []
+        if key.isdecimal() and int(key) < len(acts):
+            acts[int(key)]()

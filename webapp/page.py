@@ -15,10 +15,8 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
-from webapp.board import Board
-from webapp.facts import Facts, facts_of
-from webapp.handles import on_user_change
-from webapp.presses import Asking, Presses
+from webapp.board import Board, Facts, facts_of
+from webapp.handles import Asking, Presses, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.background import EventLoop, Workers

@@ -1,5 +1,5 @@
 // Words of the app's own markup that can be pressed: data-press says what one is, data-key of whom. The server
-// (presses.py) hears of each once, and of what else scripts of ours tell it.
+// (handles.py) hears of each once, and of what else scripts of ours tell it.
 (() => {
   if (window.finlabPresses) return;
   const AGAIN_MS = 700, TRIES = 40; // a page that is just connecting may lose what it is told to send

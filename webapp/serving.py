@@ -22,16 +22,9 @@ FIRST_LAYOUT = "ucat"
 def serve(
     host: str = "127.0.0.1", port: int = 8080, layout: str | None = None, checkpoint: str | Path | None = None
 ) -> None:
-    """Serve the app until SIGTERM or Ctrl-C. Raises FinlabError: the port is taken, or layout or checkpoint
-    cannot be read.
-
-    Args:
-        host: address to listen on. Only this machine can reach the default; for any other one the printed
-            address carries a token, without which nothing is shown.
-        port: port to listen on; 0 takes a free one.
-        layout: file, or name of a shipped layout, that a new session opens; None for the U-CAT.
-        checkpoint: folder or name of a checkpoint; None for the shipped one.
-    """
+    """Serve the app until SIGTERM or Ctrl-C; other hosts than this machine get an address with a token, port
+    0 is a free one, None the U-CAT and the shipped checkpoint. Raises FinlabError: the port is taken, or
+    layout or checkpoint cannot be read."""
     prepare(["webapp.session.files", "webapp.tasks.fitting"])
     first = in_worker(load_layout, layout or FIRST_LAYOUT)
     _check_port(host, port)

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from webapp.session.looking import DRAWERS, TASKS, Desk
-from webapp.session.search_request import SearchRequest
+from webapp.session.looking import DRAWERS, TASKS, Desk, SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
 

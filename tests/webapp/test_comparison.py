@@ -25,7 +25,7 @@ from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
-from webapp.tasks.comparison import Comparison, Run
+from webapp.tasks.jobs import Comparison, Run
 from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])

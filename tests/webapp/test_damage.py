@@ -19,7 +19,7 @@ from webapp.markup.words import damage_words
 from webapp.panels.files_tab import command_line
 from webapp.session import Session
 from webapp.session.layout_edits import DYNAMICS, with_dynamics
-from webapp.session.search_request import SearchRequest
+from webapp.session.looking import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.solver import Solver

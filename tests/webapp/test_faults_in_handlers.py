@@ -1,6 +1,7 @@
 """A fault in whatever a widget does: the page says so in a sentence, and goes on."""
 
 import asyncio
+import threading
 import types
 from collections.abc import Iterator
 from typing import Any
@@ -8,13 +9,15 @@ from typing import Any
 import pytest
 import viser
 
+from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.panels.frame import View
 from webapp.session import Session
-from webapp.session.guide import Guide
+from webapp.session.lessons import Guide
+from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
@@ -139,3 +142,48 @@ def test_every_widget_survives_a_fault_in_what_is_written(
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.3 and faults(view) == []
+
+
+def shout(text: str) -> None:
+    raise AssertionError(text)
+
+
+def test_only_the_newest_waits(worker: Worker) -> None:
+    gate, done = threading.Event(), threading.Event()
+    ran: list[int] = []
+    worker.submit("block", lambda: gate.wait(10) and None, shout)
+    for k in range(100):
+        worker.submit("a", lambda k=k: ran.append(k), shout)
+    worker.submit("end", done.set, shout)
+    gate.set()
+    assert done.wait(10)
+    assert ran == [99]
+
+
+def test_askers_take_turns(worker: Worker) -> None:
+    gate, done = threading.Event(), threading.Event()
+    ran: list[str] = []
+    worker.submit("block", lambda: gate.wait(10) and None, shout)
+    for key in ("a", "b", "c", "a"):
+        worker.submit(key, lambda key=key: ran.append(key), shout)
+    worker.forget("b")
+    worker.submit("end", done.set, shout)
+    gate.set()
+    assert done.wait(10)
+    assert ran == ["a", "c"]
+
+
+def test_a_fault_does_not_end_the_thread(worker: Worker, capsys: pytest.CaptureFixture[str]) -> None:
+    done = threading.Event()
+    told: list[str] = []
+
+    def refuse() -> None:
+        raise FinlabError("not so")
+
+    worker.submit("bad", lambda: 1 / 0, told.append)  # type: ignore[arg-type]
+    worker.submit("refused", refuse, told.append)
+    worker.submit("good", done.set, shout)
+    assert done.wait(10)
+    assert told == ["it failed: division by zero", "not so"]
+    printed = capsys.readouterr().err
+    assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"

@@ -20,7 +20,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.handles import put
-from webapp.markup.html import html
+from webapp.markup.words import html
 from webapp.panels.frame import View
 from webapp.session.looking import DRAWERS
 from webapp.tasks.designs import Opening
@@ -179,8 +179,6 @@ def test_several_files_at_once_are_refused() -> None:
     with pytest.raises(FinlabError, match="one ZIP archive"):
         Taken().heard["dropped"]("", "")
 
-
-__all__ = ["app", "server", "view"]
 
 EVIL = "<img src=x onerror=alert(1)>'\"&amp;"
 ESCAPED = re.compile(r"&(lt|amp);")

@@ -15,7 +15,7 @@ from finlab.layout import Fin, load_layout
 from tests.webapp.stand_in import page_of, running, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
-from webapp.session.search_request import SearchRequest
+from webapp.session.looking import SearchRequest
 from webapp.session.state import State
 from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver, Room

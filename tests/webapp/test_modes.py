@@ -20,8 +20,7 @@ from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import HOLD, Answering, Refining
-from webapp.tasks.mode_names import MAX_SHOWN, NO_MODES, Modes, NamedMode, named_modes
-from webapp.tasks.solver import Solver
+from webapp.tasks.solver import MAX_SHOWN, NO_MODES, Modes, NamedMode, Solver, named_modes
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 

@@ -15,8 +15,8 @@ from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
 from webapp.panels.wrench_tab import reach_marks
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion
-from webapp.scene.arrows import NOTHING, force_arrow, torque_ring
-from webapp.scene.direction_handle import on_sphere, snapped
+from webapp.scene.actuator_shapes import NOTHING, force_arrow, torque_ring
+from webapp.scene.wrench_nodes import on_sphere, snapped
 from webapp.theme import ASKED, DELIVERED, FIN_COLORS, MISSING, Rgb, ink
 
 

@@ -11,8 +11,7 @@ from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import Actuator, Fin, Layout, Thruster
 from finlab.layout.damage import Health
-from webapp.markup.html import html
-from webapp.markup.words import damage_words, saturated
+from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
@@ -29,12 +28,7 @@ PLAIN_HEADER = Markup(
 
 
 def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
-    """The bars of all six axes.
-
-    Args:
-        demanded: target wrench (6,) [N, N m]; NaN for an axis that is free.
-        got: delivered wrench (6,), None while there is none.
-    """
+    """The bars of all six axes: wrenches (6,) [N, N m], demanded (NaN where free) and got, if anything."""
     demanded = np.asarray(demanded, dtype=float)
     got = None if got is None else np.asarray(got, dtype=float)
     wanted = np.nan_to_num(demanded)
@@ -104,15 +98,7 @@ def swatch(index: int, failed: bool = False) -> str:
 def fin_table(
     layout: Layout, health: Health | None, allocation: Allocation | None, full: Array, selected: str | None
 ) -> str:
-    """All fins with their commands.
-
-    Args:
-        layout: the robot.
-        health: its damage.
-        allocation: the answer for it, None while there is none.
-        full: full thrust (n,) of each fin [N].
-        selected: name of the selected fin.
-    """
+    """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
     limits = None if allocation is None else saturated(allocation)
     rows = []
     for i, fin in enumerate(layout.actuators):

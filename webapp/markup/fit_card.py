@@ -4,8 +4,7 @@ from markupsafe import Markup
 
 from finlab.fit.fin_fit import FinFit
 from finlab.fit.thruster_fit import ThrusterFit, summary
-from webapp.markup.html import html, row
-from webapp.markup.words import three_digits
+from webapp.markup.words import html, row, three_digits
 from webapp.tasks.fitting import Fitted
 
 MOST_NAMED = 8

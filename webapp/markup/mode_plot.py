@@ -6,10 +6,10 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.arrays import Array
-from webapp.markup.html import html
+from webapp.handles import press
 from webapp.markup.plot import EXACT, RIGHT, WIDTH, Plot, Point, cost_axis, error_axis
-from webapp.presses import press
-from webapp.tasks.mode_names import Modes
+from webapp.markup.words import html
+from webapp.tasks.solver import Modes
 from webapp.theme import DEAD, MODE_COLORS, css
 
 LEFT = 54
@@ -32,16 +32,8 @@ TRAIL = (0, 1, 2, 3, 4, 6, 8, 12, 20)
 
 
 def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
-    """Effort, which the network's proposals keep least, against the error.
-
-    Samples are small dots, with thin lines to where they end; modes are numbered rings, which can be clicked.
-
-    Args:
-        modes: an answer's modes, which give the samples their colours.
-        shown: mode on the robot.
-        step: how many steps of refinement the samples have had; None for all.
-        height: of the plot [px].
-    """
+    """Effort, which the network's proposals keep least, against the error: samples, after so many steps of
+    refinement (None: all), are small dots with lines to where they end, modes are rings; `height` in px."""
     if not modes.shown or not modes.ways:
         return ""
     error = np.array([named.mode.err_norm for named in modes.shown])

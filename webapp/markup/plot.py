@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from webapp.markup.html import html
+from webapp.markup.words import html
 from webapp.theme import Rgb, css
 
 WIDTH = 388

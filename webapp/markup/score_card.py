@@ -11,8 +11,7 @@ from finlab.analysis.score_card import QuickCheck
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
-from webapp.markup.html import html, row
-from webapp.markup.words import listed, three_digits
+from webapp.markup.words import html, listed, row, three_digits
 from webapp.scene.actuator_shapes import SPAN
 from webapp.session.state import AXIS_UNITS
 
@@ -24,13 +23,7 @@ FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
 
 
 def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> str:
-    """The score card.
-
-    Args:
-        layout: the robot, for its fins' colours.
-        card: what it can do.
-        before: what it could do before, None where that is the same.
-    """
+    """The score card, beside what could be done `before` where that differs."""
     parts = [_summary(card, before), _axes(card, before), _losses(layout, card)]
     parts += [html("<div class='said dim'>{}</div>", note) for note in card.notes]
     return html("<div class='fl score'>{}</div>", parts)
@@ -125,13 +118,7 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
 
 
 def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:
-    """What there is to watch while a layout is edited.
-
-    Args:
-        quick: axes, and what single failures cost.
-        several: whether more than one fin works.
-        warnings: sentences about fins in the way.
-    """
+    """What there is to watch while a layout is edited: axes, what single failures cost, fins in the way."""
     texts = Markup().join(html("<div class='missing'>{}</div>", text) for text in warnings)
     costs = "No single failure costs an axis." if several else ""
     if quick.lost:

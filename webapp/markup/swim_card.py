@@ -2,8 +2,7 @@
 
 from markupsafe import Markup
 
-from webapp.markup.html import html, row
-from webapp.markup.words import fins_words, unlearned_sentence
+from webapp.markup.words import fins_words, html, row, unlearned_sentence
 from webapp.tasks.moment import Figures, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
@@ -48,13 +47,7 @@ def findings_words(shown: Moment) -> list[str]:
 
 
 def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> str:
-    """Distance from where the robot should be, depth error, power and energy so far, and what was found.
-
-    Args:
-        swims: whether there is a swim.
-        swimmer: the robot, None while it is being made.
-        moment: what it does.
-    """
+    """Distance from where the robot should be, depth error, power and energy so far, and what was found."""
     if not swims:
         return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:

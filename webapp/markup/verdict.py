@@ -50,12 +50,7 @@ COLORS: dict[Verdict, Rgb] = {
 
 
 def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
-    """What an answer is worth.
-
-    Args:
-        allocation: the answer.
-        in_reach: whether any command of the working fins gives what is asked.
-    """
+    """What an answer is worth; `in_reach` where any command of the working fins gives what is asked."""
     if allocation.unknown_fins:
         return Verdict.UNLEARNED  # whatever it gives, it gives by chance
     if allocation.reachable:
@@ -114,14 +109,8 @@ def bound_sentence(allocation: Allocation) -> str:
 def answer_sentence(
     state: State, allocation: Allocation | None, busy: bool, searching: bool = False
 ) -> Markup:
-    """What is left undone, why, and what the method ignores.
-
-    Args:
-        state: what is asked now.
-        allocation: the newest answer, None while there is none.
-        busy: whether it answers an earlier question.
-        searching: whether what is proved of it, and doubtful, is not known yet.
-    """
+    """What is left undone, why, and what the method ignores; while `busy` of an earlier question, and while
+    `searching` without what is proved of it."""
     sentences: list[str] = []
     if allocation is not None and not busy:
         if allocation.unknown_fins:

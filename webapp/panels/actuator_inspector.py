@@ -12,7 +12,7 @@ from finlab.layout.directions import Vector, axis_names, direction, part_of, poi
 from finlab.layout.fin import MAX_FREQUENCY
 from finlab.layout.fin_model import FIN_MODELS
 from webapp.markup.answer import swatch
-from webapp.markup.html import html
+from webapp.markup.words import html
 from webapp.page import Page
 from webapp.panels.actuator_model import add_fit, add_model, kind_of, of_part
 from webapp.session.actuator_edits import FORMULAS, LAW_KEYS, words

@@ -9,11 +9,10 @@ from markupsafe import Markup
 from finlab.layout import Actuator
 from finlab.layout.directions import direction
 from finlab.layout.layout import MAX_ACTUATORS
-from webapp.handles import add_html
+from webapp.handles import add_html, placed, press
 from webapp.markup.answer import swatch
-from webapp.markup.html import html, marker
+from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.presses import placed, press
 from webapp.session.actuator_edits import partner
 from webapp.session.layout_edits import NEW
 from webapp.session.state import State

@@ -16,9 +16,8 @@ from finlab.layout.directions import part_of
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of
-from webapp.markup.html import html
 from webapp.markup.plot import Plot, exact_axis, positive
-from webapp.markup.words import degrees
+from webapp.markup.words import degrees, html
 from webapp.page import Page
 from webapp.session.actuator_edits import FORMULAS
 from webapp.tasks.fitting import MAX_BYTES, Fitted
@@ -188,9 +187,8 @@ def drawn_curves(part: Actuator) -> str:
 
 @lru_cache(maxsize=64)
 def curves(part: Actuator) -> Sequence[Curves]:
-    """Force and power of an actuator over its command: of a fin for three amplitudes, in the middle of its
-    zero directions; of a rudder for water that comes from ahead at 1 m/s. Raises DataError: its table cannot
-    be read."""
+    """Force and power of an actuator over its command: of a fin for three amplitudes, of a rudder for water
+    from ahead at 1 m/s. Raises DataError: its table cannot be read."""
     plant = plant_of(Layout("one", (part,)))
     if isinstance(part, Fin):
         across = np.linspace(*part.limits.frequency, POINTS)

@@ -8,8 +8,7 @@ from typing import Any
 from finlab.hull import contradicts, displaced, lift_of
 from finlab.layout import Body, Layout
 from finlab.vehicle.fossen import GRAVITY
-from webapp.markup.html import html
-from webapp.markup.words import three_digits
+from webapp.markup.words import html, three_digits
 from webapp.page import Page
 
 KNOWN = {

@@ -12,14 +12,12 @@ from finlab.analysis.score_card import quick_check
 from finlab.deploy.design_files import LAYOUTS
 from finlab.exchange import FOREIGN
 from finlab.layout import Layout
-from webapp.handles import add_html
+from webapp.handles import add_html, press
 from webapp.markup.answer import wrench_bars
-from webapp.markup.html import html, marker
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.verdict import answer_sentence
-from webapp.markup.words import righting_sentences
+from webapp.markup.words import html, marker, righting_sentences
 from webapp.page import Page
-from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR, Stop

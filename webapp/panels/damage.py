@@ -12,7 +12,7 @@ from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.directions import part_of
 from webapp.handles import numbered
-from webapp.markup.html import button_colors
+from webapp.markup.words import button_colors
 from webapp.page import Page
 from webapp.session.state import STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color, ink
@@ -25,16 +25,7 @@ DEGREE = 180.0 / math.pi
 def add_fin_buttons(
     page: Page, label: str, hint: str, marker: str, act: Callable[[str], object], row: Callable[..., Row]
 ) -> None:
-    """A row of numbers, one for each actuator.
-
-    Args:
-        page: where it stands.
-        label: what the numbers do.
-        hint: the same at more length.
-        marker: its name on the page.
-        act: an intent about the actuator of a name.
-        row: which there are, as a function of facts.
-    """
+    """A row of numbers, one per actuator, that carry out `act(name)`; `row` is made of facts."""
     names: Sequence[str] = ()
 
     @wraps(row)

@@ -8,7 +8,7 @@ import viser
 from finlab.layout import Layout
 from finlab.layout.damage import Health
 from webapp.handles import add_html
-from webapp.markup.html import html, marker
+from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.session.files import bundle_name, design_name, graph_name, has_files, shipped, shipped_name
 from webapp.session.state import State

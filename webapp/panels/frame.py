@@ -13,13 +13,22 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
-from webapp.commands import add_commands
-from webapp.handles import add_html, put
-from webapp.markup.html import html, marker
+from webapp.handles import add_html, press, put
+from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.panels.places import ALLOCATE, CANDIDATES, DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
+from webapp.panels.places import (
+    ALLOCATE,
+    CANDIDATES,
+    DRAWER,
+    LEFT,
+    PLACES,
+    REGIONS,
+    RIGHT,
+    SIMULATE,
+    Place,
+    add_keys,
+)
 from webapp.panels.status import add_corner
-from webapp.presses import press
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
@@ -42,9 +51,8 @@ FOLDER = ".mantine-Paper-root[data-fl~={}]"
 
 
 class Section:
-    """A panel in its place; it gives way to a sentence when it cannot be shown: no old figure stands under a
-    new name. The browser builds its widgets when it is met first, so that a first page does not wait for
-    those of other tasks; from then on they stay."""
+    """A panel in its place, built when it is met first; it gives way to a sentence when it cannot be shown:
+    no old figure stands under a new name."""
 
     def __init__(self, page: Page, place: Place, index: int) -> None:
         self.place, self.name, self._page = place, f"at-{index}", page
@@ -202,5 +210,5 @@ class View(Page):
     def _build(self) -> None:
         self.gui.main_panel.dock_right()
         self.gui.set_panel_label("finlab")
-        add_commands(self)
+        add_keys(self)
         self.frame = Frame(self)

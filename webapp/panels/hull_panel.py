@@ -16,8 +16,7 @@ from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from finlab.vehicle.fossen import GRAVITY
-from webapp.markup.html import html
-from webapp.markup.words import three_digits
+from webapp.markup.words import html, three_digits
 from webapp.page import Page
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull

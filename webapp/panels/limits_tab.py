@@ -10,13 +10,11 @@ from markupsafe import Markup
 from finlab.analysis import AXES, Improvement, Progress
 from finlab.analysis.goals import MISSION, UNREACHED
 from webapp.handles import add_html
-from webapp.markup.html import html, marker
 from webapp.markup.score_card import score_table
-from webapp.markup.words import fins_words, listed, three_digits
+from webapp.markup.words import fins_words, html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.looking import DRAWN
-from webapp.session.search_request import GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
+from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
 from webapp.tasks.jobs import Findings
 
 

@@ -10,16 +10,14 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.yardstick import REACHED
 from finlab.layout import Layout
 from finlab.mdn.method import WHOLE
-from webapp.handles import add_html
-from webapp.markup.html import html, marker
+from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.verdict import Verdict, verdict_of
-from webapp.markup.words import error_digits, source_words, three_digits, unlearned_sentence
+from webapp.markup.words import error_digits, html, marker, source_words, three_digits, unlearned_sentence
 from webapp.page import Page
-from webapp.presses import placed, press
 from webapp.session.state import DRAWING, State, least_of
-from webapp.tasks.comparison import Run
-from webapp.tasks.mode_names import Modes
+from webapp.tasks.jobs import Run
+from webapp.tasks.solver import Modes
 from webapp.theme import MODE_COLORS, css
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
@@ -112,12 +110,7 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
 
 
 def mode_table(modes: Modes, mode: int) -> str:
-    """Name and origin, error, power, effort and use of the limits of each mode.
-
-    Args:
-        modes: an answer's modes.
-        mode: which of them moves the fins.
-    """
+    """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the fins."""
     if not modes.shown:
         return ""
     rows = []

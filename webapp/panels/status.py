@@ -8,17 +8,16 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.handles import put
-from webapp.markup.html import html
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
-from webapp.markup.words import error_digits, parts_word, three_digits
+from webapp.markup.words import error_digits, html, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.jobs import Findings
-from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
+from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
 
@@ -65,15 +64,8 @@ def _written(
 
 
 def legend(newtons: float, torque: float, cut: bool, size: float, also: str) -> str:
-    """Arrows, scales, and rows of more.
-
-    Args:
-        newtons: force [N] that an arrow of 0.1 m stands for where `size` is 1.
-        torque: torque [N m] that half a turn of a ring stands for.
-        cut: whether a ring would have to be longer than a turn.
-        size: how large arrows are drawn.
-        also: rows as `set_rows` makes them.
-    """
+    """Arrows, scales ([N] of 0.1 m where `size` is 1, [N m] of half a turn; `cut` where a ring would have to
+    be longer than one), and rows of more."""
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
     ring = f"{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
@@ -127,18 +119,8 @@ def corner(
     in_reach: bool = False,
     refined: str = "",
 ) -> str:
-    """Legend and status line in the lower left corner of the page.
-
-    Args:
-        state: what is asked.
-        legend: what the view shows, as markup.
-        allocation: what is on the robot.
-        busy: whether a newer answer is on its way.
-        error: why there is no answer.
-        least: whether it is the answer itself, not another way to do the same.
-        in_reach: whether any command of the working fins gives what is asked.
-        refined: which step of its refinement is on the robot, in place of a verdict; nothing at its end.
-    """
+    """Legend and status line in the lower left corner of the page; `least` where the answer itself is shown,
+    not another way to do the same; `refined` is the step of its refinement, nothing at its end."""
     fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:

@@ -13,10 +13,9 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, put
-from webapp.markup.html import html, marker
 from webapp.markup.plot import Axis, Plot, cost_axis, exact_axis, positive
 from webapp.markup.swim_card import swim_card
-from webapp.markup.words import righting_sentences, trim_sentence
+from webapp.markup.words import html, marker, righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
 from webapp.session.swim_plan import CHOICES, SCENARIOS, SPEEDS, SwimSettings

@@ -9,13 +9,11 @@ from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from webapp.handles import add_html, put
+from webapp.handles import add_html, placed, press, put
 from webapp.markup.answer import fin_table
-from webapp.markup.html import html, marker
-from webapp.markup.words import listed, three_digits
+from webapp.markup.words import html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.presses import placed, press
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
@@ -119,8 +117,7 @@ def _sentence(ranges_error: str | None) -> str:
 
 
 def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:
-    """Both ends of a range, value and text, on a slider that is `width` long; one mark where it is a point,
-    none where there is no range, and one text for both where two would lie on each other."""
+    """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
     if not np.isfinite(low):
         return ()
     first, last = _short(low, width), _short(high, width)

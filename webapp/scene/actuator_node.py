@@ -17,7 +17,7 @@ from finlab.hull.shapes import Mesh
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes
-from webapp.scene.arrows import NOTHING, force_arrow, joined, tube
+from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, MISSING, fin_color
 
@@ -101,14 +101,8 @@ class ActuatorNode:
         on_click: Callable[[int, bool], None],
         on_drag: Callable[[int, str, tuple[float, float, float]], None],
     ) -> None:
-        """Build the nodes.
-
-        Args:
-            scene: the client's scene.
-            index: place of the actuator in the layout.
-            on_click: called with the index when it is clicked, and whether Ctrl or Shift was held.
-            on_drag: called with index, phase (`start`, `update`, `end`) and position [m].
-        """
+        """Build the nodes. `on_click` gets the index and whether Ctrl or Shift was held, `on_drag` the index,
+        phase (`start`, `update`, `end`) and the position [m]."""
         name = f"/robot/fins/{index}"
         # The arrows stay along the body's axes, like the numbers beside them.
         idle: dict[str, Any] = {"depth_test": False, "active_axes": (False,) * 3, "line_width": 3.5}
@@ -157,17 +151,8 @@ class ActuatorNode:
         stuck: bool,
         owned_by_user: bool,
     ) -> None:
-        """Show an actuator.
-
-        Args:
-            part: the actuator.
-            hull: what its strut ends at.
-            sizes: of actuators, and of arrows.
-            moved: whether its gizmo is shown.
-            label: text at its root.
-            stuck: whether a pin holds it.
-            owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
-        """
+        """Show an actuator with its strut to the hull; `sizes` are of actuators and of arrows, `moved` shows
+        its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that holds it."""
         frame, place, (size, arrows) = np.array(part.frame), np.array(part.position), sizes
         slenderness, scale = shape_of(part, size)
         is_fin, is_pod = isinstance(part, Fin), isinstance(part, Azimuth)

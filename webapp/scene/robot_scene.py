@@ -18,9 +18,8 @@ from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
-from webapp.scene.direction_handle import DirectionHandle
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, part_size, view_size
-from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
+from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings

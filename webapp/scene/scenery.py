@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.hull.shapes import Mesh
 from webapp.board import Board
 from webapp.handles import put
-from webapp.scene.arrows import NOTHING, force_arrow, joined, tube
+from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale

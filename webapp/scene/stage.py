@@ -13,7 +13,7 @@ from finlab.hull import Surface, hull_of
 from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.arrows import NOTHING
+from webapp.scene.actuator_shapes import NOTHING
 from webapp.theme import LIGHT, Look, Rgb, look
 
 BELOW = 0.22
@@ -104,10 +104,7 @@ class Shape:
     def __init__(
         self, scene: viser.SceneApi, name: str, color: Rgb, mesh: Mesh = NOTHING, **options: Any
     ) -> None:
-        """Add the node; `options` as viser's `add_mesh_simple` takes them.
-
-        Shadows fall on the floor alone: on round shapes the map of shadows draws stripes.
-        """
+        """Add the node, with viser's `options`; shadows fall on the floor alone."""
         self.node = scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=color, receive_shadow=False, **options
         )

@@ -90,10 +90,8 @@ def unlinked(links: Links, name: str) -> Links:
 
 
 def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
-    """The layout after the twin of `name`, if it has one, has taken its mirrored place.
-
-    Axes that pointed the other way than the image's `before` stay so.
-    """
+    """The layout after the twin of `name`, if any, took its mirrored place; axes that pointed the other way
+    than the image's `before` stay so."""
     twin = partner(links, name)
     if twin is None or twin not in layout.names:
         return layout

@@ -12,10 +12,8 @@ from finlab.layout import Layout
 from finlab.layout.axes import axes_in
 from finlab.layout.damage import FAULTS
 from finlab.layout.directions import part_of
-from webapp.session.history import History, Steps
-from webapp.session.looking import DRAWERS, TASKS, Desk, Display
-from webapp.session.search_request import SearchRequest
-from webapp.session.state import LEAST, MAX_SPEED, State, chosen, number
+from webapp.session.looking import DRAWERS, TASKS, Desk, Display, SearchRequest
+from webapp.session.state import LEAST, MAX_SPEED, History, State, Steps, chosen, number
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST, PRESETS
 

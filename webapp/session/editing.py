@@ -13,7 +13,7 @@ from finlab.layout.directions import Vector, part_of, replaced, turned_about
 from webapp.session import actuator_edits, layout_edits
 from webapp.session.actuator_edits import followed, partner, unlinked
 from webapp.session.core import Core
-from webapp.session.guide import Guide
+from webapp.session.lessons import Guide
 from webapp.session.looking import Display
 from webapp.session.state import method_for
 

@@ -86,9 +86,8 @@ def graph_name(layout: Layout) -> str:
 
 
 def read_layout(name: str, content: bytes) -> Opened:
-    """The layout in an uploaded layout file, bundle, archive of a layout with its files, or description.
-    LayoutError: the file is too large, no text or no layout, or names a force table that did not come along;
-    the message names file and key. DataError: a table cannot be read."""
+    """The layout in an uploaded layout, bundle, archive or description. LayoutError, with file and key: too
+    large, no text, no layout, or a force table is missing. DataError: a table cannot be read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())

@@ -11,8 +11,7 @@ from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
-from webapp.tasks.mode_names import NO_MODES, Modes
-from webapp.tasks.solver import Reply
+from webapp.tasks.solver import NO_MODES, Modes, Reply
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""

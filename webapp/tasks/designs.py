@@ -14,7 +14,7 @@ from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
 from finlab.hull import hull_of
-from webapp.presses import Presses
+from webapp.handles import Presses
 from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State

@@ -15,7 +15,7 @@ from finlab.hull import hull_of
 from finlab.layout import Fin, Layout
 from finlab.layout.directions import replaced
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
-from webapp.session.search_request import GOAL_WORDS, SearchRequest
+from webapp.session.looking import GOAL_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
@@ -37,8 +37,7 @@ class Room:
 
     def __init__(self, layout: Layout, apart: float) -> None:
         """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
-        `apart` [m]: a cylinder about a fin's shaft, else a ball. What is closer already, or overlaps, need
-        not part, but comes no closer."""
+        `apart` [m]; what is closer already, or overlaps, need not part, but comes no closer."""
         self._hull = hull_of(layout).coarse()
         fins = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._along = np.where(fins[:, None], ALONG, 0.0)

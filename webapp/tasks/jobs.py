@@ -1,22 +1,87 @@
 """The jobs of one page beside the event loop, and score cards and ranges, which are two of them."""
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
+from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.looking import DRAWN
-from webapp.session.state import Flow, State
+from webapp.session.state import Flow, State, compared
 from webapp.tasks.answering import Answering, Refining
 from webapp.tasks.background import Newest
-from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
+
+TRIES = 3
+"""Answers of each method, of whose times the shortest counts: the first one may have to load a network, and
+on a busy machine any may have to wait."""
+
+Answer = Allocation | str
+
+
+class Run(NamedTuple):
+    """One comparison, as far as it has come."""
+
+    state: State | None = None
+    """The question, None before the first run."""
+    answers: tuple[tuple[str, Answer], ...] = ()
+    cancelled: bool = False
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """All of them, in their order."""
+        return () if self.state is None else compared(self.state.layout)
+
+    @property
+    def running(self) -> bool:
+        """True until all methods have answered."""
+        return len(self.answers) < len(self.methods) and not self.cancelled
+
+
+class Comparison(Newest[State, Allocation]):
+    """The runs of one page: one question per method, so that those of other pages are answered in between."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context.loop, context.workers.answers, self._quickest, self._hear)
+        self._solver, self._render = context.solver, context.changed
+        self.run = Run()
+
+    def start(self, state: State) -> None:
+        """Ask all methods about a state; a run that is still going on is given up."""
+        super().forget()
+        self.run = Run(state)
+        self._next(state)
+
+    def cancel(self) -> None:
+        """Ask no more; the answers so far stay."""
+        super().forget()
+        self.run = self.run._replace(cancelled=True)
+
+    def forget(self) -> None:
+        """Give up and forget."""
+        super().forget()
+        self.run = Run()
+
+    def _next(self, state: State) -> None:
+        if self.run.running:
+            self.ask(replace(state, method=self.run.methods[len(self.run.answers)]))
+
+    def _quickest(self, state: State) -> Allocation:
+        return min((self._solver.solve(state) for _ in range(TRIES)), key=lambda answer: answer.solve_ms)
+
+    def _hear(self) -> None:
+        if self.answered is not None:
+            answer = self.findings or self.error or "no answer"
+            self.run = self.run._replace(answers=(*self.run.answers, (self.answered.method, answer)))
+            self._render()
+            self._next(self.answered)
+
 
 REST_S = 0.12
 """How long the target may not change before the marks are worked out again [s]."""
