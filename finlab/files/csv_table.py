@@ -59,17 +59,28 @@ class CsvTable:
         rows = [(line, row) for line, row in every if row.strip(" ,;\t") and not row.startswith("#")]
         if not rows:
             raise DataError(f"{self.source}: has no rows below its header")
-        return np.array([self._row(row, places, line) for line, row in rows]), np.array([n for n, _ in rows])
+        numbers = self._plain([row for _, row in rows], places)
+        if numbers is None:
+            numbers = np.array([self._row(row, places, line) for line, row in rows])
+        return numbers, np.array([line for line, _ in rows])
+
+    def _plain(self, rows: Sequence[str], places: Sequence[int]) -> Array | None:
+        """The numbers of rows without quotes, gaps and faults, several times as fast; else None."""
+        if any('"' in row or "_" in row for row in rows):
+            return None
+        cells = [row.split(self._delimiter) for row in rows]
+        if any(len(each) != len(self.header) for each in cells):
+            return None
+        with suppress(ValueError):
+            numbers = np.array([[float(each[i]) for i in places] for each in cells])
+            return numbers if np.isfinite(numbers).all() else None
+        return None
 
     def _row(self, row: str, places: Sequence[int], line: int) -> list[float]:
         where = f"{self.source}: line {line}"
         cells = self._cells(row, where)
         if len(cells) != len(self.header):
             raise DataError(f"{where} has {len(cells)} values, the header has {len(self.header)}")
-        with suppress(ValueError):
-            values = [float(cells[i]) for i in places]
-            if "_" not in row and all(map(math.isfinite, values)):
-                return values
         return [self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places]
 
     def _cells(self, row: str, where: str) -> list[str]:

@@ -298,9 +298,6 @@ def test_a_large_force_table_is_read_in_time(tmp_path: Path) -> None:
     rows = np.stack([axis.ravel() for axis in grid] * 2, axis=-1) + 0.1234567890123
     np.savetxt(tmp_path / "t.csv", rows, fmt="%.9f", delimiter=",", header="A,f,phi,Fx,Fy,Fz", comments="")
     assert (tmp_path / "t.csv").stat().st_size > 23_000_000
-    took = list[float]()
-    while len(took) < 3 and min(took, default=9.0) >= 3.0:  # a busy machine is slower
-        start = time.thread_time()
-        read_table(tmp_path / "t.csv")
-        took.append(time.thread_time() - start)
-    assert min(took) < 3.0
+    start = time.thread_time()
+    read_table(tmp_path / "t.csv")
+    assert time.thread_time() - start < 3.0
