@@ -66,13 +66,11 @@ class CsvTable:
 
     def _plain(self, rows: Sequence[str], places: Sequence[int]) -> Array | None:
         """The numbers of rows without quotes, gaps and faults, several times as fast; else None."""
-        if any('"' in row or "_" in row for row in rows):
-            return None
-        cells = [row.split(self._delimiter) for row in rows]
-        if any(len(each) != len(self.header) for each in cells):
+        separators = len(self.header) - 1
+        if any('"' in row or "_" in row or row.count(self._delimiter) != separators for row in rows):
             return None
         with suppress(ValueError):
-            numbers = np.array([[float(each[i]) for i in places] for each in cells])
+            numbers = np.loadtxt(rows, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2)
             return numbers if np.isfinite(numbers).all() else None
         return None
 
