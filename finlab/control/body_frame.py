@@ -15,12 +15,11 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control.completion import Completion, axes_of
 from finlab.control.measurement import Controller, Measurement, Setpoint
-from finlab.control.observer import MotionObserver, strongest_wrench
-from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
+from finlab.control.observer import MotionObserver
+from finlab.control.tracking_controller import TrackingController, most_of, pace_of
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.axes import wrapped
-from finlab.vehicle.actuator_motion import following_delay
 
 SLOW, TURN, SPEED = 0.4, 0.75, 0.6
 """Bandwidths of position and depth, of the heading and of the speed, times the delay."""
@@ -39,12 +38,7 @@ def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]
     the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
     observer = MotionObserver(layout, period_s)
     drag = observer.inertia * observer.slowed_by(np.full(4, CRUISE)) / CRUISE
-    return (
-        1.0 / (following_delay(layout) + BEHIND_S),
-        observer.inertia,
-        drag,
-        LARGEST * strongest_wrench(layout),
-    )
+    return pace_of(layout), observer.inertia, drag, most_of(layout)
 
 
 class WaypointController:

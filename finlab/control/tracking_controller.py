@@ -64,16 +64,26 @@ class TrackingGains:
     changes all the time where it keeps a place, and more and more to where the path goes on."""
 
 
+def pace_of(layout: Layout) -> float:
+    """Inverse of the delay of a robot's actuators, its sensors and a period [1/s]."""
+    return 1.0 / (following_delay(layout) + BEHIND_S)
+
+
+def most_of(layout: Layout) -> Array:
+    """Largest wrench (6,) that a robot is asked for [N, N m]."""
+    return LARGEST * strongest_wrench(layout)
+
+
 def gains_for(layout: Layout) -> TrackingGains:
     """The gains for one robot, by one rule.
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
     inverse of that delay, velocities close at 1.0, the heading 1.3 times slower than they, and the path
     round it twice as slow as the heading; of robots that rudders steer see `BY_RUDDERS`."""
-    pace = 1.0 / (following_delay(layout) + BEHIND_S)
+    pace = pace_of(layout)
     dives = "Ty" in axes_of(layout)
     velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
-    most = LARGEST * strongest_wrench(layout)
+    most = most_of(layout)
     body = dynamics_of(complete_body(layout))
     linear, quadratic = body.linear[0], max(body.quadratic[0], 1e-9)
     steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)

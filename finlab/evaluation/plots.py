@@ -12,6 +12,7 @@ import numpy as np
 from finlab.assets import install
 from finlab.errors import DataError
 from finlab.evaluation.document import Row
+from finlab.sim.plot import COLORS
 from finlab.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".svg", ".pdf")  # kinds of files that are written
 DPI = 150
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Okabe and Ito's, which most people can tell apart."""
 MARKERS = "osD^v<>"
 LEAST_ERROR = 1e-12  # errors below this one are drawn there: a logarithmic axis has no 0
 

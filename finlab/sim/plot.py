@@ -11,7 +11,7 @@ from finlab.sim.log import RunLog
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Okabe and Ito's, which most people can tell apart."""
 STYLES = ("-", "--", ":", "-.")
 """Of the lines of one color, which the first word of a name has."""

@@ -17,7 +17,8 @@ from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.executor import map_parts
-from finlab.layout import Layout
+from finlab.files.worker import in_worker
+from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, RunLog, Trajectory
 
 RTE_DELTA_S = 5.0
@@ -118,12 +119,16 @@ def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]
     ]
 
 
-def losses_of(layout: Layout, counts: Sequence[int]) -> dict[int, tuple[str, ...] | None]:
-    """For each number of fins the first that may be lost so that the robot can be steered; None where all are
-    needed. Numbers that leave no fin are left out. Raises DataError: a negative number."""
+def with_losses(
+    layouts: Sequence[str], counts: Sequence[int]
+) -> list[tuple[Layout, int, tuple[str, ...] | None]]:
+    """For each file or shipped name and number of fins the first that may be lost so that the robot can be
+    steered; None where all are needed. Numbers that leave no fin are left out. Raises DataError: a negative
+    number."""
     if min(counts) < 0:
         raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
-    return {count: steerable_loss(layout, count) for count in counts if count < layout.n}
+    robots = [in_worker(load_layout, name) for name in layouts]
+    return [(each, n, steerable_loss(each, n)) for each in robots for n in counts if n < each.n]
 
 
 POWER = (

@@ -16,13 +16,12 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     Swim,
     follow_row,
-    losses_of,
     mean_rows,
     swum,
+    with_losses,
 )
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
-from finlab.layout import load_layout
 from finlab.sim import RunLog, make_trajectory
 from finlab.sim.plot import paths_picture
 
@@ -58,9 +57,8 @@ def run(
         seed: of the first run's noise.
     """
     check_names("controllers", controllers, CONTROLLERS)
-    robots = [in_worker(load_layout, name) for name in layouts]
     path, specs = in_worker(make_trajectory, trajectory), load_method_specs(methods, checkpoint)
-    cases = [(robot, *loss) for robot in robots for loss in losses_of(robot, lost).items()]
+    cases = with_losses(layouts, lost)
     able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
     parts = list(product(able, controllers, specs, range(seed, seed + runs)))
     swims = [Swim(robot, path, name, law, k, fins) for (robot, _, fins), law, name, k in parts]

@@ -11,15 +11,13 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     Swim,
     depth_error,
-    losses_of,
     mean_rows,
     power_row,
     speed_error,
     swum,
+    with_losses,
 )
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.files.worker import in_worker
-from finlab.layout import load_layout
 from finlab.sim import RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
@@ -57,9 +55,8 @@ def run(
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
     check_names("controllers", controllers, CONTROLLERS)
-    robots = [in_worker(load_layout, name) for name in layouts]
     specs = load_method_specs(methods, checkpoint)
-    cases = [(robot, *loss) for robot in robots for loss in losses_of(robot, lost).items()]
+    cases = with_losses(layouts, lost)
     able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
     parts = list(product(able, SPEEDS, controllers, specs, range(seed, seed + runs)))
     swims = [
