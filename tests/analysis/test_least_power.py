@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import Blade
 from finlab.analysis.score_card import least_power
 from finlab.layout import FinModelSpec, load_layout
 from finlab.layout.axes import AXES

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.blade import OWN_INERTIA, Blade
+from finlab.actuators.law import OWN_INERTIA, Blade
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 

@@ -12,7 +12,7 @@ from time import thread_time
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
+from finlab.allocation.baselines.pseudo_inverse import SOLVED, ModelBased, TimeLimitedSettings
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.physics import Plant

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from finlab.allocation.baselines.model_based import ModelBased, TimeLimitedSettings
-from finlab.allocation.baselines.pseudo_inverse import pushed_axes
+from finlab.allocation.baselines.pseudo_inverse import ModelBased, TimeLimitedSettings, pushed_axes
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
