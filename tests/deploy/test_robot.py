@@ -13,9 +13,8 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.physics import plant_of
-from tests.any_robot import AnyRobot
+from tests.any_robot import FIN_ROBOTS, AnyRobot
 from tests.exhaustive import sampled
-from tests.fin_robots import FIN_ROBOTS
 
 
 @pytest.fixture(scope="module")
