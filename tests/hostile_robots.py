@@ -136,7 +136,7 @@ def _extreme(rng: np.random.Generator, kind: str) -> FinModelSpec:
     return FinModelSpec(kind, tuple(values))
 
 
-def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpec]:
+def _models(rng: np.random.Generator) -> Sequence[FinModelSpec]:
     """The fin models of one robot: one kind, or a mixture."""
     large = float(rng.uniform(1.0, 5.0))
     kinds = [
