@@ -11,7 +11,6 @@ from pathlib import Path
 
 from msgspec import to_builtins
 
-from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.axes import AXES
@@ -19,6 +18,7 @@ from finlab.layout.file import FORMAT, layout_to_dict
 from finlab.layout.file_form import plain
 from finlab.layout.load import Data, Edge, Graph, Normalization, edges_of
 from finlab.paper.network import POSITION_SCALE, SCALES
+from finlab.physics.objective import yardstick
 from finlab.whole_file import write_whole
 
 _FORCE = ("force", "N")
