@@ -8,9 +8,16 @@ import numpy as np
 
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
-from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
+from finlab.allocation.methods import (
+    LEARNED,
+    Checkpoint,
+    MethodChoice,
+    checked_settings,
+    choose_method,
+)
 from finlab.allocation.settings import Settings
-from finlab.layout import Layout
+from finlab.assets import shipped_layouts
+from finlab.layout import Layout, load_layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.networks.trained import Normalization
 
@@ -65,3 +72,11 @@ class AnyRobot:
 def normalized_error(normalization: Normalization, wrench: Any, target: Any) -> Any:
     """`||(wrench - target) / std||`, over the last axis."""
     return np.linalg.norm((np.asarray(wrench) - np.asarray(target)) / normalization.std, axis=-1)
+
+
+def _is_one(layout: Layout) -> bool:
+    return layout.is_of_fins and all(fin.mounting_angle is not None for fin in layout.fins)
+
+
+FIN_ROBOTS = {name: path for name, path in shipped_layouts().items() if _is_one(load_layout(path))}
+"""Names and layout files."""

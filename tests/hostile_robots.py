@@ -1,4 +1,4 @@
-"""Robots and targets that are valid but hostile: degenerate limits, geometry, fin models and wrenches."""
+"""Robots that are valid but hostile: degenerate limits, geometry and fin models."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,6 @@ from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.fin import LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
 from finlab.layout.fin_model import FIN_MODELS
-from finlab.physics import Plant
 
 DOMAIN = 0xF022
 """Leads the seed of every robot."""
@@ -28,24 +27,21 @@ ARCS = (
     "shifted full",
 )
 """What arcs of zero directions there are."""
-TARGETS = ("reachable", "zero", "huge", "tiny", "unreachable", "one axis")
-"""What wrenches are asked for."""
 
 
-def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
+def hostile_robot(number: int, seed: int) -> Layout:
     """Robot `number` of a seed: 1 to 16 fins, each robot with a mixture of degeneracies of its own.
 
     Args:
         number: which robot.
         seed: of the whole set.
-        table: path of a table of forces; without one no fin follows a table.
     """
     rng = np.random.default_rng([DOMAIN, seed, number])
     n = int(rng.choice([1, 2, 3, 4, 5, 6, 8, 12, 16]))
     position, angle = _places(rng, str(rng.choice(GEOMETRIES)), n)
     ranges = rng.choice(RANGES, size=int(rng.integers(1, 4)))
     arcs = rng.choice(ARCS, size=int(rng.integers(1, 4)))
-    models = _models(rng, table)
+    models = _models(rng)
     fins = (
         Fin(
             f"fin_{i}",
@@ -61,26 +57,6 @@ def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
         for i in range(n)
     )
     return Layout(f"hostile {number}", tuple(fins))
-
-
-def hostile_targets(layout: Layout, count: int, number: int, seed: int) -> Array:
-    """Wrenches (count, 6) for robot `number`, of every kind in `TARGETS` in turn."""
-    rng = np.random.default_rng([DOMAIN, seed, number, 1])
-    plant = Plant(layout)
-    targets = np.clip(plant.wrench(plant.sample(rng, (count,))), -1e6, 1e6).reshape(count, 6)
-    for i in range(count):
-        kind = TARGETS[i % len(TARGETS)]
-        if kind == "zero":
-            targets[i] = 0.0
-        elif kind == "huge":
-            targets[i] = rng.uniform(-1e6, 1e6, 6)
-        elif kind == "tiny":
-            targets[i] = rng.normal(size=6) * 1e-12
-        elif kind == "unreachable":
-            targets[i] = np.clip(rng.normal(size=6) * 10.0 * np.abs(targets).max(), -1e6, 1e6)
-        elif kind == "one axis":
-            targets[i] = np.eye(6)[rng.integers(6)] * rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 3)
-    return targets
 
 
 def _places(rng: np.random.Generator, geometry: str, n: int) -> tuple[Array, Array]:
@@ -160,7 +136,7 @@ def _extreme(rng: np.random.Generator, kind: str) -> FinModelSpec:
     return FinModelSpec(kind, tuple(values))
 
 
-def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpec]:
+def _models(rng: np.random.Generator) -> Sequence[FinModelSpec]:
     """The fin models of one robot: one kind, or a mixture."""
     large = float(rng.uniform(1.0, 5.0))
     kinds = [
@@ -170,7 +146,5 @@ def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpe
         FinModelSpec("soft", (("k", 8.0 * large),)),
         *(_extreme(rng, kind) for kind in ("drag", "lighthill", "soft")),
     ]
-    if table is not None:
-        kinds.append(FinModelSpec("table", (("path", table),)))
     chosen = int(rng.integers(len(kinds) + 2))
     return kinds if chosen >= len(kinds) else [kinds[chosen]]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop

@@ -18,7 +18,6 @@ LEVELS = (
     ("bundle_files", "executor"),
     ("layout",),
     ("actuators",),
-    ("uncertainty",),
     ("physics", "exchange"),
     ("vehicle",),
     ("networks", "hull"),

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
 from finlab.actuators.fin.fin_laws import stack_laws
 from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import RudderGroup, RudderLaw
-from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
+from finlab.actuators.thruster import AzimuthGroup, AzimuthLaw, ThrusterGroup, ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
 

@@ -8,7 +8,6 @@ its convex hull, at which `T` has a steep place.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -50,11 +49,6 @@ class RadialTable:
         """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson, 1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
         return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
-
-    @classmethod
-    def of_price(cls, top: float, answer: Callable[[Array], Array], rest: float = 0.0) -> "RadialTable":
-        """A table of a function that gives forces for prices."""
-        return cls.of_forces(top, answer(price_grid(top)), rest)
 
     @classmethod
     def of_costs(cls, force: Array, cost: Array) -> "RadialTable":

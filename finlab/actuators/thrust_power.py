@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import RadialTable
+from finlab.actuators.response import RadialTable, price_grid
 from finlab.arrays import AnyArray, Array, Values
 from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
@@ -160,14 +160,9 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
     [N]."""
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
-    rest = float(own.watts(ends)[0, 0])
     top = abs(float(own.marginal(ends)[1, 0]))
-
-    def answer(price: Array) -> Array:
-        """Sizes of the force [N] whose marginal cost is a price [W/N]."""
-        return np.clip(sign * own.answer(sign * price[:, None])[:, 0], least, most)
-
-    return RadialTable.of_price(top, answer, rest)
+    force = np.clip(sign * own.answer(sign * price_grid(top)[:, None])[:, 0], least, most)
+    return RadialTable.of_forces(top, force, float(own.watts(ends)[0, 0]))
 
 
 class PropellerLaw(ActuatorLaw):

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.report import allocation_text, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData, Rows
-from finlab.allocation.yardstick import REACHED, judged_effort, judged_power
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
 from finlab.physics.expected_miss import expected_miss
+from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
 Number = TypeVar("Number", float, Array)
@@ -60,7 +60,7 @@ class Answer(PlainData, Generic[Number]):
     command: Array
     """Command (n, 3) or (N, n, 3) of every actuator, as its law takes it; NaN if failed."""
     scale: Array
-    """Yardstick (6,) of the error [N, N m]; see `finlab.allocation.yardstick`."""
+    """Yardstick (6,) of the error [N, N m]; see `finlab.physics.objective`."""
     method: str
     """Name of the method that answered."""
     checkpoint: str | None = None

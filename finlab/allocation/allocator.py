@@ -37,7 +37,6 @@ from finlab.allocation.question import (
 )
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
-from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
@@ -45,6 +44,7 @@ from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
+from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant, plant_of
 
 MOST_PREPARED = 32
@@ -173,7 +173,7 @@ class Allocator:
 
     @property
     def scale(self) -> Array:
-        """Yardstick (6,) of the robot's errors [N, N m]; see `finlab.allocation.yardstick`."""
+        """Yardstick (6,) of the robot's errors [N, N m]; see `finlab.physics.objective`."""
         return self._scale
 
     @property

@@ -26,8 +26,8 @@ METHODS: dict[str, tuple[str, str]] = {
     "paper_sqp": ("finlab.allocation.baselines.linear", "PaperSqp"),
     "px4": ("finlab.allocation.baselines.autopilots", "Px4"),
     "ardusub": ("finlab.allocation.baselines.autopilots", "ArduSub"),
-    "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
-    "fixed_frequency": ("finlab.allocation.baselines.analytic", "FixedFrequency"),
+    "analytic": ("finlab.allocation.baselines.pseudo_inverse", "Analytic"),
+    "fixed_frequency": ("finlab.allocation.baselines.pseudo_inverse", "FixedFrequency"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""

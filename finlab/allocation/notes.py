@@ -12,8 +12,8 @@ from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.layout.axes import axes_in, wrapped
 from finlab.layout.force_table_file import DOUBT
 from finlab.physics import FinLaw, TableLaw, make_law
+from finlab.physics.table_error import grid_uncertainty
 from finlab.precision import NEARLY
-from finlab.uncertainty.table_error import grid_uncertainty
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""

@@ -77,12 +77,8 @@ def as_policy(policy: Policy | str) -> Policy:
 
 
 def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
-    """Sentences about the actuators of a robot that are at their limits, within a thousandth of each range.
-
-    Args:
-        layout: the robot.
-        command: (n, 3), NaN for a failed actuator.
-    """
+    """Sentences about the actuators of a robot that a command (n, 3), NaN for a failed one, has at their
+    limits, within a thousandth of each range."""
     sentences = []
     for part, row in zip(layout.actuators, command, strict=True):
         if np.isnan(row).any():

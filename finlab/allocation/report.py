@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
 from finlab.command_end import aligned
 from finlab.layout import Layout
 from finlab.layout.axes import AXES
 from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand, command_of
 from finlab.physics.expected_miss import sources_of_miss
+from finlab.physics.objective import REACHED
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
@@ -145,13 +145,8 @@ def plain_target(target: Array) -> list[float | None]:
 
 
 def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
-    """Commands with their forces as plain values; None for a failed actuator, whose row is NaN.
-
-    Args:
-        layout: the robot.
-        command: (n, 3).
-        forces: (n, 3) [N], body frame; along an axis of its own the signed one.
-    """
+    """Commands (n, 3) with their forces (n, 3) [N], body frame, as plain values, along an axis of its own the
+    signed one; None for a failed actuator, whose row is NaN."""
     values: list[dict[str, object]] = []
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
         own, axis = command_of(part, row), getattr(part, "axis", None)

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
-from finlab.allocation.yardstick import REACHED
 from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.arrays import Array
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
+from finlab.physics.objective import REACHED
 
 
 def least_power(

@@ -20,7 +20,7 @@ from msgspec import to_builtins
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
-from finlab.allocation.yardstick import yardstick
+from finlab.physics.objective import yardstick
 from finlab.assets import NAME, shipped_checkpoints
 from finlab.bundle_files import (
     ABOUT,

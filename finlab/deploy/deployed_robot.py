@@ -17,7 +17,6 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import bundled_method, method_class
 from finlab.allocation.policy import KINDS
-from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import DataError
@@ -26,6 +25,7 @@ from finlab.layout.axes import AXES
 from finlab.layout.commands import neutral_row
 from finlab.layout.load import Case, robot_of
 from finlab.physics import plant_of
+from finlab.physics.objective import REACHED
 
 N_SELF_TEST = 4  # self-test wrenches in a bundle: enough to notice a wrong file, few enough to read
 SELF_TEST_TOLERANCE = 1e-6

@@ -1,7 +1,7 @@
 """A thruster from its bench table, rising force and convex power over the command, and the file of it.
 
 Rows of one command are averaged, and neighbours where there are very many. How sure the force is, the table's
-own rows tell (`finlab.uncertainty`).
+own rows tell (`finlab.physics.table_error`).
 """
 
 import json

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.rates import Box
+from finlab.allocation.dual.policies import Box
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
 from finlab.mdn.descent import EffortProblem, descend, effort_problem, realize, wrench
@@ -105,16 +105,8 @@ class Answers(NamedTuple):
 def follow(
     robot: EffortRobot, target: Array, force: AnyArray, keep: int, steps: Steps, kept: int = 0
 ) -> Answers:
-    """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex.
-
-    Args:
-        robot: the robot.
-        target: normalized wrenches.
-        force: proposals for each.
-        keep: how many of the most promising descents are refined.
-        steps: how long.
-        kept: number of proposals, the first ones, that are refined whatever they promise.
-    """
+    """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex: the `keep` most promising
+    descents are refined, the first `kept` proposals among these whatever they promise."""
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
     *_, reached = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)

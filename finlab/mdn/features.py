@@ -125,14 +125,8 @@ def see(view: RobotView, target: AnyArray) -> Seen:
 
 
 def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
-    """The features of N targets, each on a robot of its own.
-
-    Args:
-        wanted: p (N, n), complex.
-        static: as in `RobotView`, (N, n, 20).
-        a: first part of the blocks of P (N, n, n), complex.
-        b: second part.
-    """
+    """The features of N targets p (N, n), complex, each on a robot of its own: `static` (N, n, 20) as in
+    `RobotView`, and both parts of the blocks of P (N, n, n), complex."""
     rows, n = wanted.shape
     size = np.abs(wanted)
     frame = np.where(size > 1e-9, wanted, 1.0)

@@ -14,12 +14,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.dual.rates import Rates
+from finlab.allocation.dual.policies import Rates
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import MdnSettings, Settings
 from finlab.allocation.solution import Candidates, Solution
-from finlab.allocation.yardstick import costs
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.mdn.answers import NOW, OTHER, Answers, Steps, effort_robot, follow, ranked, refined, traced
@@ -28,6 +27,7 @@ from finlab.mdn.features import Proposal, Seen, propose, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.networks.layers import single_threaded_products
 from finlab.networks.trained import TrainedWeights
+from finlab.physics.objective import costs
 
 USUAL_SHARE = 0.1
 """What a robot is mostly asked for, as a share of its yardstick; wrenches are divided by that."""

@@ -76,13 +76,8 @@ class NetworkConfig:
         )
 
     def __call__(self, w: Weights, x: Values, target: Values) -> "Mixture":
-        """The mixtures that a network of these sizes gives.
-
-        Args:
-            w: its weights.
-            x: node features (B, n, 10).
-            target: normalized, centred targets (B, 6).
-        """
+        """The mixtures that a network with these weights gives for node features (B, n, 10) and normalized,
+        centred targets (B, 6)."""
         xp = library_of(x)
         hidden = layers.linear(w, "enter", x)
         for name in self._named("graph", self.graph_layers):

@@ -9,14 +9,13 @@ from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
 from finlab.allocation.solution import Candidates, Solution
-from finlab.allocation.yardstick import costs
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.layers import single_threaded_products
 from finlab.networks.trained import TrainedWeights, to_command, to_normalized
 from finlab.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, blocks_of
-from finlab.physics.objective import EffortMeter
+from finlab.physics.objective import EffortMeter, costs
 
 STEPS = 160
 """Steps of Adam."""

@@ -12,9 +12,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.actuators.fin.blade import Blade
 from finlab.actuators.fin.fin_laws import file_stamps, make_law
-from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.law import ActuatorLaw, Blade
 from finlab.actuators.registry import free_angles, laws_of
 from finlab.actuators.thrust_power import held
 from finlab.arrays import Array

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.axes import TURN, is_full_turn

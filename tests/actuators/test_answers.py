@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Group, Line
 from finlab.actuators.rudder import RudderGroup, RudderLaw
-from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
+from finlab.actuators.thruster import AzimuthGroup, AzimuthLaw, ThrusterGroup, ThrusterLaw
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness

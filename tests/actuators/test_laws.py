@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.azimuth import AzimuthLaw
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.rudder import RudderLaw
 from finlab.actuators.thrust_power import ByPower, Sides
-from finlab.actuators.thruster import ThrusterLaw
+from finlab.actuators.thruster import AzimuthLaw, ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
 from finlab.allocation.method import LeastErrorMethod
 from finlab.cli.robot_verbs import allocate

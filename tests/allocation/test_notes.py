@@ -19,7 +19,7 @@ from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, write_table
 from tests.allocation.quick import OF_FINS, quick_allocator
-from tests.fin_robots import FIN_ROBOTS
+from tests.any_robot import FIN_ROBOTS
 
 pytestmark = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"

@@ -16,9 +16,9 @@ from finlab.allocation import METHODS, Allocator, Health
 from finlab.allocation.allocation import CHUNK
 from finlab.allocation.allocator import MOST_PREPARED
 from finlab.allocation.method import Method
-from finlab.allocation.yardstick import yardstick
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from finlab.physics.objective import yardstick
 from tests.allocation.quick import QUICK
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]

@@ -12,7 +12,7 @@ import finlab
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.layout import Azimuth, Body, Layout, Thruster, own_effectiveness
-from tests.fin_robots import FIN_ROBOTS
+from tests.any_robot import FIN_ROBOTS
 from tests.mixed_robots import load, random_robot
 
 HERE = Path(__file__).parent

@@ -14,7 +14,7 @@ from finlab.cli import main
 from finlab.errors import DataError
 from finlab.fit.thruster_bench import Bench, read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster, layout_lines
-from finlab.uncertainty.table_error import thrust_table_error
+from finlab.physics.table_error import thrust_table_error
 from tests.fit.cell import write
 
 T200 = Path(__file__).parent / "data" / "t200_16v.csv"

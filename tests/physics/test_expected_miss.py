@@ -15,7 +15,7 @@ from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
-from finlab.uncertainty.table_error import grid_uncertainty, thrust_table_error
+from finlab.physics.table_error import grid_uncertainty, thrust_table_error
 from tests.mixed_robots import load, random_flow, random_robot
 
 DRAWS = 20_000

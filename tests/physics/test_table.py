@@ -2,10 +2,13 @@
 
 import math
 import os
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from finlab.bundle_files import CHECKSUMS, archive_around, checksums, table_name
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, make_law, plant_of, read_table, write_table
@@ -228,3 +231,36 @@ def test_a_missing_or_binary_file_is_refused(tmp_path):
     (tmp_path / "b.csv").write_bytes(bytes(range(256)))
     with pytest.raises(DataError, match="is not UTF-8 text"):
         read_table(tmp_path / "b.csv")
+
+
+GRID = np.linspace(0.0, 0.6, 5), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 9)
+
+
+@pytest.fixture
+def soft_table(tmp_path: Path) -> Path:
+    path = tmp_path / "fin.csv"
+    write_table(path, make_law(FinModelSpec("soft", (("e", 0.2),))), *GRID)
+    return path
+
+
+def spec(path: Path) -> FinModelSpec:
+    return FinModelSpec("table", (("path", str(path)),))
+
+
+def test_tables_are_read_out_of_an_archive(soft_table: Path, tmp_path: Path) -> None:
+    content = soft_table.read_bytes()
+    needed = {"robot.json": b"", "bundle.json": b'{"version": 8}'}
+    files = {**needed, table_name(content): content}
+    with zipfile.ZipFile(tmp_path / "x.zip", "w") as archive:
+        for name, part in {**files, CHECKSUMS: checksums(files)}.items():
+            archive.writestr(name, part)
+    inside = tmp_path / "x.zip" / table_name(content)
+    assert archive_around(inside) == str(tmp_path / "x.zip") and archive_around(soft_table) is None
+    assert archive_around(tmp_path / "y.zip" / table_name(content)) is None, "there is no such archive"
+    assert archive_around(tmp_path / "x.zip" / "other" / "x.csv") is None
+    command = np.array([[0.4, 1.1, 0.3]])
+    np.testing.assert_array_equal(
+        make_law(spec(inside)).force(command), make_law(spec(soft_table)).force(command)
+    )
+    with pytest.raises(DataError, match="no such file, expected a CSV table"):
+        make_law(spec(inside.with_name("0" * 64 + ".csv")))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finlab.actuators.fin.blade import OWN_INERTIA, Blade
+from finlab.actuators.law import OWN_INERTIA, Blade
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, Servo, load_layout
 from finlab.vehicle.fin_motion import FinMotion, fin_power

@@ -17,11 +17,11 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import METHODS, MethodChoice
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
-from finlab.allocation.yardstick import costs
 from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
+from finlab.physics.objective import costs
 from webapp.session import Session
 from webapp.tasks.background import EventLoop
 from webapp.tasks.context import Context

@@ -15,7 +15,7 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.layout.force_table_file import write_table
 from finlab.physics import make_law, plant_of
-from tests.fin_robots import FIN_ROBOTS
+from tests.any_robot import FIN_ROBOTS
 from webapp.markup.verdict import verdict_sentence
 from webapp.panels.actuator_list import actuator_list
 from webapp.panels.files_tab import command_line

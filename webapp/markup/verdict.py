@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.yardstick import REACHED
+from finlab.physics.objective import REACHED
 from webapp.markup.words import (
     authority_sentence,
     listed,

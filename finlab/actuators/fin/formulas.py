@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.actuators.fin.blade import Blade
-from finlab.actuators.law import PlanarLaw
+from finlab.actuators.law import Blade, PlanarLaw
 from finlab.arrays import Array, Values, library_of
 
 

@@ -13,8 +13,13 @@ from typing import Any
 import numpy as np
 
 from finlab.actuators.response import Group, Line, Plane
-from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
-from finlab.allocation.baselines.pseudo_inverse import PseudoInverse, pushed_axes
+from finlab.allocation.baselines.pseudo_inverse import (
+    SOLVED,
+    ModelBased,
+    PseudoInverse,
+    TimeLimitedSettings,
+    pushed_axes,
+)
 from finlab.allocation.dual.answers import Answers
 from finlab.allocation.settings import number
 from finlab.arrays import Array

@@ -12,7 +12,7 @@ from time import thread_time
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
+from finlab.allocation.baselines.pseudo_inverse import SOLVED, ModelBased, TimeLimitedSettings
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.physics import Plant
@@ -137,16 +137,9 @@ class PaperSqp(ModelBased):
 
 
 def box_qp(matrix: Array, wanted: Array, weight: float, low: Array, high: Array) -> Array:
-    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between `low` and `high`,
-    by SciPy's active-set method.
-
-    Args:
-        matrix: (6, k).
-        wanted: (6,).
-        weight: of the regularization, at least 0.
-        low: lower limits (k,), each below the upper one.
-        high: upper limits (k,).
-    """
+    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between
+    limits (k,), each `low` below its `high`, by SciPy's active-set method; `matrix` is (6, k), `weight` at
+    least 0."""
     k = len(low)
     both = np.vstack([matrix, np.sqrt(weight) * np.eye(k)])
     return np.asarray(lsq_linear(both, np.concatenate([wanted, np.zeros(k)]), (low, high), method="bvls").x)

@@ -1,12 +1,25 @@
-"""The pseudo-inverse in force space, each actuator's force turned into its cheapest command."""
+"""Pseudo-inverse of the forces, each turned into its cheapest command, and all methods that begin there.
+
+Methods `analytic` and `fixed_frequency` are that alone; the base of the others has it for their starts.
+"""
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Line, Plane, Response
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.settings import Settings, number
+from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout.axes import wrapped
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
+from finlab.physics.objective import Name, cost_meter
 
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""
@@ -83,3 +96,111 @@ def pushed_axes(effectiveness: Array) -> Array:
     """Directions (r, 6) of the wrench in which columns (6, k) push at all, each once."""
     axes, size, _ = np.linalg.svd(effectiveness)
     return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
+
+
+SOLVED = 1e-5
+"""Normalized error up to which an answer is exact."""
+LIMIT = "processor time per target after which the best command so far is the answer"
+USUAL_SHARE = 0.1
+"""What a robot is mostly asked for, as a share of its yardstick."""
+
+
+class ModelBased(LeastErrorMethod):
+    """A method that optimizes over the actuators' own laws and tables, those that score every method."""
+
+    settings_class: ClassVar[type[Settings]] = Settings
+
+    def prepare(self) -> None:
+        self.aim: Name = getattr(self.settings, "objective", "power")
+        """What is kept least."""
+        if self.aim == "effort":
+            self.layout.only("objective 'effort'")
+        self.sigma = USUAL_SHARE * self.scale
+        """What wrenches (6,) are divided by: what a robot is mostly asked for."""
+
+    @cached_property
+    def _inverse(self) -> PseudoInverse:
+        """What answers by the pseudo-inverse, and where others start."""
+        return PseudoInverse(self.plant, self.sigma)
+
+    @abstractmethod
+    def _commands(self, targets: Array, seed: int) -> Array:
+        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all targets, so
+        that a target gets the same answer alone and among others."""
+
+    def _best(self, target: Array, commands: Array, steps: int) -> Array:
+        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps, the
+        cheapest one (n, 3) that meets it, else the one with the smallest error."""
+        problem = CommandProblem.of(self.plant, self.sigma)
+        ends = refine(problem, target[None] / self.sigma, commands, steps)
+        missed = ends.error > SOLVED
+        cost = np.where(missed, ends.error, cost_meter(self.aim, self.plant)(ends.command))
+        return np.array(ends.command[np.lexsort((cost, missed))[0]])
+
+    def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        return Solution(self.plant.feasible(self._commands(targets, seed)))
+
+
+@dataclass(frozen=True)
+class TimeLimitedSettings(Settings):
+    """Settings of a slow method, which ends in time."""
+
+    time_limit_s: float = number(0.6, 0.0, 3600.0, LIMIT, "s", above=True)
+
+
+class Analytic(ModelBased):
+    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
+    each gives by its cheapest command. What does not fit is clipped, the rest not redistributed."""
+
+    name = "analytic"
+    takes = "any actuator"
+
+    def _commands(self, targets: Array, seed: int) -> Array:
+        return self._inverse.command(targets)
+
+
+@dataclass(frozen=True)
+class FixedFrequencySettings(Settings):
+    """Settings of method `fixed_frequency`."""
+
+    frequency: float = number(
+        2.1, 0.01, 100.0, "at which all fins beat, within the limits of each; U-CAT's are 1.1 and 2.1", "Hz"
+    )
+
+
+class FixedFrequency(ModelBased):
+    """U-CAT's on-board law: all fins beat at one frequency; force sets the amplitude, its direction the zero
+    direction.
+
+    With the law `drag` of a fin, `A = 1/2 arccos(1 - F / (2 rho Cd S rc^2 (2 pi f)^2))`; other laws are
+    inverted in the same way. Where a fin is asked for more than it can give, all forces are scaled down
+    together, as on board all amplitudes are. A fin of less force than that of its least amplitude stops: it
+    takes its least amplitude and frequency. Forces are those of the pseudo-inverse, which on U-CAT's layout
+    replaces the on-board rules made for it.
+    """
+
+    name = "fixed_frequency"
+    settings_class = FixedFrequencySettings
+    settings: FixedFrequencySettings
+
+    @cached_property
+    def _inverse(self) -> PseudoInverse:
+        layout, fins = self.layout, []
+        for fin in layout.fins:
+            (low, high), wanted = fin.limits.frequency, self.settings.frequency
+            held = min(max(wanted, low), high)
+            fins.append(replace(fin, limits=replace(fin.limits, frequency=(held, held))))
+        plant = plant_of(replace(layout, actuators=tuple(fins))).counting(layout.commanded)
+        return PseudoInverse(plant.at(self.plant.flow), self.sigma)
+
+    def _commands(self, targets: Array, seed: int) -> Array:
+        inverse, lower = self._inverse, self.plant.lower
+        force = inverse.force(targets)
+        share = np.linalg.norm(force, axis=-1) / np.maximum(inverse.largest, 1e-9)
+        force /= np.maximum(share.max(axis=1), 1.0)[:, None, None]
+        command = inverse.decoded(force)
+        least = command.copy()
+        least[..., 0] = lower[:, 0]
+        stops = np.linalg.norm(force, axis=-1) < np.linalg.norm(inverse.plant.force(least), axis=-1)
+        command[..., :2] = np.where(stops[..., None], lower[:, :2], command[..., :2])
+        return command

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from finlab.allocation.baselines.model_based import ModelBased, TimeLimitedSettings
-from finlab.allocation.baselines.pseudo_inverse import pushed_axes
+from finlab.allocation.baselines.pseudo_inverse import ModelBased, TimeLimitedSettings, pushed_axes
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
@@ -74,14 +73,8 @@ class Sqp(ModelBased):
 
 
 def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
-    """Returns what finds the cheapest commands near a start that deliver a target, by SciPy's SLSQP.
-
-    Args:
-        plant: the robot.
-        meter: what commands cost.
-        sigma: per-axis standard deviation (6,) of the error.
-        steps: most quadratic programs.
-    """
+    """Returns what finds the commands of least cost, by the meter, near a start that deliver a target, by
+    SciPy's SLSQP with at most some steps; `sigma` (6,) divides the wrenches."""
     axes, width = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None]), plant.width
     free = width.ravel() > 0.0
     usual = max(float(meter(plant.sample(np.random.default_rng(0), (16,))).mean()), 1e-300)

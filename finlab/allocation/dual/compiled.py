@@ -10,9 +10,9 @@ from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.physics.expected_miss import uncertainties
 from finlab.physics.plant import Plant
 from finlab.precision import ROUNDING
-from finlab.uncertainty.known import uncertainties
 
 
 class Compiled:

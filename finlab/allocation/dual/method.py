@@ -18,8 +18,7 @@ from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_pow
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.drag import EXACT, Search
 from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
-from finlab.allocation.dual.policies import Nearest, nearest
-from finlab.allocation.dual.rates import Rates, within_tick
+from finlab.allocation.dual.policies import Nearest, Rates, nearest, within_tick
 from finlab.allocation.dual.sets import Sets
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method

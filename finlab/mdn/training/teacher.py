@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from finlab.allocation.yardstick import yardstick
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.mdn.answers import LAST, EffortRobot, distinct, effort_robot
@@ -17,6 +16,7 @@ from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.effort_fins import Projected
 from finlab.mdn.features import VECTORS, features
 from finlab.mdn.training.random_robots import FIN_COUNTS, random_kinds, random_robot, random_targets
+from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant
 from finlab.whole_file import write_whole
 

@@ -103,16 +103,9 @@ def train_mdn(
     preset: str, out: Path, *, seed: int = 0, resume: bool = False, **training: Any
 ) -> TrainedWeights:
     """Write the answers that are missing in `out/answers`, train a preset's network on them, and write a
-    checkpoint, once a minute and at the end. Raises DataError: an unknown preset, or a file that cannot be
-    written.
-
-    Args:
-        preset: one of `RECIPES`.
-        out: folder for checkpoint, answers and log, made if need be.
-        seed: of the answers and of the first weights.
-        resume: go on from the state in `out`.
-        training: fields of `MdnTraining`, in place of the recipe's where they are not None.
-    """
+    checkpoint, once a minute and at the end; `seed` is that of answers and first weights, `resume` goes on
+    from the state in `out`, and fields of `MdnTraining` replace the recipe's where they are not None. Raises
+    DataError: an unknown preset, or a file that cannot be written."""
     started = time.monotonic()
     if preset not in RECIPES:
         raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r}")

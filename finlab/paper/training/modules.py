@@ -71,13 +71,8 @@ class AllocatorNetwork(nn.Module):
         )
 
     def forward(self, x: Tensor, target: Tensor, mask: Tensor) -> Mixture:
-        """Mixtures over each fin's command in normalized coordinates.
-
-        Args:
-            x: node features (B, n, 10).
-            target: normalized wrenches (B, 6).
-            mask: (B, n), True where there is a fin.
-        """
+        """Mixtures over each fin's command in normalized coordinates, of node features (B, n, 10) and
+        normalized wrenches (B, 6); the mask (B, n) is True where there is a fin."""
         hidden = self.enter(x)
         for layer in self.graph:
             hidden = hidden + functional.elu(layer(hidden, mask))

@@ -197,16 +197,9 @@ class DataSet:
         self._order = torch.empty(0)
 
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
-        """The rows of batch number `step`, a function of step and seed.
-
-        Args:
-            step: number of the batch.
-            size: samples of the whole batch.
-            seed: of the order.
-            one_layout: whether they are random commands of a single layout (paper, surrogate pretraining), a
-                new one in each step, or of all, in a new order in each epoch.
-            rows: those of the batch that are answered.
-        """
+        """Some rows of batch number `step` of `size` samples, a function of step and seed: random commands
+        of one layout (paper, surrogate pretraining), a new one in each step, or of all, reordered in each
+        epoch."""
         count = self.layouts if one_layout else self.layouts * self.commands
         if not one_layout and size > count:
             raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")

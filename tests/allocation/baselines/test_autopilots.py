@@ -7,13 +7,13 @@ import pytest
 
 from finlab import Allocator, load_layout
 from finlab.allocation.baselines.autopilots import ArduSub, Px4, Px4Settings, frame_factors, normalised
-from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.evaluation.splits import make_split
 from finlab.exchange.motor_factors import FRAMES, SIGNS
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from finlab.physics.objective import yardstick
 
 HEAVY = load_layout("bluerov2_heavy")
 GOLDEN = {

@@ -32,7 +32,7 @@ def total(answer: BatchAllocation, robust: float) -> Array:
 
 
 def test_a_table_with_a_square_answers_as_the_cost_says() -> None:
-    table, weight = RadialTable.of_price(3.0, lambda v: 2.0 + 5.0 * (v / 3.0) ** 2), 0.4
+    table, weight = RadialTable.of_forces(3.0, 2.0 + 5.0 * (price_grid(3.0) / 3.0) ** 2, 0.0), 0.4
     dearer = table.with_square(weight)
     force = np.linspace(2.0, 7.0, 20_001)
     cost = 2.0 * (force - 2.0) ** 1.5 / np.sqrt(5.0) + weight * force**2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.actuators.response import Line, RadialTable
+from finlab.actuators.response import Line, RadialTable, price_grid
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.allocation.dual.newton import solve
@@ -93,7 +93,7 @@ def test_least_miss_of_a_heavy() -> None:
 def _table(watts: float, most: float) -> RadialTable:
     """Power `watts` F^1.5 up to a largest force [N]."""
     top = 1.5 * watts * np.sqrt(most)
-    return RadialTable.of_price(top, lambda price: np.minimum((price / (1.5 * watts)) ** 2, most))
+    return RadialTable.of_forces(top, np.minimum((price_grid(top) / (1.5 * watts)) ** 2, most), 0.0)
 
 
 def test_costly_reverse_is_within_reach() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.analytic import Analytic
+from finlab.allocation.baselines.pseudo_inverse import Analytic
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution

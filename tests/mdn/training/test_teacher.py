@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.yardstick import yardstick
 from finlab.layout import Layout
 from finlab.mdn.answers import EffortRobot, effort_robot
 from finlab.mdn.descent import realize, wrench
 from finlab.mdn.training.random_robots import FIN_COUNTS, NUMBERS, random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
 from finlab.physics import Plant
+from finlab.physics.objective import yardstick
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

@@ -1,1 +1,0 @@
-"""Errors of the laws and tables of actuators."""
