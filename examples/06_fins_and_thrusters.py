@@ -5,7 +5,7 @@ actuator, and what becomes of a lift out of reach by two policies.
 """
 
 import finlab
-from finlab.layout.commands import ThrusterCommand
+from finlab.actuators.thruster import ThrusterCommand
 
 
 def main() -> None:

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from finlab.actuators.fin.fin_model import FIN_MODELS, LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.fin import LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
-from finlab.layout.fin_model import FIN_MODELS
 
 DOMAIN = 0xF022
 """Leads the seed of every robot."""
@@ -64,7 +63,7 @@ def _places(rng: np.random.Generator, geometry: str, n: int) -> tuple[Array, Arr
     position = rng.uniform(-1.0, 1.0, (n, 3)) * [0.3, 0.3, 0.1]
     angle = rng.uniform(-math.pi, math.pi, n)
     if geometry == "far":
-        position *= rng.uniform(3.0, MAX_POSITION) / np.abs(position).max()
+        position *= rng.uniform(3.0, 10.0) / np.abs(position).max()
     elif geometry == "origin":
         position[:] = 0.0
     elif geometry == "coincident":

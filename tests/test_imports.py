@@ -14,10 +14,10 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "arrays"),
-    ("files", "assets", "command_end", "least_squares", "precision", "whole_file"),
+    ("axes", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
     ("bundle_files", "executor"),
-    ("layout",),
     ("actuators",),
+    ("layout",),
     ("physics", "exchange"),
     ("vehicle",),
     ("networks", "hull"),
@@ -173,6 +173,7 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
         ("finlab", ("viser", "webapp", "playwright")),
         *((f"finlab/{room}", ("trimesh",)) for rooms in LEVELS for room in rooms if room != "hull"),
         ("finlab/layout", ("torch", "scipy", "matplotlib")),
+        ("finlab/actuators", ("torch", "scipy", "matplotlib")),
         *((f"finlab/{room}", ("torch",)) for room in ("evaluation", "sim", "control", "exchange")),
         ("webapp", ("finlab.cli",)),
         ("finlab/networks", ("torch", "scipy")),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from finlab.layout.file import ANY_LAYOUT
+from finlab.layout.file import layout_form
 from finlab.layout.load import Graph
 
 PACKAGE = Path(__file__).parents[1] / "finlab"
@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parents[1] / "finlab"
 def schemas() -> dict[Path, str]:
     """Returns the text of each schema by its file."""
     kinds = {
-        "layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT),
+        "layout/layout.schema.json": ("finlab-layout-2", layout_form()),
         "layout/graph.schema.json": ("finlab-graph-4", Graph),
     }
     texts = {}

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from finlab.actuators.thrust_model import lower_hull
 from finlab.arrays import Array
-from finlab.layout.thrust_model import lower_hull
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""

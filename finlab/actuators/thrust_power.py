@@ -3,15 +3,12 @@ through a table of measurements."""
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import RadialTable, price_grid
-from finlab.arrays import AnyArray, Array, Values
-from finlab.layout.propellers import Azimuth, Thruster
-from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
+from finlab.actuators.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
+from finlab.arrays import AnyArray, Array
 from finlab.precision import NOTHING
 
 
@@ -163,33 +160,3 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
     top = abs(float(own.marginal(ends)[1, 0]))
     force = np.clip(sign * own.answer(sign * price_grid(top)[:, None])[:, 0], least, most)
     return RadialTable.of_forces(top, force, float(own.watts(ends)[0, 0]))
-
-
-class PropellerLaw(ActuatorLaw):
-    """n propellers, one of whose commands is a force; there is none within the dead band."""
-
-    column: int
-    """Which of the three commands it is."""
-
-    def __init__(self, parts: Sequence[Thruster | Azimuth]) -> None:
-        """Takes n thrusters, or n that turn."""
-        self.power_curve = ThrustPower([part.model for part in parts])
-        self.dead_band = np.array([part.dead_band for part in parts])
-
-    def given(self, command: Values) -> Any:
-        """Returns the forces (..., n) [N] of commands (..., n, 3)."""
-        return held(command[..., self.column], self.dead_band)
-
-    def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes none."""
-        return self.power_curve.watts(self.given(command))
-
-    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        gradient = np.zeros(command.shape)
-        gradient[..., self.column] = self.power_curve.marginal(self.given(command))
-        return gradient
-
-
-def held(force: AnyArray, dead_band: Array) -> AnyArray:
-    """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
-    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force))

@@ -1,22 +1,106 @@
-"""Thrusters with a fixed axis, and those that turn: the force is the command, but none in the dead band.
+"""Thrusters with a fixed axis: the force is the command, but none in the dead band.
 
-Fixed: command (force [N], 0, 0); own frame: axis, and two directions across it, along which nothing acts. The
+Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts. The
 reaction torque of the propeller is part of the effectiveness.
-
-Azimuths and tilts: command (angle [rad], force [N], 0); own frame: turn_axis, zero, turn_axis x zero; at the
-angle a the force points along cos(a) zero + sin(a) (turn_axis x zero).
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from finlab.actuators.response import Group, Line, Plane
-from finlab.actuators.thrust_power import PropellerLaw, ThrustPower, radial_table
+from finlab.actuators.actuator import Box, Command, Faults, Metres, Place, Places, Seconds, Uncertainty
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.response import Group, Line
+from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
+from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.axes import TURN, is_full_turn, wrapped
-from finlab.layout.propellers import Azimuth, Thruster
-from finlab.precision import NEARLY
+from finlab.axes import Direction3, unit_vector
+from finlab.errors import LayoutError
+from finlab.files.checked import Name
+
+
+class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
+    """What a thruster with a fixed axis is told."""
+
+    force: float
+    """Force along its axis [N], signed."""
+    input: float | None = None
+    """What its table says to send for it, in the table's unit; None for a power law."""
+
+    @property
+    def words(self) -> str:
+        """See `Command`."""
+        return force_words(self.force, "", self.input)
+
+
+@dataclass(frozen=True)
+class Thruster(Propeller):
+    """A thruster with a fixed axis; its command is the force. Checked on construction."""
+
+    NUMBERS, COMMAND = (("force", "N"),), ThrusterCommand
+    LIMITS, RATES, AXES, PUSHES = ("force",), ("rate",), ("axis",), (0,)
+    THRUST, TURNS, FAULTS, LOOKS = 0, False, ("weak",), "thruster"
+    BOXES = (
+        Box("Force [N]", "force", "Least and most along the axis; astern it is negative.", 1.0, pair=True),
+        *Propeller.BOXES,
+    )
+    type: ClassVar[str] = "thruster"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, body frame [m]."""
+    axis: Direction3
+    """Unit vector, body frame: direction of the force on the robot for a positive force."""
+    force: tuple[Newtons, Newtons]
+    """Least and most force [N]; one of them is 0 where the thruster pushes one way only."""
+    model: ThrustModel
+    """What power it takes."""
+    dead_band: Threshold = 0.0
+    """Forces smaller than this, other than 0, cannot be held [N]."""
+    torque_per_newton: Metres = 0.0
+    """Reaction torque about the axis per force, signed [m]."""
+    time_constant: Seconds = 0.1
+    """Time in which the force comes to 63 % of a new one [s]."""
+    rate: ForceRate | None = None
+    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "axis", unit_vector("axis", self.axis))
+        least, most = self.force
+        if not least <= 0.0 <= most or least == most:
+            raise LayoutError(
+                f"must include 0, and more than that, got {least:g} and {most:g}",
+                "force_n",
+            )
+        if self.dead_band > max(-least, most):
+            raise LayoutError(
+                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
+            )
+        check_force(self.model, self.force)
+
+    @classmethod
+    def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
+        return [(np.arange(len(parts)), ThrusterLaw(parts))]
+
+    @classmethod
+    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
+        return ThrusterGroup(parts, effectiveness)
+
+    @classmethod
+    def sample(cls) -> Self:
+        """See `Actuator`: a T200 of Blue Robotics at 16 V, as shipped layouts have it."""
+        return cls("thruster", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-39.91, 51.44), T200)
+
+    def damaged(self, faults: Faults) -> Self:
+        left, (low, high) = faults.weak, self.force
+        return self if left is None else replace(self, force=(left * low, left * high))
 
 
 class ThrusterLaw(PropellerLaw):
@@ -69,85 +153,3 @@ def _line(thruster: Thruster, along: Array) -> Line:
         return Line(along, radial_table(thruster.model, -1, 0.0, -least), band=thruster.dead_band)
     reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
     return Line(along, radial_table(thruster.model, 1, 0.0, most), reverse, thruster.dead_band)
-
-
-class AzimuthLaw(PropellerLaw):
-    """n turning thrusters."""
-
-    column = 1
-
-    def force(self, command: Values, inflow: Array | None = None) -> Values:
-        force = np.zeros_like(command)
-        size = self.given(command)
-        force[..., 1], force[..., 2] = size * np.cos(command[..., 0]), size * np.sin(command[..., 0])
-        return force
-
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        force = self.force(command)
-        jacobian = np.zeros((*command.shape, 3))
-        jacobian[..., 0, 1], jacobian[..., 0, 2] = -force[..., 2], force[..., 1]
-        angle, free = command[..., 0], self.given(command) == command[..., 1]
-        jacobian[..., 1, 1], jacobian[..., 1, 2] = np.cos(angle) * free, np.sin(angle) * free
-        return force, jacobian
-
-
-class AzimuthGroup(Group):
-    """What the turning thrusters of a robot offer for prices."""
-
-    def __init__(self, azimuths: Sequence[Azimuth], effectiveness: Array) -> None:
-        """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
-        self._lower = np.array([azimuth.lower for azimuth in azimuths])
-        self._upper = np.array([azimuth.upper for azimuth in azimuths])
-        self._power = ThrustPower([azimuth.model for azimuth in azimuths])
-        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
-        self.responses = [
-            _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
-            for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
-        ]
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as
-        near to 0 as the arc allows. What can be given forward and in reverse is given at the least power."""
-        size = np.hypot(force[..., 0], force[..., 1])
-        before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
-        angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
-        ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
-        if (self._lower[:, 1] >= 0.0).all():
-            return ahead
-        wanted, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
-        missing, watts = [], []
-        for way in (ahead, back):
-            force = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
-            missing.append(np.linalg.norm(force - wanted, axis=0))
-            watts.append(self._power.watts(way[..., 1]))
-        cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
-        return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)
-
-    def _pushed(self, angle: Array, force: Array) -> Array:
-        """Commands (..., m, 3) that come nearest to angles [rad] and forces [N] (..., m)."""
-        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
-        command = np.zeros((*force.shape, 3))
-        command[..., 0] = middle + wrapped(angle - middle)
-        command[..., 1] = force
-        return np.clip(command, self._lower, self._upper)
-
-    def radial_worth(self, price: Array, back: Array) -> Array:
-        least, most = self._lower[:, 1], self._upper[:, 1]
-        ahead = self._power.worth(price, np.maximum(least, 0.0), most)
-        return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
-
-
-def _plane(azimuth: Azimuth, matrix: Array, middle: float, half: float) -> Plane:
-    """What one offers; `matrix` (2, 6) is the wrench per newton."""
-    least, most = azimuth.force
-    table = radial_table(azimuth.model, 1, max(least, 0.0), most)
-    reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
-    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)
-
-
-def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
-    """Middles and halves (m,) of arcs [rad]; pi is the half of a full turn."""
-    return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))

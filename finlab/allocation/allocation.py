@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.report import allocation_text, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData, Rows
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
 from finlab.physics.expected_miss import expected_miss
 from finlab.physics.objective import REACHED, judged_effort, judged_power
@@ -220,7 +220,7 @@ class Allocation(Answer[float]):
     def commands(self) -> dict[str, Command | None]:
         """Command of each actuator by its name, in a type of its own; None for a failed one."""
         parts = zip(self.layout.actuators, self.command, strict=True)
-        return {part.name: command_of(part, row) for part, row in parts}
+        return {part.name: part.command(row) for part, row in parts}
 
     @cached_property
     def candidates(self) -> Candidates | None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.layout import Layout
-from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 
 RESTING, STILL = 0.15, 0.01

@@ -4,13 +4,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import file_stamps
-from finlab.actuators.registry import KINDS
+from finlab.actuators.fin.force_table_file import DOUBT
+from finlab.actuators.kinds import KINDS, file_stamps
 from finlab.allocation.method import Method
 from finlab.arrays import Array
-from finlab.layout import FinModelSpec, Layout, Limits
-from finlab.layout.axes import axes_in, wrapped
-from finlab.layout.force_table_file import DOUBT
+from finlab.axes import axes_in, wrapped
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, TableLaw, make_law
 from finlab.physics.table_error import grid_uncertainty
 from finlab.precision import NEARLY
@@ -62,9 +61,8 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 
     None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    notes, kinds = _made(layout, file_stamps(layout)), [KINDS[part.type] for part in layout.actuators]
-    parts = list(zip(layout.actuators, kinds, strict=True))
-    foils = [part for part, kind in parts if kind.feels_flow]
+    notes = _made(layout, file_stamps(layout.actuators))
+    foils = [part for part in layout.actuators if part.BY_FLOW]
     if flow is None and not foils:
         return notes
     if flow is None:
@@ -72,13 +70,13 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
         return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
     if not foils:
-        kind = next(name for name, kind in KINDS.items() if kind.feels_flow)
+        kind = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
         return (
             *notes,
             f"the flow is without effect: layout {layout.name} has no {kind}, and what speed through the "
             "water takes from other actuators is not known",
         )
-    models = {part.name: getattr(part, "model", None) for part, kind in parts if not kind.feels_flow}
+    models = {part.name: getattr(part, "model", None) for part in layout.actuators if not part.BY_FLOW}
     tables = ", ".join(name for name, model in models.items() if model and model.type == "table")
     speed = (f"the tables of {tables} hold forces at rest; what speed changes is not known",)
     return notes + (speed if tables else ())
@@ -88,7 +86,9 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     first = layout.description.partition("\n")[0]
     notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
-    for fin, stamp in zip(layout.fins, stamps, strict=True):
+    for fin, stamp in zip(layout.actuators, stamps, strict=True):
+        if not isinstance(fin, Fin):
+            continue
         notes += [note.replace("{name}", fin.name) for note in _notes_of(fin.model, fin.limits, stamp)]
     return tuple(notes)
 

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.registry import KINDS as ACTUATORS
 from finlab.arrays import Array
+from finlab.axes import AXES as AXES
+from finlab.axes import is_full_turn, mask_of
 from finlab.errors import CommandError
 from finlab.layout import Layout
-from finlab.layout.axes import AXES as AXES
-from finlab.layout.axes import is_full_turn, mask_of
 
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
@@ -83,8 +82,8 @@ def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
     for part, row in zip(layout.actuators, command, strict=True):
         if np.isnan(row).any():
             continue
-        low, high, kind = np.array(part.lower), np.array(part.upper), ACTUATORS[part.type]
-        pushes, angle = not kind.feels_flow, -1 if kind.angle is None else kind.angle
+        low, high = np.array(part.lower), np.array(part.upper)
+        pushes, angle = not part.BY_FLOW, -1 if part.ANGLE is None else part.ANGLE
         angle = angle if pushes else 0  # all that a foil is told
         slack = 1e-3 * (high - low) + 1e-9
         at_low, at_high = row <= low + slack, row >= high - slack

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.solution import among_all
 from finlab.arrays import Array
+from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
-from finlab.layout.axes import AXES, Axis, axes_in
 from finlab.layout.damage import Health
 
 MAX_WRENCH = 1e6

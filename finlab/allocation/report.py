@@ -9,10 +9,9 @@ import numpy as np
 from msgspec import to_builtins
 
 from finlab.arrays import Array
+from finlab.axes import AXES
 from finlab.command_end import aligned
 from finlab.layout import Layout
-from finlab.layout.axes import AXES
-from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand, command_of
 from finlab.physics.expected_miss import sources_of_miss
 from finlab.physics.objective import REACHED
 from finlab.physics.plant import Plant
@@ -29,20 +28,6 @@ COLUMNS = ("actuator", "type", "command", "force [N]")
 """Columns of the table of actuators."""
 WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
 """Columns of the table of wrenches."""
-
-
-def in_words(command: Command) -> str:
-    """A command with its units."""
-    if isinstance(command, FinCommand):
-        return (
-            f"{command.amplitude:.3f} rad, {command.frequency:.3f} Hz, "
-            f"{math.degrees(command.zero_direction):.1f} deg"
-        )
-    if isinstance(command, RudderCommand):
-        return f"{math.degrees(command.deflection):.1f} deg"
-    angle = f" at {math.degrees(command.angle):.1f} deg" if isinstance(command, AzimuthCommand) else ""
-    sent = "" if command.input is None else f", input {command.input:.5g}"
-    return f"{round(command.force, 3) + 0.0:.3f} N{angle}{sent}"
 
 
 def summary(result: Allocation) -> str:
@@ -80,7 +65,7 @@ def allocation_text(result: Allocation) -> str:
     rows: list[tuple[str, ...]] = []
     for part, force in zip(result.layout.actuators, result.forces, strict=True):
         command = result.commands[part.name]
-        cells = ("failed", "") if command is None else (in_words(command), f"{math.hypot(*force):.3f}")
+        cells = ("failed", "") if command is None else (command.words, f"{math.hypot(*force):.3f}")
         rows.append((part.name, part.type, *cells))
     wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
     if result.expected_error:
@@ -149,7 +134,7 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
     signed one; None for a failed actuator, whose row is NaN."""
     values: list[dict[str, object]] = []
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
-        own, axis = command_of(part, row), getattr(part, "axis", None)
+        own, axis = part.command(row), getattr(part, "axis", None)
         along = force.tolist() if axis is None else float(force @ np.array(axis))
         plain = None if own is None else to_builtins(own)
         values.append({"name": part.name, "type": part.type, "force_n": along, "command": plain})

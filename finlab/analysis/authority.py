@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH
+from finlab.axes import Axis
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
 from finlab.layout import Layout
-from finlab.layout.axes import AXES as WRENCH
-from finlab.layout.axes import Axis
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from finlab.allocation import Allocator
 from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
 from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import ForceSets, force_sets
 from finlab.forces.reach import weakest
 from finlab.layout import Layout
-from finlab.layout.axes import AXES as WRENCH
 from finlab.physics.objective import REACHED
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from finlab.actuators.actuator import Actuator
 from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
+from finlab.axes import MIRROR
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Layout
-from finlab.layout.directions import MIRROR, replaced, with_axes
 from finlab.layout.effectiveness import moved_effectiveness
-from finlab.layout.layout import Actuator
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
@@ -82,7 +82,7 @@ def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
 def is_mirrored(part: Actuator, other: Actuator, tolerance: float = MIRROR_TOLERANCE) -> bool:
     """Says whether two actuators of a type are each other's mirror image, within [m, rad]: fins with their
     shafts, others whichever way their axes count."""
-    count = 1 if part.type == "thruster" else 2
+    count = len(part.AXES)
     image, axes = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
     apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()
     turned = np.linalg.norm(np.cross(image, axes), axis=-1).max()
@@ -190,7 +190,7 @@ class Moves:
         position, frames = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
-            result = replaced(result, with_axes(self.layout.actuators[i], frames[0, i], position[0, i]))
+            result = result.with_part(self.layout.actuators[i].turned(frames[0, i], position[0, i]))
         return result
 
 

@@ -1,12 +1,11 @@
 """Layouts and their score cards as text."""
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from finlab.analysis import AXES, Authority, Improvement, Loss, ScoreCard
 from finlab.command_end import aligned
-from finlab.layout import Actuator, Azimuth, Fin, Layout, Rudder
+from finlab.layout import Layout
 
 _UNITS = ("N", "N", "N", "N m", "N m", "N m")
 COLUMNS = ("actuator", "type", "x [m]", "y [m]", "z [m]", "direction", "limits")
@@ -15,53 +14,20 @@ COLUMNS = ("actuator", "type", "x [m]", "y [m]", "z [m]", "direction", "limits")
 def layout_text(layout: Layout) -> str:
     """A layout in words, and a table of its actuators."""
     rows = [
-        (part.name, part.type, *(f"{x:6.3f}" for x in part.position), direction_text(part), _limits(part))
+        (part.name, part.type, *(f"{x:6.3f}" for x in part.position), part.direction_words, part.limits_words)
         for part in layout.actuators
     ]
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
     return "\n".join([title, "", *table(COLUMNS, rows)])
 
 
-def direction_text(part: Actuator) -> str:
-    """Where an actuator points: the axes that its file gives, in the body frame."""
-    if isinstance(part, Fin) and part.mounting_angle is not None:
-        return f"shaft at {math.degrees(part.mounting_angle):.1f} deg"
-    first, second, _ = part.frame
-    if isinstance(part, Fin | Rudder):
-        return f"shaft {_vector(first)}, zero {_vector(second)}"
-    if isinstance(part, Azimuth):
-        return f"turns about {_vector(first)}, zero {_vector(second)}"
-    return f"axis {_vector(first)}"
-
-
-def _limits(part: Actuator) -> str:
-    if isinstance(part, Rudder):
-        return f"{_arc(*part.deflection)}, {part.area:g} m^2"
-    if isinstance(part, Fin):
-        (a, b), (c, d) = part.limits.amplitude, part.limits.frequency
-        arc = _arc(*part.limits.zero_direction)
-        return f"A {a:g}..{b:g} rad, f {c:g}..{d:g} Hz, {arc}, {part.model.type}"
-    low, high = part.force
-    force = f"{low:g}..{high:g} N, {part.model.type}"
-    return f"{_arc(*part.arc)}, {force}" if isinstance(part, Azimuth) else force
-
-
-def _arc(low: float, high: float) -> str:
-    low, high = math.degrees(low), math.degrees(high)
-    return "any direction" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f} deg"
-
-
-def _vector(values: Iterable[float]) -> str:
-    return f"({', '.join(f'{value:.3g}' for value in values)})"
-
-
 def improvement_text(improvement: Improvement, output: Path) -> str:
     """Where the actuators went, the card after it, and where the layout was written."""
     lines = [f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}", ""]
     for name in improvement.moved:
-        part = improvement.layout.actuators[improvement.layout.index(name)]
+        part = improvement.layout.part(name)
         place = "  ".join(f"{value:6.3f}" for value in part.position)
-        lines.append(f"{name:<16}  {place} m  {direction_text(part)}")
+        lines.append(f"{name:<16}  {place} m  {part.direction_words}")
     lines += ["", score_card_text(improvement.card_after), ""]
     lines.append(
         f"{output}: written."

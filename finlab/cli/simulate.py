@@ -225,6 +225,6 @@ def monitored(loop: ClosedLoop) -> str:
     if loop.monitor is not None and not loop.monitor.tells:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     if health is not None:
-        words += [f"{name} torn" for name, _ in (*health.thrust, *health.weak)]
+        words += [f"{name} torn" for name, _ in (*health.torn, *health.weak)]
         words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
     return ", ".join(words) or "all fins whole"

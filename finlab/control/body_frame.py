@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.control.completion import Completion, axes_of
 from finlab.control.measurement import Controller, Measurement, Setpoint
 from finlab.control.observer import MotionObserver
 from finlab.control.tracking_controller import TrackingController, most_of, pace_of
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.axes import wrapped
 
 SLOW, TURN, SPEED = 0.4, 0.75, 0.6
 """Bandwidths of position and depth, of the heading and of the speed, times the delay."""

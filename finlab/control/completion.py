@@ -12,8 +12,8 @@ from itertools import combinations
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Layout, Rudder
-from finlab.layout.axes import mask_of
+from finlab.axes import mask_of
+from finlab.layout import Layout
 from finlab.layout.effectiveness import layout_effectiveness
 
 LEVER_M = 0.25
@@ -57,7 +57,7 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
     sideways hardly push ahead: with them sway is headed against. A robot that lifts by rudders alone dives by
     its pitch, and one that does not lift at all is steered in the plane."""
     lifts = ("Fx", "Fz", "Tz")
-    rudders = [part.name for part in layout.actuators if isinstance(part, Rudder)]
+    rudders = layout.by_flow
     driven = layout.without(rudders) if len(rudders) < layout.n else layout
     candidates: list[tuple[Layout, tuple[str, ...]]]
     candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]

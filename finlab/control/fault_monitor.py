@@ -7,12 +7,12 @@ import numpy as np
 
 from finlab.allocation.dual.policies import Rates
 from finlab.arrays import Array
+from finlab.axes import TURN
 from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
 from finlab.control.measurement import Measurement
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Layout
-from finlab.layout.axes import TURN
 from finlab.layout.damage import Damage
 from finlab.physics import plant_of
 

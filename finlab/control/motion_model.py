@@ -71,7 +71,7 @@ class MotionModel:
         self._swing = np.array([0.0, 0.0, 0.0, *(cosine.real - 1.0), 0.0])
         self._force = np.zeros((2, layout.n, 6))
         self._thrust = np.zeros((layout.n, 3))
-        self._turned_off = np.array([part.type not in ("thruster", "rudder") for part in layout.actuators])
+        self._turned_off = np.array(["stuck" in part.FAULTS for part in layout.actuators])
         self._unsure_s, self._any_unsure = np.zeros(layout.n), False
         self.unsure = np.zeros(layout.n, dtype=bool)
         """Which actuators (n,) turn about by command just now; which way round is unknown."""

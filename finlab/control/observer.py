@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_response import fin_table
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.control.measurement import Measurement, Setpoint
-from finlab.layout import Fin, Layout, Rudder
-from finlab.layout.axes import wrapped
+from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
 from finlab.vehicle.fossen import complete_body, damping_jacobian, damping_rates
@@ -91,8 +90,7 @@ class MotionObserver:
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
-        steered = any(isinstance(part, Rudder) for part in layout.actuators)
-        unknown = UNKNOWN_BY_RUDDERS if steered else UNKNOWN_FORCE
+        unknown = UNKNOWN_BY_RUDDERS if layout.by_flow else UNKNOWN_FORCE
         self._noise = period_s * np.concatenate(
             [
                 (unknown * strength) ** 2,
@@ -243,12 +241,5 @@ def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
     effectiveness = plant_of(layout).effectiveness
     reach = np.zeros(6)
     for part, own in zip(layout.actuators, effectiveness, strict=True):
-        if isinstance(part, Fin):
-            most = fin_table(part).largest  # a soft fin may push more with a smaller command than the largest
-        elif isinstance(part, Rudder):
-            angle = min(part.stall, max(map(abs, part.deflection)))
-            most = 0.5 * part.density * part.area * speed**2 * part.slope * angle
-        else:
-            most = max(map(abs, part.force))
-        reach += most * np.linalg.norm(own[list(part.PUSHES)], axis=0)
+        reach += part.largest(speed) * np.linalg.norm(own[list(part.PUSHES)], axis=0)
     return reach

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.axes import is_full_turn
 from finlab.control.hypotheses import MonitorSettings
-from finlab.layout import Azimuth, Fin, Layout, Rudder
-from finlab.layout.axes import is_full_turn
+from finlab.layout import Layout
 from finlab.physics import plant_of
 
 FORCE_N = 0.6
@@ -42,7 +42,7 @@ class Probe:
         self._every, self._length = round(settings.probe_every_s / period_s), round(LENGTH_S / period_s)
         self._side = np.zeros(layout.n)
         self._parts = layout.actuators
-        self._of_fins = np.array([isinstance(part, Fin) for part in layout.actuators])
+        self._of_fins = layout.is_fin
         self._count = 0
 
     def added(self, command: Array, lost: NDArray[np.bool_], direction: Array) -> Array:
@@ -70,15 +70,16 @@ class Probe:
     def _trial(self, index: int, direction: float) -> tuple[float, float, float]:
         """The command of one that is tried, which is or points at a direction [rad]; a rudder amidships."""
         part = self._parts[index]
-        if isinstance(part, Fin):
+        if self._of_fins[index]:
             return self._command(index, 0.0, math.copysign(FORCE_N, math.sin(direction)))
-        if isinstance(part, Rudder):
-            return 0.0, 0.0, 0.0
-        low, high = part.force
-        force = max(SHARE * max(high, -low), 2.0 * part.dead_band)
-        if isinstance(part, Azimuth):
-            return direction, min(force, high), 0.0
-        return (min(force, high) if high > 0.0 else max(-force, low)), 0.0, 0.0
+        row = [0.0, 0.0, 0.0]
+        if part.THRUST is not None:
+            low, high = part.lower[part.THRUST], part.upper[part.THRUST]
+            force = max(SHARE * max(high, -low), 2.0 * getattr(part, "dead_band", 0.0))
+            if part.TURNS:
+                row[part.HELD] = direction
+            row[part.THRUST] = min(force, high) if high > 0.0 else max(-force, low)
+        return row[0], row[1], row[2]
 
     def _pushing(self, command: Array) -> Array:
         """Fins that are commanded to push less than is needed to be known push more, each the other way than

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.control.completion import axes_of
 from finlab.control.measurement import Measurement, Setpoint
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
-from finlab.layout.axes import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.fossen import complete_body, dynamics_of
 

@@ -18,10 +18,11 @@ from shutil import rmtree
 from msgspec import to_builtins
 
 import finlab
+from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
-from finlab.physics.objective import yardstick
 from finlab.assets import NAME, shipped_checkpoints
+from finlab.axes import AXES
 from finlab.bundle_files import (
     ABOUT,
     CHECKSUMS,
@@ -40,15 +41,14 @@ from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.archive import packed
 from finlab.layout import Actuator, Fin, FinModelSpec, Layout
-from finlab.layout.axes import AXES
 from finlab.layout.file import FORMAT as LAYOUT_FORMAT
 from finlab.layout.file import layout_to_dict
 from finlab.layout.file_form import plain
-from finlab.layout.force_table_file import table_bytes
 from finlab.layout.load import Data, Edge, Graph, Normalization, Robot, edges_of, robot_bytes
 from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_checkpoint
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.network import POSITION_SCALE, SCALES
+from finlab.physics.objective import yardstick
 from finlab.whole_file import PART, write_together, write_whole
 
 
@@ -170,18 +170,6 @@ def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
     )
 
 
-_FORCE = ("force", "N")
-_ANGLE = ("angle", "rad")
-COMMANDS = {
-    "fin": (("A", "rad"), ("f", "Hz"), ("phi", "rad")),
-    "thruster": (_FORCE,),
-    "azimuth": (_ANGLE, _FORCE),
-    "tilt": (_ANGLE, _FORCE),
-    "rudder": (("deflection", "rad"),),
-}
-"""Numbers of a command and their units, by type of actuator."""
-
-
 def features_of(part: Actuator) -> dict[str, float]:
     """Returns the features of an actuator by name and unit."""
     found = dict(zip(("x [m]", "y [m]", "z [m]"), part.position, strict=True))
@@ -190,7 +178,7 @@ def features_of(part: Actuator) -> dict[str, float]:
     else:
         for name, axis in zip(("first axis", "second axis"), part.frame, strict=False):
             found |= {f"{name} {one}": float(value) for one, value in zip("xyz", axis, strict=True)}
-    for (name, unit), low, high in zip(COMMANDS[part.type], part.lower, part.upper, strict=False):
+    for (name, unit), low, high in zip(part.NUMBERS, part.lower, part.upper, strict=False):
         found |= {f"{name}_min [{unit}]": float(low), f"{name}_max [{unit}]": float(high)}
     return found
 

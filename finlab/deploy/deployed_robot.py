@@ -18,11 +18,10 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import bundled_method, method_class
 from finlab.allocation.policy import KINDS
 from finlab.arrays import Array
+from finlab.axes import AXES
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.layout.axes import AXES
-from finlab.layout.commands import neutral_row
 from finlab.layout.load import Case, robot_of
 from finlab.physics import plant_of
 from finlab.physics.objective import REACHED
@@ -64,12 +63,9 @@ class DeployedRobot:
         return answer
 
     def neutral(self, failed: Sequence[str] = (), now: Array | None = None) -> Array:
-        """Commands (n, 3) that push least, see `neutral_row`; azimuths keep the angles of the present ones
-        (n, 3), where there are any."""
+        """Commands (n, 3) that push least, see `Actuator.neutral`, given the present ones (n, 3) if any."""
         rows = [None] * self.layout.n if now is None else now
-        command = np.array(
-            [neutral_row(part, row) for part, row in zip(self.layout.actuators, rows, strict=True)]
-        )
+        command = np.array([part.neutral(row) for part, row in zip(self.layout.actuators, rows, strict=True)])
         command[[name in (*self.failed, *failed) for name in self.layout.names]] = np.nan
         return command
 

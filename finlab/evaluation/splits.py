@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
-from finlab.layout.axes import wrapped
 from finlab.layout.random_layouts import (
     TRAINING_BOX,
     random_azimuth,

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree
 
+from finlab.axes import Vector
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.simulator_plugins import DERIVATIVES
-from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
-from finlab.layout.axes import Vector, is_full_turn
+from finlab.layout import Actuator, Body, Layout
 
 ROOT = "base_link"
 MASS, MOMENT = 1e-11, 1e-4
@@ -63,9 +63,11 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         parts.append(form["link"].format(**own, inertial=inertial))
         parts.append(form["joint"].format(**own, kind=kind, axis=_text(axis), limit=limit))
     for part in layout.actuators:
-        if isinstance(part, Thruster | Azimuth):
-            limits = {"min_thrust_cmd": part.force[0], "max_thrust_cmd": part.force[1]}
-            band = {"deadband": part.dead_band} if part.dead_band else {}
+        if part.THRUST is not None:
+            low, high = part.lower[part.THRUST], part.upper[part.THRUST]
+            limits = {"min_thrust_cmd": low, "max_thrust_cmd": high}
+            dead_band = getattr(part, "dead_band", 0.0)
+            band = {"deadband": dead_band} if dead_band else {}
             parts.append(_plugin(form, "Thruster", {"joint_name": f"{part.name}_joint", **limits, **band}))
     damping: dict[str, float] = {}
     for field, tags in DERIVATIVES.items():
@@ -75,8 +77,8 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     if mass is None:
         exchange.note("The layout has no mass: no link has one, and simulators want one.")
     exchange.note("A robot description has no place for power, reaction torques, rates and buoyancy.")
-    if any(not isinstance(part, Thruster | Azimuth) for part in layout.actuators):
-        exchange.note("Fins and rudders are joints that push nothing; --fins names the fins among them.")
+    if any(part.THRUST is None for part in layout.actuators):
+        exchange.note("Others than thrusters are joints that push nothing; --fins names the fins among them.")
     text = form["robot"].format(name=escape(layout.name), parts="".join(parts))
     root = ElementTree.fromstring(text)
     ElementTree.indent(root)
@@ -85,13 +87,10 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
 
 def _links(part: Actuator) -> Iterator[tuple[str, str, Vector, Vector, tuple[float, float] | None]]:
     """Links of an actuator: name, parent, place seen from it [m], axis, and limits of the angle [rad]."""
-    if isinstance(part, Azimuth):
-        mount, arc = f"{part.name}_mount", part.arc
-        yield mount, ROOT, part.position, part.turn_axis, None if is_full_turn(arc[1] - arc[0]) else arc
-        yield part.name, mount, (0.0, 0.0, 0.0), part.zero, None
-    else:
-        ends = part.deflection if isinstance(part, Rudder) else None
-        yield part.name, ROOT, part.position, part.frame[0], ends
+    parent, place = ROOT, part.position
+    for suffix, axis, ends in part.joints:
+        yield part.name + suffix, parent, place, axis, ends
+        parent, place = part.name + suffix, (0.0, 0.0, 0.0)
 
 
 def _inertial(form: Mapping[str, str], mass: float | None, moments: Sequence[float]) -> str:

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
+from finlab.axes import Vector
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Thruster
-from finlab.layout.axes import Vector
-from finlab.layout.thrust_model import PowerLaw
 
 T200_FORCE, T200_POWER = (-39.91, 51.44), PowerLaw(0.997, 1.449)
 """Least and most force [N] of a Blue Robotics T200 at 16 V (the maker's table), and a fit of its power."""

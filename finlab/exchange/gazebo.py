@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import TURN
 from finlab.errors import LayoutError
 from finlab.exchange.description import TURNING, Description, Joint, number, parse_description
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
@@ -18,7 +19,6 @@ from finlab.exchange.labels import listed
 from finlab.exchange.simulator_plugins import UUV, body_of, driven, drives, force_of, is_plugin
 from finlab.exchange.xml_models import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
-from finlab.layout.axes import TURN
 
 MAX_TILT = math.radians(5.0)
 """Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for horizontal."""

@@ -7,9 +7,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import AXES, Axis
 from finlab.errors import LayoutError
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
-from finlab.layout.axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}

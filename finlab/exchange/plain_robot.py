@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
+from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
@@ -15,7 +16,6 @@ from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.files.plain_values import yaml_text
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
-from finlab.layout.axes import AXES
 
 Ends = tuple[float, float]
 Parts = tuple[Thruster, ...]

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import AXES, Axis
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
 from finlab.files.csv_table import LENGTHS, TURNS
-from finlab.layout.axes import AXES, Axis
 
 UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""

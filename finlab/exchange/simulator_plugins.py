@@ -12,12 +12,12 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from finlab.axes import Vector
 from finlab.errors import LayoutError
 from finlab.exchange.description import ADDED, Description, Joint, number, said
 from finlab.exchange.exchange import Exchange, vector
 from finlab.exchange.labels import numbers_in
 from finlab.layout import Body
-from finlab.layout.axes import Vector
 
 MOST = 1000.0
 """What gz-sim takes for a limit of a thruster that is left out [N]."""

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.actuators.fin.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
 from finlab.arrays import Array
+from finlab.axes import TURN
 from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
-from finlab.layout.axes import TURN
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
 from finlab.whole_file import write_whole
 
 MOST_SAMPLES = 1500

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
+from finlab.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.errors import DataError
 from finlab.fit.columns import Columns, read_columns, together
-from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 NEEDED = ("A", "f", "Fy", "Fz")
 """Columns without which no fin can be fitted."""

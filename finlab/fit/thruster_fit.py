@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import isotonic_regression, nnls
 
+from finlab.actuators.fin.force_table_file import table_text
+from finlab.actuators.thrust_model import COLUMNS, PowerTable
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
 from finlab.fit.thruster_bench import Bench
-from finlab.layout.force_table_file import table_text
-from finlab.layout.thrust_model import COLUMNS, PowerTable
 
 NO_FORCE = 0.002
 """Share of the largest force up to which a command counts as at rest, or ..."""

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_response import FinGroup
-from finlab.actuators.registry import groups_of, laws_of
+from finlab.actuators.kinds import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
+from finlab.axes import TURN, wrapped
 from finlab.layout import Layout
-from finlab.layout.axes import TURN, wrapped
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
@@ -210,7 +210,7 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
 def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
     """Returns what each actuator can push; arguments as for `force_sets`."""
     shapes: dict[str, Shape] = {}
-    for places, law in laws_of(layout):
+    for places, law in laws_of(layout.actuators):
         if law.feels_flow:
             met = plant_of(layout).inflow(None if flow is None else np.asarray(flow, np.float64))
             lower, upper = layout.lower[places], layout.upper[places]
@@ -222,7 +222,7 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
     if others:
         rest = layout.without(shapes) if shapes else layout
         own = np.broadcast_to(np.eye(3, 6), (rest.n, 3, 6))
-        for places, group in groups_of(rest, own):
+        for places, group in groups_of(rest.actuators, own):
             for place, response in zip(places, group.responses, strict=True):
                 shapes[rest.names[place]] = _shape(response, isinstance(group, FinGroup))
     return [shapes[name] for name in layout.names]

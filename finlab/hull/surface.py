@@ -14,7 +14,7 @@ from finlab.errors import FinlabError
 from finlab.files.guarded import read_file
 from finlab.hull.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
 from finlab.hull.shapes import Mesh, Three, shape_mesh
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 
 COARSE_FACES = 400
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "inch": 0.0254}
@@ -133,5 +133,5 @@ def hull_of(layout: Layout) -> Surface:
 @lru_cache(maxsize=8)
 def has_inside(layout: Layout) -> bool:
     """Whether an actuator other than a fin sits inside the hull."""
-    places = [part.position for part in layout.actuators if not isinstance(part, Fin)]
-    return bool(places) and bool(hull_of(layout).contains(np.array(places)).any())
+    places = layout.position[~layout.is_fin]
+    return bool(len(places)) and bool(hull_of(layout).contains(places).any())

@@ -1,6 +1,6 @@
 """The geometry of forces, for numpy's arrays and torch's tensors: own axes, body frame, wrench.
 
-Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`); body frame FLU about the centre of
+Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.actuators.fin.fin`); body frame FLU about the centre of
 gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 

@@ -11,18 +11,20 @@ Every error names the file and the key, such as
 import json
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct, to_builtins
 
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.kinds import KINDS
+from finlab.axes import AXES
 from finlab.errors import LayoutError
+from finlab.files.checked import form
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
-from finlab.layout.axes import AXES
-from finlab.layout.checked import form
-from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, Reader, plain, under
-from finlab.layout.fin import Fin
+from finlab.layout.file_form import BODY, HORIZONTAL_FIN, Reader, actuator_form, plain, under
 from finlab.layout.layout import MAX_ACTUATORS, Layout
 from finlab.whole_file import write_whole
 
@@ -58,9 +60,18 @@ LAYOUT_OF_FINS = form(
     fins=Annotated[list[HORIZONTAL_FIN], _COUNT],
     **_OF_A_LAYOUT,
 )
-LAYOUT = form(Layout, {}, tag=("version", 2), actuators=Annotated[list[ACTUATOR], _COUNT], **_OF_A_LAYOUT)
-ANY_LAYOUT: Any = LAYOUT_OF_FINS | LAYOUT
-"""A layout file: version 1, which holds horizontal fins, or version 2."""
+
+
+def layout_form() -> Any:
+    """Returns the form of a layout file: version 1, which holds horizontal fins, or version 2."""
+    return _layout_form(tuple(KINDS.values()))
+
+
+@cache
+def _layout_form(kinds: tuple[type[Actuator], ...]) -> Any:
+    kind: Any = list[actuator_form(kinds)]  # type: ignore[misc]
+    parts = Annotated[kind, _COUNT]
+    return LAYOUT_OF_FINS | form(Layout, {}, tag=("version", 2), actuators=parts, **_OF_A_LAYOUT)
 
 
 def parse_layout(
@@ -77,7 +88,7 @@ def parse_layout(
     """
     with under(source=source):
         check_version(data, FORMAT, *VERSIONS)
-        file = checked(data, ANY_LAYOUT)
+        file = checked(data, layout_form())
         key = VERSIONS[data["version"]]
         reader = Reader(folder, may_open)
         values = {}
@@ -105,7 +116,7 @@ def check_version(data: Any, form: str, *versions: int) -> None:
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
     """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
-    horizontal = all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
+    horizontal = layout.is_of_fins and all(fin.mounting_angle is not None for fin in layout.fins)
     horizontal &= layout.axes == AXES
     version = 1 if horizontal else 2
     data: dict[str, Any] = {"format": FORMAT, "version": version, "name": layout.name}

@@ -9,20 +9,19 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Union, get_type_hints
 
 from msgspec import Meta, Struct, structs
 
+from finlab.actuators.actuator import Actuator, Uncertainty
+from finlab.actuators.fin.fin import Fin, Servo
+from finlab.actuators.fin.fin_model import FinModelSpec, Limits, Model
+from finlab.actuators.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row, ThrustModel
 from finlab.errors import LayoutError
+from finlab.files.checked import Checked, form
 from finlab.layout.body import Body, Hull
-from finlab.layout.checked import Checked, form
-from finlab.layout.commanded import Uncertainty
-from finlab.layout.fin import Fin, Limits, Servo
-from finlab.layout.fin_model import FinModelSpec, Model
-from finlab.layout.propellers import Azimuth, Thruster, Tilt
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
 
 
 class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
@@ -35,29 +34,38 @@ class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=Tru
     unit: Annotated[str, Meta(max_length=20)] | None = None
 
 
+_FORMS: tuple[tuple[Any, Any], ...] = (
+    (Uncertainty, form(Uncertainty)),
+    (Limits, form(Limits)),
+    (Servo, form(Servo)),
+    (FinModelSpec, Model),
+    (ThrustModel, form(PowerLaw) | TableForm),
+)
+"""Types of fields that are parts of their own in a file, and the forms of these."""
+
+
 def _form(cls: type[Checked], **others: Any) -> Any:
     """The form of a class whose angles are in degrees, with other types of some fields."""
     keys = {name: key for name, (key, _) in cls.DEGREES.items()}
     kinds = {name: kind for name, (_, kind) in cls.DEGREES.items()}
+    hints = get_type_hints(cls)
+    for kind, own in _FORMS:
+        kinds |= {name: own for name, hint in hints.items() if hint in (kind, kind | None)}
     return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
 
 
-_THRUST: Any = form(PowerLaw) | TableForm
-_UNCERTAINTY: dict[str, Any] = {"uncertainty": form(Uncertainty)}
-_FIN: dict[str, Any] = {"limits": form(Limits), "model": Model, "servo": form(Servo), **_UNCERTAINTY}
 HORIZONTAL_FIN = _form(
-    Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None, **_FIN
+    Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None
 )
 """A fin of version 1."""
-_KINDS = {
-    Fin: _form(Fin, **_FIN),
-    Thruster: _form(Thruster, model=_THRUST, **_UNCERTAINTY),
-    Azimuth: _form(Azimuth, model=_THRUST, **_UNCERTAINTY),
-    Tilt: _form(Tilt, model=_THRUST, **_UNCERTAINTY),
-    Rudder: _form(Rudder, **_UNCERTAINTY),
-}
-ACTUATOR: Any = Union[tuple(_KINDS.values())]  # noqa: UP007
-"""An actuator of version 2."""
+
+
+@cache
+def actuator_form(kinds: tuple[type[Actuator], ...]) -> Any:
+    """Returns the form of an actuator of version 2, one of several kinds."""
+    return Union[tuple(map(_form, kinds))]  # noqa: UP007
+
+
 BODY = form(Body, hull=form(Hull))
 
 
@@ -130,7 +138,7 @@ def plain(value: Any) -> Any:
         return value
     keys = {**value.KEYS, **{name: key for name, (key, _) in value.DEGREES.items()}}
     data = {}
-    for field in fields(value):  # type: ignore[arg-type]
+    for field in fields(value):
         own = getattr(value, field.name)
         if own != field.default or field.name in value.WRITTEN:
             own = degrees_of(own) if field.name in value.DEGREES else own

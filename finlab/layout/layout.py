@@ -10,19 +10,13 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.fin.fin import Fin
 from finlab.arrays import Array
+from finlab.axes import AXES, CommandedAxes, mask_of
 from finlab.errors import LayoutError
-from finlab.layout.axes import AXES, CommandedAxes, mask_of
+from finlab.files.checked import Checked, Name
 from finlab.layout.body import Body
-from finlab.layout.checked import Checked, Name
-from finlab.layout.fin import Fin
-from finlab.layout.propellers import Azimuth, Thruster
-from finlab.layout.rudder import Rudder
-
-Actuator = Fin | Thruster | Azimuth | Rudder
-"""An actuator of a robot: `name`, `type`, `position` [m], `frame` (3 x 3, rows in the body frame), and
-`lower` and `upper`, the limits of its command (3,)."""
-
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -77,6 +71,16 @@ class Layout(Checked):
     def fins(self) -> tuple[Fin, ...]:
         """The actuators that are fins, in order; of a robot of fins all of them."""
         return tuple(part for part in self.actuators if isinstance(part, Fin))
+
+    @cached_property
+    def is_fin(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) are fins."""
+        return np.array([isinstance(part, Fin) for part in self.actuators])
+
+    @cached_property
+    def by_flow(self) -> tuple[str, ...]:
+        """Names of the actuators that give nothing at rest, such as rudders."""
+        return tuple(part.name for part in self.actuators if part.BY_FLOW)
 
     @property
     def is_of_fins(self) -> bool:
@@ -192,6 +196,16 @@ class Layout(Checked):
         """Returns the places of several actuators, in the order asked for; one unknown name is an error."""
         return tuple(self.index(name) for name in names)
 
+    def part(self, name: str) -> Actuator:
+        """Returns the actuator called `name`; errors as for `index`."""
+        return self.actuators[self.index(name)]
+
+    def with_part(self, part: Actuator, name: str = "") -> "Layout":
+        """Returns the layout with another actuator in the place of the one of that name, by default its
+        own."""
+        i = self.index(name or part.name)
+        return replace(self, actuators=(*self.actuators[:i], part, *self.actuators[i + 1 :]))
+
     def without(self, names: Iterable[str]) -> "Layout":
         """Returns the layout that is left when the actuators called `names` are lost. Raises LayoutError: a
         name is unknown, or none is left."""
@@ -205,9 +219,7 @@ class Layout(Checked):
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`."""
-        i = self.index(name)
-        changed = replace(self.actuators[i], **changes)
-        return replace(self, actuators=(*self.actuators[:i], changed, *self.actuators[i + 1 :]))
+        return self.with_part(replace(self.part(name), **changes), name)
 
 
 def _read_only(values: ArrayLike) -> Array:

@@ -10,13 +10,15 @@ from typing import Literal
 
 import numpy as np
 
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.azimuth import Azimuth, Tilt
+from finlab.actuators.fin.fin import Fin
+from finlab.actuators.fin.fin_model import FinModelSpec, Limits
+from finlab.actuators.thrust_model import PowerLaw
+from finlab.actuators.thruster import Thruster
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout.fin import Fin, Limits
-from finlab.layout.fin_model import FinModelSpec
-from finlab.layout.layout import Actuator, Layout
-from finlab.layout.propellers import Azimuth, Thruster, Tilt
-from finlab.layout.thrust_model import PowerLaw
+from finlab.layout.layout import Layout
 
 TRAINING_BOX = (0.3, 0.3, 0.1)
 """Largest |x|, |y|, |z| of a fin in training and in split `id` [m]."""

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import AnyArray, Array, solve
-from finlab.layout.axes import wrapped
+from finlab.axes import wrapped
 from finlab.mdn.effort_fins import (
     AMPLITUDE,
     EFFORT,

@@ -19,8 +19,8 @@ from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.actuators.fin.fin_response import fin_table
 from finlab.actuators.response import POINTS
 from finlab.arrays import AnyArray, Array
+from finlab.axes import TURN
 from finlab.layout import Fin, Layout
-from finlab.layout.axes import TURN
 from finlab.physics.objective import effort_of_shares, effort_scale
 
 LEVELS = 49
@@ -93,7 +93,7 @@ class EffortFins:
         """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no thrust
         within the limits."""
         compiled = [fin_table(fin) for fin in layout.fins]
-        costs = [_costs(fin, file_stamp(fin.model)) for fin in layout.fins]
+        costs = [_costs(fin, file_stamp(fin.reads)) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)
         gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]
         return cls(

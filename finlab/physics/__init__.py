@@ -3,7 +3,7 @@
 from finlab.actuators.fin.fin_laws import TableLaw as TableLaw
 from finlab.actuators.fin.fin_laws import make_law as make_law
 from finlab.actuators.fin.fin_laws import read_table as read_table
+from finlab.actuators.fin.force_table_file import write_table as write_table
 from finlab.actuators.law import FinLaw as FinLaw
-from finlab.layout.force_table_file import write_table as write_table
 from finlab.physics.plant import Plant as Plant
 from finlab.physics.plant import plant_of as plant_of

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import TableLaw, file_stamps, make_law
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.fin.fin import Fin
+from finlab.actuators.fin.fin_laws import TableLaw, make_law
+from finlab.actuators.kinds import file_stamps
+from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
-from finlab.layout.fin import Fin
-from finlab.layout.layout import Actuator, Layout
-from finlab.layout.propellers import Thruster
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerTable
+from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 from finlab.physics.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
@@ -56,7 +56,7 @@ class Known:
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
     """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
-    return _known(layout, file_stamps(layout))
+    return _known(layout, file_stamps(layout.actuators))
 
 
 @lru_cache(maxsize=256)
@@ -135,9 +135,9 @@ def _errors(layout: Layout, place: int, known: Known, command: Array, force: Arr
     deviation = known.deviation(np.nan_to_num(command), np.linalg.norm(force, axis=-1))
     deviation = np.where(failed[:, None], 0.0, deviation)
     part = layout.actuators[place]
-    acting = force if isinstance(part, Thruster | Rudder) else force * [0.0, 1.0, 1.0]
+    acting = force if len(part.PUSHES) == 1 else force * [0.0, 1.0, 1.0]
     size = np.linalg.norm(acting, axis=-1, keepdims=True)
-    rest = [float(k == _AXIS.get(type(part), 1)) for k in range(3)]
+    rest = np.eye(3)[part.PUSHES[0]]  # where it gives no force
     along = np.where(size > 0.0, acting / np.maximum(size, 1e-300), rest)
     errors = np.zeros((len(command), 3, 3))
     errors[:, 0] = deviation[:, :1] * along
@@ -145,7 +145,3 @@ def _errors(layout: Layout, place: int, known: Known, command: Array, force: Arr
         errors[:, 1, 1], errors[:, 1, 2] = -errors[:, 0, 2], errors[:, 0, 1]
         errors[:, 2, 0] = deviation[:, 1]
     return errors
-
-
-_AXIS = {Thruster: 0, Rudder: 2}
-"""Own axis along which actuators err where they give no force, if it is not the second one."""

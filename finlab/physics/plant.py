@@ -12,13 +12,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.actuators.fin.fin_laws import file_stamps, make_law
+from finlab.actuators.fin.fin_laws import make_law
+from finlab.actuators.kinds import file_stamps, free_angles, laws_of
 from finlab.actuators.law import ActuatorLaw, Blade
-from finlab.actuators.registry import free_angles, laws_of
-from finlab.actuators.thrust_power import held
+from finlab.actuators.propeller import held
 from finlab.arrays import Array
+from finlab.axes import TURN, is_full_turn
 from finlab.errors import CommandError
-from finlab.layout.axes import TURN, is_full_turn
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
 
@@ -33,13 +33,13 @@ class Plant:
         self.lower, self.upper = layout.lower, layout.upper
         self.width = self.upper - self.lower
         """Ranges of the limits (n, 3)."""
-        self.turns: NDArray[np.bool_] = free_angles(layout) & is_full_turn(self.width)
+        self.turns: NDArray[np.bool_] = free_angles(layout.actuators) & is_full_turn(self.width)
         """Commands (n, 3) that may turn freely: they wrap instead of ending at a limit."""
         self.full_turn = self.turns[:, 2]
         """Fins (n,) whose zero direction does."""
         self.effectiveness: Array = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along the own axes of each actuator."""
-        laws = laws_of(layout)
+        laws = laws_of(layout.actuators)
         # A robot of one law is spared the copies of fancy indexing.
         self._laws: list[tuple[Any, ActuatorLaw]] = [(slice(None), laws[0][1])] if len(laws) == 1 else laws
         self.feels_flow = any(law.feels_flow for _, law in self._laws)
@@ -225,7 +225,7 @@ def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ..
 def plant_of(layout: Layout) -> Plant:
     """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a fin's
     force table cannot be read."""
-    return _made(layout, file_stamps(layout))
+    return _made(layout, file_stamps(layout.actuators))
 
 
 @lru_cache(maxsize=256)

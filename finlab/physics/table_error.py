@@ -14,8 +14,8 @@ import numpy as np
 
 from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
+from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
-from finlab.layout.thrust_model import PowerTable
 
 FEWEST = 3, 9
 """Lines from which every second and every fourth one tell something."""

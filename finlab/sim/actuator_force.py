@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.layout import Layout
-from finlab.layout.axes import wrapped
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import ActuatorMotion

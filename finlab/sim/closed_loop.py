@@ -24,7 +24,7 @@ from finlab.control import (
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.errors import FinlabError
-from finlab.layout import Azimuth, Layout, Rudder
+from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
 from finlab.sim.actuator_force import ActuatorForce
@@ -103,8 +103,7 @@ class ClosedLoop:
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         # Rudders that the flow leaves weak must not stop the propeller.
-        steered = any(isinstance(part, Rudder) for part in layout.actuators)
-        under_way = "closest" if steered else allocator.policy_under_way
+        under_way = "closest" if layout.by_flow else allocator.policy_under_way
         self.policy = as_policy(under_way if policy is None else policy)
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth), current)
@@ -319,8 +318,7 @@ class ClosedLoop:
         result = command.copy()
         for name, share in health.weak:
             index = self.layout.index(name)
-            part = self.layout.actuators[index]
-            result[index, 1 if isinstance(part, Azimuth) else 0] /= share
+            result[index, self.layout.actuators[index].THRUST or 0] /= share
         return result
 
     def _moved(self, command: Array) -> Array:

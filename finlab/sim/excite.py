@@ -19,10 +19,10 @@ from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.control import Measurement, Setpoint
 from finlab.errors import DataError, FinlabError
-from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
-from finlab.layout.axes import wrapped
+from finlab.layout import Layout
 from finlab.layout.effectiveness import layout_effectiveness
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
@@ -153,7 +153,7 @@ class Exciting(Method):
         self._inner = right[rank:] * self._most
         self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
         self._calls = 0
-        self._is_fin = np.array([isinstance(part, Fin) for part in layout.actuators])
+        self._is_fin = layout.is_fin
         self._direction: Array | None = None
         if layout.fins:
             self._plant = plant_of(replace(layout, actuators=layout.fins))
@@ -177,11 +177,7 @@ class Exciting(Method):
         force = self._to_force @ target + (INNER_SHARE * swing @ self._inner if len(k) else 0.0)
         command = np.zeros((self.layout.n, 3))
         for i, part in enumerate(self.layout.actuators):
-            own = force[self._owner == i]
-            if isinstance(part, Thruster):
-                command[i, 0] = own[0]
-            elif isinstance(part, Azimuth):
-                command[i, :2] = math.atan2(own[1], own[0]), math.hypot(*own)
+            command[i] = part.pushing(force[self._owner == i])
         command = self.plant.feasible(command)
         if self._is_fin.any():
             own = force[np.isin(self._owner, np.flatnonzero(self._is_fin))].reshape(-1, 2)
@@ -244,7 +240,7 @@ def excitation(
         current: velocity (3,) of the water in the world [m/s].
         seed: of the excitation and of the sensors' noise.
     """
-    if any(isinstance(part, Rudder) for part in layout.actuators):
+    if layout.by_flow:
         raise FinlabError(
             f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a wide path, "
             "such as --trajectory circle --scale 25, and fit that log"

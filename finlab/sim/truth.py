@@ -14,11 +14,11 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.arrays import Array
+from finlab.axes import rotation
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
-from finlab.layout.directions import rotation, with_axes
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -66,7 +66,7 @@ def perturbed(
     parts = []
     for k, part in enumerate(layout.actuators):
         turn = rotation((0.0, 0.0, 1.0), askew * (-1.0) ** k)
-        parts.append(with_axes(part, np.array(part.frame) @ turn.T, np.subtract(part.position, center)))
+        parts.append(part.turned(np.array(part.frame) @ turn.T, np.subtract(part.position, center)))
     return replace(swum, actuators=tuple(parts))
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
-from finlab.layout.axes import TURN, is_full_turn
+from finlab.axes import TURN, is_full_turn
+from finlab.layout import Actuator, Layout
 from finlab.vehicle.fin_motion import FinLag
 
 AT_ONCE, UNLIMITED = 1e-9, 1e12
@@ -18,7 +18,7 @@ AT_ONCE, UNLIMITED = 1e-9, 1e12
 class FirstOrder:
     """m actuators that are no fins; commands (m, 3) are those of the layout."""
 
-    def __init__(self, actuators: Sequence[Thruster | Azimuth | Rudder]) -> None:
+    def __init__(self, actuators: Sequence[Actuator]) -> None:
         """Starts at rest: no force, angles as near to 0 as their arcs allow."""
         m = len(actuators)
         self._rate = np.minimum(np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED)
@@ -27,8 +27,8 @@ class FirstOrder:
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
-            self._time_constant[i, each.LAGS] = each.time_constant
-            if isinstance(each, Thruster):
+            self._time_constant[i, each.LAGS] = getattr(each, "time_constant", AT_ONCE)
+            if not each.TURNS:
                 continue
             low, high = each.lower[0], each.upper[0]
             self._angles[i, 0], self._circles[i, 0] = True, is_full_turn(high - low)
@@ -49,25 +49,20 @@ class FirstOrder:
         self.value = np.where(np.isnan(command), stopped, value + np.sign(error) * (size - left))
 
 
-USED = 0.2
-"""Share of its range that a command usually changes by."""
-
-
 class ActuatorMotion:
     """What the actuators of one layout do if they follow as they should; commands are (n, 3)."""
 
     def __init__(self, layout: Layout, fins: FinLag | None = None) -> None:
         """Starts at rest; `fins` follows the fins, by default without what happens within the beat."""
-        is_fin = np.array([isinstance(part, Fin) for part in layout.actuators])
-        self.of_fins, self.of_others = np.flatnonzero(is_fin), np.flatnonzero(~is_fin)
+        self.of_fins, self.of_others = np.flatnonzero(layout.is_fin), np.flatnonzero(~layout.is_fin)
         """Places of the fins and of the others."""
         self.fins = FinLag(layout) if fins is None else fins
-        self.others = FirstOrder([part for part in layout.actuators if not isinstance(part, Fin)])
+        self.others = FirstOrder([layout.actuators[i] for i in self.of_others])
         self._held = np.array([part.HELD for part in layout.actuators])
         self._places = np.arange(layout.n)
         self._working = np.ones(layout.n, bool)
         widths = (layout.upper - layout.lower)[self._places, self._held]
-        self.angles: NDArray[np.bool_] = np.array([part.type != "thruster" for part in layout.actuators])
+        self.angles: NDArray[np.bool_] = np.array([part.TURNS for part in layout.actuators])
         """Which actuators (n,) have an angle that stays where they stick."""
         self.turns_fully: NDArray[np.bool_] = self.angles & is_full_turn(widths)
         """Which actuators (n,) may come to any direction."""
@@ -124,11 +119,5 @@ class ActuatorMotion:
 
 @lru_cache(maxsize=256)
 def following_delay(layout: Layout) -> float:
-    """How late the slowest actuator of a robot is [s]: 2 / p of a fin's double pole p; of others the time
-    constant, and the time in which it comes through a fifth of its range at its rate."""
-    delays = [2.0 / layout.servo_poles.min()] if layout.n_fins else []
-    for part in layout.actuators:
-        if not isinstance(part, Fin):
-            ranges = zip(part.lower, part.upper, part.rates, strict=True)
-            delays.append(part.time_constant + max(USED * (high - low) / rate for low, high, rate in ranges))
-    return float(max(delays))
+    """How late the slowest actuator of a robot is [s]."""
+    return max(part.delay_s for part in layout.actuators)

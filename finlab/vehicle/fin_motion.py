@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from finlab.actuators.law import Blade
 from finlab.arrays import Array
+from finlab.axes import TURN, is_full_turn
 from finlab.layout import Layout
-from finlab.layout.axes import TURN, is_full_turn
 
 
 class LagStep(NamedTuple):

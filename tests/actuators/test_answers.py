@@ -6,18 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.registry import groups_of
+from finlab.actuators.azimuth import Azimuth
+from finlab.actuators.fin.fin import Fin
+from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line
-from finlab.actuators.rudder import RudderGroup, RudderLaw
-from finlab.actuators.thruster import AzimuthGroup, AzimuthLaw, ThrusterGroup, ThrusterLaw
+from finlab.actuators.rudder import Rudder, RudderGroup, RudderLaw
+from finlab.actuators.thrust_model import PowerLaw, PowerTable
+from finlab.actuators.thruster import AzimuthGroup, AzimuthLaw, Thruster, ThrusterGroup, ThrusterLaw
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
-from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
-from finlab.layout.propellers import Azimuth, Thruster
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
@@ -182,7 +181,7 @@ def test_what_a_tick_can_do_of_an_azimuth_is_a_smaller_arc() -> None:
 
 def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
     robot = Layout("robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1]))
-    found = groups_of(robot, own_effectiveness(robot))
+    found = groups_of(robot.actuators, own_effectiveness(robot))
     assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
     force = np.zeros((2, robot.n, 2))
     command = np.empty((2, robot.n, 3))

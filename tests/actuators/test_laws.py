@@ -6,16 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab.actuators.azimuth import Azimuth
+from finlab.actuators.fin.fin import Fin
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.rudder import RudderLaw
+from finlab.actuators.rudder import Rudder, RudderLaw
+from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.actuators.thrust_power import ByPower, Sides
-from finlab.actuators.thruster import AzimuthLaw, ThrusterLaw
+from finlab.actuators.thruster import AzimuthLaw, Thruster, ThrusterLaw
 from finlab.arrays import Array
-from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
-from finlab.layout.propellers import Azimuth, Thruster
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, Policy
+from finlab.axes import AXES
 from finlab.cli import main
 from finlab.errors import CommandError, LayoutError
 from finlab.layout import Layout, load_layout
-from finlab.layout.axes import AXES
 from finlab.layout.file import layout_to_dict, parse_layout
 from tests.least_power import lower_bound
 from tests.mixed_robots import layout_of

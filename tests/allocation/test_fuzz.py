@@ -46,8 +46,8 @@ def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     if len(names) > 1 and rng.random() < 0.3:
         asked["failed"] = names[: int(rng.integers(1, len(names)))]
     if rng.random() < 0.3:
-        kind = pick(rng, ("weak", "stuck", "running", "thrust"))
-        value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "thrust": 1e-3}[kind]
+        kind = pick(rng, ("weak", "stuck", "running", "torn"))
+        value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
         asked["health"] = Health.of(**{kind: {names[-1]: value}})
     return asked
 

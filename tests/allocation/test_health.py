@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.fin_model import FinModelSpec
 from finlab.allocation import Allocator, Health
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Layout, Limits, load_layout
-from finlab.layout.fin_model import FinModelSpec
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot
 

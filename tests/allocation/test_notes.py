@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.actuators.azimuth import AzimuthCommand
+from finlab.actuators.fin.fin import FinCommand
+from finlab.actuators.rudder import Rudder, RudderCommand
+from finlab.actuators.thrust_model import PowerTable
+from finlab.actuators.thruster import Thruster, ThrusterCommand
 from finlab.allocation import Allocator
 from finlab.allocation.notes import fin_notes
-from finlab.allocation.report import in_words
 from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
-from finlab.layout.commands import AzimuthCommand, FinCommand, RudderCommand, ThrusterCommand
-from finlab.layout.propellers import Thruster
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, write_table
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import FIN_ROBOTS
@@ -118,10 +118,10 @@ def test_rudders_at_rest_are_told() -> None:
 
 
 def test_commands_in_words() -> None:
-    assert in_words(FinCommand(0.5, 1.0, np.pi / 2)) == "0.500 rad, 1.000 Hz, 90.0 deg"
-    assert in_words(ThrusterCommand(10.0, 1700.0)) == "10.000 N, input 1700"
-    assert in_words(AzimuthCommand(np.pi, 10.0)) == "10.000 N at 180.0 deg"
-    assert in_words(RudderCommand(-0.5)) == "-28.6 deg"
+    assert FinCommand(0.5, 1.0, np.pi / 2).words == "0.500 rad, 1.000 Hz, 90.0 deg"
+    assert ThrusterCommand(10.0, 1700.0).words == "10.000 N, input 1700"
+    assert AzimuthCommand(np.pi, 10.0).words == "10.000 N at 180.0 deg"
+    assert RudderCommand(-0.5).words == "-28.6 deg"
 
 
 def test_tables_hold_forces_at_rest() -> None:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority, losses
+from finlab.axes import AXES
 from finlab.forces.force_sets import force_sets
 from finlab.forces.reach import weakest
 from finlab.layout import Layout
-from finlab.layout.axes import AXES
 from tests.forces.conftest import THRUST
 
 Layouts = Callable[[str], Layout]

@@ -9,9 +9,9 @@ import pytest
 from finlab.analysis import GOALS, Bounds, Progress, authority, least_power, mirror_pairs, optimize_layout
 from finlab.analysis.optimize import CHUNK
 from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
-from finlab.layout.axes import AXES as WRENCH
 
 Layouts = Callable[[str], Layout]
 

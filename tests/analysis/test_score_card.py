@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import Blade
 from finlab.analysis import authority, losses, score_card
 from finlab.analysis.score_card import least_power, quick_check
+from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
-from finlab.layout.axes import AXES
 
 Layouts = Callable[[str], Layout]
 

@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.actuators.rudder import Rudder
 from finlab.deploy import deployed_robot
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.command import main
 from finlab.deploy.deployed_robot import DeployedRobot, extremes, load_robot, parse_robot, self_check
 from finlab.errors import FinlabError
 from finlab.layout import Layout, save_layout
-from finlab.layout.rudder import Rudder
 from finlab.physics import plant_of
-from tests.any_robot import AnyRobot
+from tests.any_robot import FIN_ROBOTS, AnyRobot
 from tests.exhaustive import sampled
-from tests.fin_robots import FIN_ROBOTS
 
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 WRENCH = ["--wrench", *map(str, TARGET)]

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
-from finlab.layout.thrust_model import PowerLaw
 from tests.mixed_robots import load, random_robot
 
 D = np.sqrt(0.5)

@@ -10,12 +10,12 @@ from threadpoolctl import threadpool_info
 
 from finlab import load_layout
 from finlab.actuators.fin.fin_laws import read_table
+from finlab.actuators.fin.force_table_file import DOUBT
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit, fit_fin, summary, write_fin
 from finlab.layout import Fin, FinModelSpec, Layout
-from finlab.layout.force_table_file import DOUBT
 from finlab.physics import TableLaw
 from tests.fit.cell import commands, measured, samples, soft
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.analysis import AttainableSet, attainable_set, authority, score_card
+from finlab.axes import AXES as WRENCH
 from finlab.errors import LayoutError
 from finlab.forces.attainable import _sphere
 from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import axis_ranges, max_wrench_along_exactly
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
-from finlab.layout.axes import AXES as WRENCH
-from finlab.layout.thrust_model import PowerLaw
 from finlab.physics import Plant
 from tests.forces.conftest import THRUST
 from tests.least_power import farthest

@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 from msgspec import to_builtins
 
+from finlab.actuators.azimuth import Azimuth, AzimuthCommand, Tilt
+from finlab.actuators.fin.fin import FinCommand
+from finlab.actuators.propeller import input_of
+from finlab.actuators.rudder import Rudder, RudderCommand
+from finlab.actuators.thrust_model import PowerLaw, PowerTable
+from finlab.actuators.thruster import Thruster, ThrusterCommand
 from finlab.layout import Fin
-from finlab.layout.commands import (
-    AzimuthCommand,
-    FinCommand,
-    RudderCommand,
-    ThrusterCommand,
-    command_of,
-    input_of,
-    neutral_row,
-)
-from finlab.layout.propellers import Azimuth, Thruster, Tilt
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerLaw, PowerTable
 
 AHEAD, UP, LAW = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), PowerLaw(2.0)
 ROWS = ((1100, -40, 390), (1470, 0, 0), (1480, 0, 0), (1530, 0, 0), (1700, 10, 30), (1900, 50, 380))
@@ -32,11 +26,11 @@ RUDDER = Rudder("rudder", (-1.0, 0.0, 0.0), UP, AHEAD, 0.03, (-0.7, 0.5), 3.0)
 
 def test_each_type_has_a_command_of_its_own() -> None:
     row = np.array([0.3, 1.2, -0.5])
-    assert command_of(FIN, row) == FinCommand(0.3, 1.2, -0.5)
-    assert command_of(THRUSTER, np.array([10.0, 0.0, 0.0])) == ThrusterCommand(10.0, 1700.0)
-    assert command_of(AZIMUTH, np.array([0.3, 12.0, 0.0])) == AzimuthCommand(0.3, 12.0, None)
-    assert command_of(RUDDER, np.array([0.1, 0.0, 0.0])) == RudderCommand(0.1)
-    assert command_of(THRUSTER, np.full(3, math.nan)) is None
+    assert FIN.command(row) == FinCommand(0.3, 1.2, -0.5)
+    assert THRUSTER.command(np.array([10.0, 0.0, 0.0])) == ThrusterCommand(10.0, 1700.0)
+    assert AZIMUTH.command(np.array([0.3, 12.0, 0.0])) == AzimuthCommand(0.3, 12.0, None)
+    assert RUDDER.command(np.array([0.1, 0.0, 0.0])) == RudderCommand(0.1)
+    assert THRUSTER.command(np.full(3, math.nan)) is None
 
 
 def test_keys_of_files_carry_the_units() -> None:
@@ -74,7 +68,7 @@ def test_neutral_pushes_least_and_an_azimuth_keeps_its_angle() -> None:
         (TILT, [0.2, 3.0, 0.0]),
         (RUDDER, [0.0] * 3),
     ):
-        np.testing.assert_array_equal(neutral_row(actuator, None), row)
-    np.testing.assert_array_equal(neutral_row(AZIMUTH, np.array([1.5, 9.0, 0.0])), [1.5, 0.0, 0.0])
-    np.testing.assert_array_equal(neutral_row(AZIMUTH, np.full(3, math.nan)), [0.0] * 3)
-    np.testing.assert_array_equal(neutral_row(THRUSTER, np.array([9.0, 0.0, 0.0])), [0.0] * 3)
+        np.testing.assert_array_equal(actuator.neutral(None), row)
+    np.testing.assert_array_equal(AZIMUTH.neutral(np.array([1.5, 9.0, 0.0])), [1.5, 0.0, 0.0])
+    np.testing.assert_array_equal(AZIMUTH.neutral(np.full(3, math.nan)), [0.0] * 3)
+    np.testing.assert_array_equal(THRUSTER.neutral(np.array([9.0, 0.0, 0.0])), [0.0] * 3)

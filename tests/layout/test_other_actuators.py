@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab.actuators.kinds import KINDS
+from finlab.actuators.thrust_model import PowerTable
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
-from finlab.layout.file_form import ACTUATOR, Reader, plain
-from finlab.layout.thrust_model import PowerTable
+from finlab.layout.file_form import Reader, actuator_form, plain
 
 THRUSTER = {
     "name": "lift",
@@ -47,7 +48,7 @@ RUDDER = {
 
 
 def _read(data: Any, folder: Path | None = None) -> Any:
-    return Reader(folder).value(checked(data, ACTUATOR))
+    return Reader(folder).value(checked(data, actuator_form(tuple(KINDS.values()))))
 
 
 @pytest.mark.parametrize("data", [THRUSTER, {**THRUSTER, "model": TABLE}, AZIMUTH, TILT, RUDDER])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.errors import AllocationError, LayoutError
 from finlab.layout import (
     Fin,
@@ -23,7 +24,6 @@ from finlab.layout import (
 )
 from finlab.layout.damage import Health
 from finlab.layout.layout import MAX_ACTUATORS
-from finlab.layout.thrust_model import PowerLaw
 from finlab.physics.plant import Plant
 from tools.schemas import PACKAGE
 
@@ -250,8 +250,8 @@ def test_damage_leaves_the_other_actuators_as_they_are():
     ("damage", "why"),
     [
         ({"stuck": {"lift": 0.1}}, "'lift': thrusters may be weak or failed, got stuck"),
-        ({"weak": {"rudder": 0.5}}, "'rudder': rudders may be thrust or failed"),
-        ({"thrust": {"lift": 0.5}}, "'lift': thrusters may be weak or failed"),
+        ({"weak": {"rudder": 0.5}}, "'rudder': rudders may be torn or failed"),
+        ({"torn": {"lift": 0.5}}, "'lift': thrusters may be weak or failed"),
         ({"running": {"pod": (0.1, 1.0, 0.0)}}, "'pod': azimuths may be weak, stuck or failed"),
     ],
 )

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from finlab.assets import shipped_layouts
+from finlab.axes import is_full_turn
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.layout.axes import is_full_turn
 from finlab.mdn.training.train_mdn import first_weights
 from finlab.networks.trained import Normalization, TrainedWeights, sizes_for_file, to_command, to_normalized
 from finlab.paper.network import NetworkConfig

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.fin_laws import TableLaw
+from finlab.actuators.rudder import Rudder
+from finlab.actuators.thrust_model import PowerTable
+from finlab.actuators.thruster import Thruster
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout
-from finlab.layout.propellers import Thruster
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
 from finlab.physics.table_error import grid_uncertainty, thrust_table_error

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.layout import Azimuth, Layout, Rudder, Thruster, load_layout
-from finlab.layout.thrust_model import PowerLaw
 from finlab.vehicle.actuator_motion import ActuatorMotion, following_delay
 from finlab.vehicle.fin_motion import FinLag
 

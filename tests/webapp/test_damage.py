@@ -11,7 +11,7 @@ from finlab.hull import contradicts, displaced, estimated, hull_of
 from finlab.hull.hydrodynamics import solid_of, water_density
 from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
-from finlab.layout.damage import FAULTS, Health
+from finlab.layout.damage import Health
 from finlab.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
@@ -66,7 +66,7 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
     assert session.state.health is None
 
 
-VALUES = {"weak": 0.5, "thrust": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
+VALUES = {"weak": 0.5, "torn": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
 
 
 @pytest.mark.parametrize("robot", ["ucat", "torpedo", "catamaran", "bluerov2"])
@@ -74,7 +74,7 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
     session = Session(load_layout(robot))
     for part in session.state.layout.actuators:
         for kind, value in VALUES.items():
-            if kind in FAULTS[part.type]:
+            if kind in part.FAULTS:
                 session.damage(part.name, kind, value)
                 assert dict(getattr(session.state.health, kind))[part.name] == value
             else:

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from finlab.actuators.fin.force_table_file import write_table
 from finlab.assets import shipped_layouts
 from finlab.deploy.design_files import stored_table
 from finlab.errors import FinlabError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.force_table_file import write_table
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
 from tests.webapp.stand_in import page_of

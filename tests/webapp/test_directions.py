@@ -5,14 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from finlab.actuators.kinds import KINDS
 from finlab.arrays import Array
+from finlab.axes import rotation
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout, load_layout
-from finlab.layout.directions import direction, image, part_of, rotation
 from finlab.physics import plant_of
 from tests.webapp.test_other_robots import FISH
 from webapp.session import Session
-from webapp.session.layout_edits import NEW
 
 ROBOTS = ("ucat", "bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid")
 FLOW = np.array([1.2, 0.1, -0.2, 0.0, 0.0, 0.0])
@@ -22,7 +22,7 @@ MIRRORED = np.concatenate([POLAR, AXIAL])
 
 def wrenches(layout: Layout, names: tuple[str, ...], flow: Array) -> Array:
     """What an actuator can do at a few hundred commands, sorted so that their order does not count."""
-    plant = plant_of(Layout("part", tuple(part_of(layout, name) for name in names)))
+    plant = plant_of(Layout("part", tuple(layout.part(name) for name in names)))
     share = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
     return np.asarray(plant.wrench(plant.lower + share * plant.width, flow=flow))
 
@@ -40,7 +40,7 @@ def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None
         for name in session.state.layout.names:
             layout = session.state.layout
             session.select(name)
-            if np.linalg.norm(np.cross(axis, part_of(layout, name).position)) < 1e-3:
+            if np.linalg.norm(np.cross(axis, layout.part(name).position)) < 1e-3:
                 with pytest.raises(FinlabError, match="stands on the"):
                     session.ring(3, letter)
                 continue
@@ -58,11 +58,11 @@ def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None
 @pytest.mark.parametrize("layout", [FISH, *map(load_layout, ROBOTS)], ids=lambda layout: layout.name)
 def test_the_image_does_the_mirrored_thing(layout: Layout) -> None:
     for part in layout.actuators:
-        other = Layout("image", (image(part),))
+        other = Layout("image", (part.image(),))
         flow = FLOW * MIRRORED
         first = wrenches(layout, (part.name,), FLOW) * MIRRORED
         assert same(first, wrenches(other, (part.name,), flow)), part.name
-        again = image(image(part))
+        again = part.image().image()
         np.testing.assert_allclose(again.frame, part.frame, atol=1e-9)
         np.testing.assert_allclose([again.lower, again.upper], [part.lower, part.upper], atol=1e-9)
 
@@ -73,14 +73,14 @@ def test_a_twin_follows_in_place_and_direction() -> None:
     session.mirror()
     assert session.selected == "front_right" and session.state.layout.n == 6
     session.point("front_left", (0.0, 3.0, 4.0))
-    left, right = (part_of(session.state.layout, name) for name in ("front_left", "front_right"))
+    left, right = (session.state.layout.part(name) for name in ("front_left", "front_right"))
     assert left.frame[0] == pytest.approx((0.0, 0.6, 0.8)) and right.frame[0] == pytest.approx(
         (0.0, -0.6, 0.8)
     )
     assert session.undo() == "Point front_left"
 
 
-@pytest.mark.parametrize("kind", NEW)
+@pytest.mark.parametrize("kind", KINDS)
 def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -> None:
     session = Session(load_layout("fish"))
     session.add(kind)
@@ -89,8 +89,8 @@ def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -
     ways = [*np.eye(3), *-np.eye(3), np.array([0.3, -0.5, 0.2])]
     for way in ways + ways[::-1]:
         session.point(name, tuple(way.tolist()))
-        part = part_of(session.state.layout, name)
-        assert direction(part) == pytest.approx(tuple(way / np.linalg.norm(way)))
+        part = session.state.layout.part(name)
+        assert part.direction == pytest.approx(tuple(way / np.linalg.norm(way)))
         np.testing.assert_allclose(np.array(part.frame) @ np.array(part.frame).T, np.eye(3), atol=1e-9)
         if isinstance(part, Fin):
             assert (part.mounting_angle is not None) == (way[2] == 0.0), "horizontal ones keep their angle"
@@ -102,7 +102,7 @@ def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
     session = Session(load_layout("ucat"))
     session.add("fin")
     session.point("fin", (0.0, 0.0, 1.0))
-    tail = part_of(session.state.layout, "fin")
+    tail = session.state.layout.part("fin")
     assert tail.frame[1] == pytest.approx((1.0, 0.0, 0.0))
     session.set_value("zero_direction", (-1.0, 1.0))
     turns = [session.state.layout]
@@ -110,9 +110,9 @@ def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
         session.point("fin", way)
         turns.append(session.state.layout)
     for before, after in pairwise(turns):
-        assert part_of(after, "fin").frame[1] == pytest.approx(part_of(before, "fin").frame[1])
+        assert after.part("fin").frame[1] == pytest.approx(before.part("fin").frame[1])
     session.turn_about((0.0, 0.0, 5.0))
-    assert part_of(session.state.layout, "fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
+    assert session.state.layout.part("fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
 
 
 def test_a_drag_of_the_direction_is_one_step() -> None:

@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
+from finlab.actuators.fin.force_table_file import DOUBT, table_bytes
+from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import packed
 from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
-from finlab.layout.force_table_file import DOUBT, table_bytes
-from finlab.layout.thrust_model import PowerTable
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
 from tests.webapp.stand_in import page_of, until
@@ -241,8 +241,8 @@ def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
 
 def robot(tmp_path: Path, cache: Path) -> Layout:
     """U-CAT with one measured fin."""
+    from finlab.actuators.fin.force_table_file import write_table
     from finlab.layout import FinModelSpec
-    from finlab.layout.force_table_file import write_table
     from finlab.physics import make_law
 
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
-from finlab.layout.thrust_model import PowerLaw
 from tests.webapp.test_faults import Tab
 from tests.webapp.test_faults_in_handlers import handles, use
 from webapp.markup.answer import fin_table

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import viser
 
+from finlab.actuators.fin.force_table_file import write_table
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.exchange import Exchange
@@ -20,7 +21,6 @@ from finlab.exchange.convert import WRITERS
 from finlab.files.plain_values import yaml_text
 from finlab.hull import hull_of
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.force_table_file import write_table
 from finlab.physics import make_law
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.panels.frame import View

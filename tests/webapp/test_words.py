@@ -12,9 +12,9 @@ from finlab.allocation import Allocation, Allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
+from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
-from finlab.layout.axes import AXES
 from finlab.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings

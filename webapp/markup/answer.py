@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
-from finlab.layout import Actuator, Fin, Layout, Thruster
+from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import Health
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
@@ -128,8 +128,8 @@ def _cells(
     meter = html("<span class='meter'><i style='{}'></i></span>", bar)
     at_limit = ["full" if one else "" for one in limits]
     if not isinstance(part, Fin):
-        along = command[0] if isinstance(part, Thruster) else force
-        remark = part.type if isinstance(part, Thruster) else f"{part.type}, {_degrees(command[0])}°"
+        along = force if part.TURNS else command[0]
+        remark = f"{part.type}, {_degrees(command[part.HELD])}°" if part.TURNS else part.type
         words = html("<td colspan='3' class='words'>{}</td>", remark)
         cell = html(
             "<td class='{}'>{}</td>",

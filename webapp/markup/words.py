@@ -7,9 +7,10 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.layout import Azimuth, Fin, Layout
+from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.righting import righting_words
@@ -168,17 +169,13 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
 
 
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
-    """Which numbers of commands (n, 2) are at their limits: amplitude and frequency of a fin at the upper
-    ones, force of a thruster or azimuth and deflection of a rudder at either."""
+    """Which of the first two numbers of commands (n, 2) are at their limits, but for free angles."""
     layout, command = allocation.layout, allocation.command[:, :2]
-    of_fins = np.array([isinstance(part, Fin) for part in layout.actuators])[:, None]
-    turns = np.array(
-        [[False, False] if not isinstance(part, Azimuth) else [True, False] for part in layout.actuators]
-    )
+    turns = free_angles(layout.actuators)[:, :2]
     with np.errstate(invalid="ignore"):
         high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
         low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
-    return np.asarray((high | (low & ~of_fins)) & ~turns)
+    return np.asarray((high | low) & ~turns)
 
 
 def parts_word(layout: Layout) -> str:
@@ -191,7 +188,7 @@ def damage_words(health: Health | None, name: str) -> str:
     if health is None:
         return ""
     parts = [f"weak {100 * share:.0f} %" for other, share in health.weak if other == name]
-    parts += [f"torn, {100 * share:.0f} % left" for other, share in health.thrust if other == name]
+    parts += [f"torn, {100 * share:.0f} % left" for other, share in health.torn if other == name]
     parts += [f"stuck at {math.degrees(angle):.0f}°" for other, angle in health.stuck if other == name]
     parts += ["runs on" for other, _ in health.running if other == name]
     return ", ".join(parts).replace("-", "−")

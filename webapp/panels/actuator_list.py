@@ -6,15 +6,14 @@ from functools import partial
 
 from markupsafe import Markup
 
+from finlab.actuators.kinds import KINDS
 from finlab.layout import Actuator
-from finlab.layout.directions import direction
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import swatch
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.session.actuator_edits import partner
-from webapp.session.layout_edits import NEW
 from webapp.session.state import State
 
 HULL = Markup(
@@ -39,7 +38,7 @@ def add_actuator_list(page: Page) -> None:
     page.add_html(actuator_list)
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _held: session.select(None))
-    adds = {kind.capitalize(): partial(session.add, kind) for kind in NEW}
+    adds = {kind.capitalize(): partial(session.add, kind) for kind in KINDS}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
         "Mirror": session.mirror,
@@ -111,7 +110,7 @@ def _row(state: State, index: int, chosen: bool, mixed: bool) -> str:
 
 def points_words(part: Actuator) -> str:
     """Where an actuator points, in degrees: `60`, `60 ↑30`, `up`."""
-    x, y, z = direction(part)
+    x, y, z = part.direction
     turn, rise = math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
     if abs(rise) > 90.0 - LEVEL:
         return "up" if rise > 0.0 else "down"

@@ -9,17 +9,15 @@ import numpy as np
 import viser
 
 from finlab.actuators.fin.fin_laws import TableLaw
+from finlab.actuators.fin.force_table_file import DOUBT
+from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
-from finlab.layout import Actuator, Fin, Layout, Rudder
-from finlab.layout.directions import part_of
-from finlab.layout.force_table_file import DOUBT
-from finlab.layout.thrust_model import PowerTable
+from finlab.layout import Actuator, Fin, Layout
 from finlab.physics import make_law, plant_of
 from webapp.markup.plot import Plot, exact_axis, positive
 from webapp.markup.words import degrees, html
 from webapp.page import Page
-from webapp.session.actuator_edits import FORMULAS
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 from webapp.theme import BLUE, GREEN, ORANGE
 
@@ -43,7 +41,7 @@ NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 
 def part_shown(selected: str | None, layout: Layout) -> Actuator:
     """The actuator that was selected last; a nominal fin where none is."""
-    return NOMINAL if selected is None else part_of(layout, selected)
+    return NOMINAL if selected is None else layout.part(selected)
 
 
 def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
@@ -51,17 +49,11 @@ def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], 
     return lambda selected, layout: value(part_shown(selected, layout))
 
 
-def kind_of(part: Actuator) -> str:
-    """The kind of an actuator's model."""
-    return "foil" if isinstance(part, Rudder) else part.model.type
-
-
 def add_model(page: Page) -> None:
     """The choice of a formula, and what is said of it."""
 
     def options(part: Actuator) -> tuple[str, ...]:
-        formulas = FORMULAS if isinstance(part, Fin) else () if isinstance(part, Rudder) else ("power_law",)
-        return formulas if kind_of(part) in formulas else (*formulas, kind_of(part))
+        return tuple(dict.fromkeys((*part.MODELS, part.model_type)))
 
     def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
         part = part_shown(selected, layout)
@@ -69,9 +61,11 @@ def add_model(page: Page) -> None:
         return model_card(part, doubts=not reported)
 
     about = "The formula that gives force and power; a table comes from a file, below."
-    kinds = page.board.show(page.gui.add_dropdown("Model", FORMULAS, hint=about), options=of_part(options))
+    kinds = page.board.show(
+        page.gui.add_dropdown("Model", NOMINAL.MODELS, hint=about), options=of_part(options)
+    )
     page.board.show(kinds, visible=of_part(lambda part: len(options(part)) > 1))
-    page.bind(kinds, page.session.choose_model, of_part(kind_of))
+    page.bind(kinds, page.session.choose_model, of_part(lambda part: part.model_type))
     page.add_html(words)
 
 
@@ -97,7 +91,7 @@ def add_fit(page: Page) -> None:
             hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
         )
     board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
-    board.show(full, visible=of_part(lambda part: not isinstance(part, Rudder)))
+    board.show(full, visible=of_part(lambda part: hasattr(part, "model")))
     bar = gui.add_progress_bar(100.0, animated=True, visible=False)
     hint = "The actuator stays as it is."
     cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)
@@ -126,11 +120,12 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
     """The model of an actuator; without `doubts` where they stand elsewhere already."""
     if isinstance(part, Fin) and part.model.type == "table":
         return html("<div class='fl'>{}</div>", _table_words(part, doubts))
-    if not isinstance(part, Fin | Rudder) and isinstance(part.model, PowerTable):
-        (first, *_), (last, *_) = part.model.rows[0], part.model.rows[-1]
+    model = getattr(part, "model", None)
+    if isinstance(model, PowerTable):
+        (first, *_), (last, *_) = model.rows[0], model.rows[-1]
         said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
-        return html(f"<div class='fl dim'>{said}</div>", len(part.model.rows), first, last, part.model.unit)
-    said = LAWS[kind_of(part)]
+        return html(f"<div class='fl dim'>{said}</div>", len(model.rows), first, last, model.unit)
+    said = LAWS.get(part.model_type, f"a law of its own kind, {part.type}")
     return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
 
 
@@ -200,8 +195,8 @@ def curves(part: Actuator) -> Sequence[Curves]:
         names = [f"A {degrees(size)}°" for size in amplitude]
         kinds = (("mean force [N]", force), ("power [W]", plant.power(command)[..., 0]))
         return [Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True))) for up, y in kinds]
-    if isinstance(part, Rudder):
-        across = np.linspace(*part.deflection, POINTS)
+    if part.BY_FLOW:
+        across = np.linspace(part.lower[0], part.upper[0], POINTS)
         command = np.zeros((POINTS, 1, 3))
         command[:, 0, 0] = across
         flow = np.zeros(6)
@@ -210,12 +205,15 @@ def curves(part: Actuator) -> Sequence[Curves]:
         force = at_origin.force(command, flow=flow)[:, 0]
         lines = ("lift", force[:, 2]), ("drag", -force[:, 1])
         return [Curves("deflection [°], water at 1 m/s", np.degrees(across), "force [N]", lines)]
-    if isinstance(part.model, PowerTable):
-        across, force, power = part.model.columns
-        word = f"command [{part.model.unit}]" if part.model.unit else "command"
+    model = getattr(part, "model", None)
+    if isinstance(model, PowerTable):
+        across, force, power = model.columns
+        word = f"command [{model.unit}]" if model.unit else "command"
         pairs = (("force [N]", force), ("power [W]", power))
         return [Curves(word, across, up, (("", y),)) for up, y in pairs]
-    across = np.linspace(*part.force, POINTS)
+    if part.THRUST is None:
+        return []
+    across = np.linspace(part.lower[part.THRUST], part.upper[part.THRUST], POINTS)
     command = np.zeros((POINTS, 1, 3))
-    command[:, 0, part.LIMITS.index("force")] = across
+    command[:, 0, part.THRUST] = across
     return [Curves("force [N]", across, "power [W]", (("", plant.power(command)[:, 0]),))]

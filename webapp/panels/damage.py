@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import FAULTS, Health
-from finlab.layout.directions import part_of
+from finlab.layout import Actuator, Layout
+from finlab.layout.damage import Health
 from webapp.handles import numbered
 from webapp.markup.words import button_colors
 from webapp.page import Page
@@ -77,7 +76,7 @@ def add_damage(page: Page) -> None:
         damage(kind, percent / 100.0)
 
     def jam(stuck: bool) -> None:
-        angle = at_now()[2 if isinstance(part(), Fin) else 0]
+        angle = at_now()[part().HELD]
         damage("stuck", math.remainder(float(angle), math.tau) if stuck else None)
 
     def run_on(running: bool) -> None:
@@ -91,7 +90,7 @@ def add_damage(page: Page) -> None:
     page.bind(parts, session.select, lambda selected, layout: _part(selected, layout).name)
     shares = {
         "weak": ("Strength [%]", "What is left of its limits: a worn motor gives less at most."),
-        "thrust": ("Force left [%]", "A torn fin or foil gives less at every command."),
+        "torn": ("Force left [%]", "A torn fin or foil gives less at every command."),
     }
     least = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in shares.items():
@@ -124,16 +123,14 @@ def add_damage(page: Page) -> None:
 
 
 def _part(selected: str | None, layout: Layout) -> Actuator:
-    return part_of(layout, selected or layout.names[0])
+    return layout.part(selected or layout.names[0])
 
 
 def _may(kind: str) -> Callable[[str | None, Layout], bool]:
     """Whether the actuator may have a fault of a kind; the thrust of a table cannot be scaled."""
 
     def may(selected: str | None, layout: Layout) -> bool:
-        part = _part(selected, layout)
-        table = isinstance(part, Fin) and part.model.type == "table"
-        return kind in FAULTS[part.type] and not (table and kind == "thrust")
+        return kind in _part(selected, layout).takes
 
     return may
 

@@ -71,7 +71,7 @@ def command_line(state: State) -> str:
     health = state.health or Health()
     for name, share in health.weak:
         words += ["--health", f"{name}={share:g}"]
-    for name, share in health.thrust:
+    for name, share in health.torn:
         words += ["--torn", f"{name}={share:g}"]
     for name, angle in health.stuck:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]

@@ -102,7 +102,7 @@ def _switch(axis: int, counts: bool) -> str:
 
 
 def _at_rest(layout: Layout, flow: Flow | None) -> str:
-    rudders = [part.name for part in layout.actuators if part.type == "rudder"]
+    rudders = layout.by_flow
     if flow is not None or not rudders:
         return ""
     said = f"{listed(rudders)} give{'s' * (len(rudders) == 1)} nothing: no water flows past at rest"

@@ -1,6 +1,6 @@
 """One actuator in the scene: its gizmo, and under it what moves, what holds it, its sweep and its force.
 
-A fin beats, a rudder is deflected, a propeller spins, a pod turns as well; `frames.js` moves them.
+A fin beats, a foil is deflected, a propeller spins, a pod turns as well; `frames.js` moves them.
 """
 
 import math
@@ -14,7 +14,7 @@ from viser.transforms import SO3
 from finlab.arrays import Array
 from finlab.hull import Surface
 from finlab.hull.shapes import Mesh
-from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
+from finlab.layout import Actuator
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
@@ -46,36 +46,34 @@ class Motion(NamedTuple):
 
 def motion(part: Actuator, command: Array | None) -> Motion:
     """How an actuator moves with a command (3,), and how it hangs where that is None."""
-    along = int(isinstance(part, Azimuth))
+    along = int(part.LOOKS == "pod")
     if command is None:
         _, across, third = part.frame
-        limp = math.atan2(third[2], across[2]) if isinstance(part, Fin) else 0.0
+        limp = math.atan2(third[2], across[2]) if part.LOOKS == "fin" else 0.0
         return Motion(angle=limp, along=along)  # the blade hangs as far down as it can
-    if isinstance(part, Fin):
+    if part.LOOKS == "fin":
         return Motion(*command.tolist())
-    if isinstance(part, Rudder):
-        return Motion(angle=float(command[0]))
-    force = float(command[along])
-    most = part.force[1] if force >= 0.0 else -part.force[0]
+    angle = float(command[part.HELD]) if part.TURNS else 0.0
+    if part.THRUST is None:
+        return Motion(angle=angle)
+    force = float(command[part.THRUST])
+    most = part.upper[part.THRUST] if force >= 0.0 else -part.lower[part.THRUST]
     # Thrust grows with the square of the speed.
     turns = math.copysign(TURNS_PER_S * math.sqrt(min(abs(force) / most, 1.0)), force) if force else 0.0
-    return Motion(angle=along * float(command[0]), turns=turns, along=along)
+    return Motion(angle=angle, turns=turns, along=along)
 
 
-def _moving(kind: type[Actuator], slenderness: float) -> Mesh:
+def _moving(looks: str, slenderness: float) -> Mesh:
     """What of an actuator turns about its first axis, in its own frame."""
-    if issubclass(kind, Rudder):
+    if looks == "foil":
         return shapes.foil(slenderness)
-    return shapes.blade() if issubclass(kind, Fin) else shapes.duct(int(issubclass(kind, Azimuth)))
+    return shapes.blade() if looks == "fin" else shapes.duct(int(looks == "pod"))
 
 
-def _mount(kind: type[Actuator], up: bool) -> Mesh:
+def _mount(looks: str, up: bool) -> Mesh:
     """What of an actuator stands still, in its own frame."""
-    if issubclass(kind, Thruster):
-        return NOTHING
-    if issubclass(kind, Azimuth):
-        return shapes.column(up)
-    return shapes.stock() if issubclass(kind, Rudder) else shapes.shaft()
+    fixed = {"thruster": NOTHING, "foil": shapes.stock(), "fin": shapes.shaft()}
+    return shapes.column(up) if looks == "pod" else fixed[looks]
 
 
 def _propeller(along: int) -> Mesh:
@@ -84,10 +82,11 @@ def _propeller(along: int) -> Mesh:
 
 def shape_of(part: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
-    if not isinstance(part, Rudder):
+    ratio, area = part.value("aspect_ratio"), part.value("area")
+    if part.LOOKS != "foil" or ratio is None or area is None:
         return 1.0, size
-    ratio = min(max(part.aspect_ratio, 0.5), 8.0) / 2.0
-    span = math.sqrt(ratio * part.area)
+    ratio = min(max(ratio, 0.5), 8.0) / 2.0
+    span = math.sqrt(ratio * area)
     return round(ratio, 3), min(max(span, 0.05 * size), 0.3 * size)
 
 
@@ -155,11 +154,11 @@ class ActuatorNode:
         its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that holds it."""
         frame, place, (size, arrows) = np.array(part.frame), np.array(part.position), sizes
         slenderness, scale = shape_of(part, size)
-        is_fin, is_pod = isinstance(part, Fin), isinstance(part, Azimuth)
+        is_fin, is_pod = part.LOOKS == "fin", part.LOOKS == "pod"
         inward = hull.anchor(place) - place
-        self._moving.show(_moving, type(part), slenderness)
-        self._mount.show(_mount, type(part), bool(inward @ frame[0] >= 0.0))
-        self._spinning.show(_propeller, -1 if isinstance(part, (Fin, Rudder)) else int(is_pod))
+        self._moving.show(_moving, part.LOOKS, slenderness)
+        self._mount.show(_mount, part.LOOKS, bool(inward @ frame[0] >= 0.0))
+        self._spinning.show(_propeller, int(is_pod) if is_pod or part.LOOKS == "thruster" else -1)
         for shape in (self._moving, self._spinning, self._mount):
             put(shape.node, scale=scale)
         put(self._fan.node, scale=size)
@@ -205,7 +204,7 @@ def moved_parts(parts: tuple[Actuator, ...], size: float) -> Mesh:
     meshes = []
     for part in parts:
         slenderness, scale = shape_of(part, size)
-        for mesh in (_moving(type(part), slenderness), _mount(type(part), True)):
+        for mesh in (_moving(part.LOOKS, slenderness), _mount(part.LOOKS, True)):
             meshes.append(
                 Mesh(scale * mesh.vertices @ np.array(part.frame) + np.array(part.position), mesh.faces)
             )

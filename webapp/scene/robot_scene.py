@@ -13,7 +13,6 @@ from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Health
-from finlab.layout.directions import direction
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
@@ -146,7 +145,7 @@ class RobotScene:
         else:
             index = drawn.index(edited)
             part, color = drawn.actuators[index], fin_color(index)
-            self._direction.show(np.array(part.position), np.array(direction(part)), sizes[1], color)
+            self._direction.show(np.array(part.position), np.array(part.direction), sizes[1], color)
 
     def _push(
         self,

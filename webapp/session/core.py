@@ -7,17 +7,15 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.policy import AXES
+from finlab.axes import axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.axes import axes_in
-from finlab.layout.damage import FAULTS
-from finlab.layout.directions import part_of
 from webapp.session.looking import DRAWERS, TASKS, Desk, Display, SearchRequest
 from webapp.session.state import LEAST, MAX_SPEED, History, State, Steps, chosen, number
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST, PRESETS
 
-FAULT_VERBS = {"weak": "Weaken", "thrust": "Tear", "stuck": "Jam", "running": "Let run"}
+FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let run"}
 
 
 class Core:
@@ -178,7 +176,7 @@ class Core:
     def mend(self, name: str) -> None:
         """An actuator is whole again."""
         state = self.state
-        for kind in FAULTS[part_of(state.layout, name).type]:
+        for kind in state.layout.part(name).FAULTS:
             state = state.with_fault(name, kind, None)
         self._commit(f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state)
 

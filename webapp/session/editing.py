@@ -5,11 +5,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from finlab.actuators.actuator import key_words
+from finlab.axes import Vector
 from finlab.errors import FinlabError
 from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
-from finlab.layout.directions import Vector, part_of, replaced, turned_about
 from webapp.session import actuator_edits, layout_edits
 from webapp.session.actuator_edits import followed, partner, unlinked
 from webapp.session.core import Core
@@ -77,7 +78,7 @@ class Session(Core):
     def set_dynamics(self, key: str, value: Any) -> None:
         """Another field of the body, one of `DYNAMICS`; None forgets it."""
         changed = layout_edits.with_dynamics(self.state.layout, **{key: value})
-        word = actuator_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
+        word = key_words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
         self._edit(f"{word} of the robot", changed)
 
     def forget_dynamics(self) -> None:
@@ -163,11 +164,11 @@ class Session(Core):
     def place_selected(self, position: Vector) -> None:
         """The selected actuator at another place [m]; others that are selected take what has changed."""
         names = self._chosen()
-        before = part_of(self.state.layout, names[-1]).position
+        before = self.state.layout.part(names[-1]).position
         changed = [abs(new - old) > layout_edits.UNTOUCHED for new, old in zip(position, before, strict=True)]
 
         def placed(layout: Layout, name: str) -> Layout:
-            own = part_of(layout, name).position
+            own = layout.part(name).position
             x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
             return layout_edits.moved(layout, name, (x, y, z))
 
@@ -175,7 +176,7 @@ class Session(Core):
 
     def turn_selected(self, angle: float) -> None:
         """All selected fins with one mounting angle [rad]; actuators without one stay."""
-        parts = [part_of(self.state.layout, name) for name in self._chosen()]
+        parts = [self.state.layout.part(name) for name in self._chosen()]
         names = tuple(part.name for part in parts if getattr(part, "mounting_angle", None) is not None)
         self._for_each("Turn", names, partial(layout_edits.turned, angle=angle), f"turn {names}")
 
@@ -186,12 +187,12 @@ class Session(Core):
         self._for_each("Point", names, pointed, f"point {names}")
 
     def turn_about(self, direction: Vector) -> None:
-        """Another second axis of all selected actuators that have one, see `turned_about`."""
-        self._change("Turn", lambda part: turned_about(part, direction))
+        """Another second axis of all selected actuators that have one, see `Actuator.turned_about`."""
+        self._change("Turn", lambda part: part.turned_about(direction))
 
     def set_value(self, key: str, value: Any) -> None:
         """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""
-        what = f"{actuator_edits.words(key)} of"
+        what = f"{key_words(key)} of"
         self._change(what, lambda part: actuator_edits.with_value(part, key, value))
 
     def choose_model(self, kind: str) -> None:
@@ -223,7 +224,7 @@ class Session(Core):
 
     def _change(self, what: str, change: Callable[[Actuator], Actuator]) -> None:
         def changed(layout: Layout, name: str) -> Layout:
-            return replaced(layout, change(part_of(layout, name)))
+            return layout.with_part(change(layout.part(name)))
 
         self._for_each(what, self._chosen(), changed)
 

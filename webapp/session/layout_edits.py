@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.kinds import KINDS
 from finlab.analysis.moves import is_mirrored
+from finlab.arrays import Array
+from finlab.axes import Vector, rotation, wrapped
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
-from finlab.layout import Actuator, Azimuth, Body, Fin, Layout, Rudder, Thruster, Tilt
-from finlab.layout.axes import wrapped
+from finlab.layout import Actuator, Body, Fin, Layout
 from finlab.layout.body import HULL_SHAPES, Hull
-from finlab.layout.directions import Vector, facing, image, part_of, replaced, rotated
 from finlab.layout.layout import MAX_ACTUATORS
-from finlab.layout.thrust_model import PowerLaw
 from webapp.session.state import chosen, number, numbers
 
 UNTOUCHED = 1e-6
@@ -31,22 +31,6 @@ ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
 STAND_OFF = 0.02
 """Distance of a new actuator from the hull: room for the servo [m]."""
 
-AT, AHEAD, UP = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-TURNS: dict[str, Any] = {"turn_axis": UP, "zero": AHEAD, "turn_rate": math.radians(120)}
-NEW: dict[str, Actuator] = {
-    "fin": Fin("fin", AT, 0.0),
-    "thruster": Thruster("thruster", AT, AHEAD, (-39.91, 51.44), PowerLaw(0.997, 1.449)),
-    "azimuth": Azimuth("azimuth", AT, force=(0.0, 51.44), model=PowerLaw(0.997), **TURNS),
-    "tilt": Tilt(
-        "tilt", AT, force=(0.0, 51.44), model=PowerLaw(0.997), arc=(-math.pi / 3, math.pi / 3), **TURNS
-    ),
-    "rudder": Rudder(
-        "rudder", AT, UP, AHEAD, area=0.00665, deflection=(-math.pi / 6, math.pi / 6), aspect_ratio=2.21
-    ),
-}
-"""What is added, by type: U-CAT's fin; a T200 of Blue Robotics at 16 V, as shipped layouts have it, fixed or
-on a pod; a tail fin of REMUS 100."""
-
 DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 
 
@@ -59,7 +43,7 @@ def moved(layout: Layout, name: str, position: Vector) -> Layout:
 def turned(layout: Layout, name: str, angle: float) -> Layout:
     """A fin with a horizontal shaft, with another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    part = part_of(layout, name)
+    part = layout.part(name)
     if not isinstance(part, Fin) or part.mounting_angle is None:
         raise FinlabError(f"{name} has no mounting angle; give a direction")
     same = abs(math.remainder(checked - part.mounting_angle, math.tau)) <= UNTOUCHED
@@ -67,9 +51,9 @@ def turned(layout: Layout, name: str, angle: float) -> Layout:
 
 
 def pointed(layout: Layout, name: str, direction: Vector) -> Layout:
-    """An actuator along a direction of any length, see `facing`."""
+    """An actuator along a direction of any length, see `Actuator.facing`."""
     x, y, z = (number(v, f"direction of {name}", -1e6, 1e6) for v in direction)
-    return replaced(layout, facing(part_of(layout, name), (x, y, z)))
+    return layout.with_part(layout.part(name).facing((x, y, z)))
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:
@@ -83,29 +67,35 @@ def keeping_hull(before: Layout, after: Layout) -> Layout:
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with an actuator's image on the other side of the robot, and the image's name. One that
     already stands there is taken for the image, and nothing is added."""
-    part = part_of(layout, name)
+    part = layout.part(name)
     if abs(part.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
     others = (other for other in layout.actuators if other.name != name)
     there = next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)
-    return (layout, there) if there is not None else _added(layout, image(part), _mirror_name(name))
+    return (layout, there) if there is not None else _added(layout, part.image(), _mirror_name(name))
 
 
 def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     """The layout with copies of an actuator, so that `count` of them stand evenly around a body axis.
     FinlabError: the actuator stands on the axis, or there is no such axis."""
-    part, axis = part_of(layout, name), np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
+    part, axis = layout.part(name), np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
         raise FinlabError(f"{name} stands on the {around} axis, so its copies would all be in one place")
     all_of_them = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
     for k in range(1, all_of_them):
-        layout, _ = _added(layout, rotated(part, axis, math.tau * k / all_of_them), name)
+        layout, _ = _added(layout, _rotated(part, axis, math.tau * k / all_of_them), name)
     return layout
+
+
+def _rotated(part: Actuator, axis: Array, angle: float) -> Actuator:
+    """The actuator turned about an axis (3,) of the body by an angle [rad], place and own axes alike."""
+    turn = rotation(axis, angle)
+    return part.turned(np.array(part.frame) @ turn.T, turn @ np.array(part.position))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with a copy of an actuator above it, 5 cm or the first place that is free, and its name."""
-    part = part_of(layout, name)
+    part = layout.part(name)
     x, y, z = part.position
     places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_ACTUATORS + 1))
     return _added(
@@ -116,7 +106,7 @@ def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
 def added(layout: Layout, kind: str) -> tuple[Layout, str]:
     """The layout with one more actuator on the hull, and its name: at the stern, or where there is room. A
     fin's shaft points away from the hull; the others push or steer ahead."""
-    part = NEW[chosen(kind, "actuator", NEW)]
+    part: Actuator = KINDS[chosen(kind, "actuator", KINDS)].sample()
     hull = hull_of(layout)
     far = 4.0 * max(hull.half)
     for clear in (CLEAR, STEP_UP, 0.0):

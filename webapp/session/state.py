@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
+from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
 from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import FAULTS, Health
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.layout.damage import Health
 from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
 
@@ -88,9 +88,9 @@ class State:
         return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
 
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
-        """An actuator with a fault of its type, see `FAULTS`; None, and a share of 1, mend that."""
+        """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend that."""
         part = self.layout.actuators[self.layout.index(name)]
-        chosen(kind, f"fault of {name}, a {part.type}", FAULTS[part.type])
+        chosen(kind, f"fault of {name}, a {part.type}", part.FAULTS)
         checked = None if value is None else _checked_fault(name, kind, value)
         held = ("stuck", "running")  # one that runs on is not stuck as well
         out = held if kind in held and checked is not None else (kind,)
@@ -140,7 +140,7 @@ class State:
 
 
 def _checked_fault(name: str, kind: str, value: Any) -> Any:
-    if kind in ("weak", "thrust"):
+    if kind in ("weak", "torn"):
         share = number(value, f"share left of {name}", *STRENGTH_RANGE)
         return None if share == 1.0 else share
     if kind == "stuck":

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from finlab.actuators.fin.fin_laws import read_table
+from finlab.actuators.thrust_model import PowerTable
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker
-from finlab.layout import Actuator, Fin, Rudder, Thruster
-from finlab.layout.directions import part_of
-from finlab.layout.thrust_model import PowerTable
+from finlab.layout import Actuator, Fin
 from webapp.session.files import table_folder
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
@@ -57,7 +56,7 @@ class Fitting(Newest[Upload, Fitted]):
 
     def start(self, actuator: str, name: str, content: bytes) -> None:
         """Begin with a file for an actuator. FinlabError: another file is under way, the file is too large,
-        or it is for a rudder."""
+        or its kind has no table."""
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
         short = re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
@@ -66,9 +65,9 @@ class Fitting(Newest[Upload, Fitted]):
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter "
                 "series, write cycle means, or use `finlab fit fin`"
             )
-        part = part_of(self._context.session.state.layout, actuator)
-        if isinstance(part, Rudder):
-            raise FinlabError(f"{actuator} is a rudder, without a table; type its coefficients")
+        part = self._context.session.state.layout.part(actuator)
+        if not part.MODELS:
+            raise FinlabError(f"{actuator} is a {part.type}, without a table; type its coefficients")
         self.forget()
         self.progress = "reading the file"
         self.ask(Upload(part, short, content))
@@ -96,7 +95,7 @@ class Fitting(Newest[Upload, Fitted]):
     def _take_over(self, fitted: Fitted) -> None:
         upload, session = fitted.upload, self._context.session
         name, layout = upload.part.name, session.state.layout
-        if name not in layout.names or _model(part_of(layout, name)) != _model(upload.part):
+        if name not in layout.names or _model(layout.part(name)) != _model(upload.part):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
         session.set_model([name], **fitted.found)
@@ -146,7 +145,7 @@ def _bench(path: Path, done: Upload) -> Fitted:
         least, most = table.rows[0][1], table.rows[-1][1]
         return {
             "model": table,
-            "force": (least if isinstance(done.part, Thruster) else max(least, 0.0), most),
+            "force": (max(least, 0.0) if done.part.TURNS else least, most),
         }
 
     with suppress(LayoutError):

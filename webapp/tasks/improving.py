@@ -12,8 +12,7 @@ from finlab.analysis import Bounds, Improvement, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
-from finlab.layout import Fin, Layout
-from finlab.layout.directions import replaced
+from finlab.layout import Layout
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
 from webapp.session.looking import GOAL_WORDS, SearchRequest
 from webapp.session.state import State
@@ -39,7 +38,7 @@ class Room:
         """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
         `apart` [m]; what is closer already, or overlaps, need not part, but comes no closer."""
         self._hull = hull_of(layout).coarse()
-        fins = np.array([isinstance(part, Fin) for part in layout.actuators])
+        fins = layout.is_fin
         self._along = np.where(fins[:, None], ALONG, 0.0)
         self._radius = np.where(fins, CHORD, PROPELLER)
         here = layout.position[None], layout.frames[None]
@@ -117,5 +116,5 @@ class Improver(Newest[Search, Improvement]):
             cancelled=search.stop.is_set,
         )
         for part in improvement.layout.actuators:
-            layout = replaced(layout, part)
+            layout = layout.with_part(part)
         return replace(improvement, layout=layout)

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.fin_model import FinModelSpec
+from finlab.actuators.fin.force_table_file import read_force_table
 from finlab.actuators.fin.formulas import Drag, Lighthill, Soft
 from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.arrays import Array, Values, library_of
 from finlab.bundle_files import archive_around
-from finlab.layout.fin_model import FinModelSpec
-from finlab.layout.force_table_file import read_force_table
-from finlab.layout.layout import Layout
 
 
 class GridLaw(FinLaw):
@@ -98,7 +97,7 @@ def make_law(spec: FinModelSpec) -> FinLaw:
     """Returns the law of one fin model; a `DataError` where it is a table whose file is missing or wrong."""
     values: dict[str, Any] = spec.values()
     if spec.type == "table":
-        return _table(values["path"], file_stamp(spec))
+        return _table(values["path"], file_stamp(values["path"]))
     return PLANAR_LAWS[spec.type](**values)
 
 
@@ -128,21 +127,15 @@ def _together(specs: list[FinModelSpec], laws: list[FinLaw]) -> FinLaw:
     return PLANAR_LAWS[specs[0].type](**{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
-def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
-    """Returns time and size of the file that a model reads, None where it reads none."""
-    if spec.type != "table":
+def file_stamp(path: str | None) -> tuple[int, int] | None:
+    """Returns time and size of a file that a law reads, None where it reads none."""
+    if path is None:
         return None
-    path = str(spec.values()["path"])
     try:
         result = os.stat(archive_around(path) or path)
     except (OSError, ValueError):
         return 0, 0
     return result.st_mtime_ns, result.st_size
-
-
-def file_stamps(layout: Layout) -> tuple[tuple[int, int] | None, ...]:
-    """Returns the stamps of all fins of a layout, for what is kept of it until one of its files changes."""
-    return tuple([file_stamp(fin.model) for fin in layout.fins])
 
 
 def read_table(path: str | os.PathLike[str]) -> TableLaw:

@@ -8,17 +8,17 @@ force that the same cost gives in each direction.
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
+from finlab.actuators.fin.fin_model import FinModelSpec, Limits
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
+from finlab.axes import TURN, is_full_turn, wrapped
 from finlab.errors import DataError
-from finlab.layout import Fin, FinModelSpec, Limits
-from finlab.layout.axes import TURN, is_full_turn, wrapped
 from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
 GRID = 17, 33
@@ -59,7 +59,7 @@ class FinTable(NamedTuple):
 class FinGroup(Group):
     """The fins of a robot."""
 
-    def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
+    def __init__(self, fins: Sequence[Any], effectiveness: Array) -> None:
         """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
         a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
@@ -143,9 +143,9 @@ class FinGroup(Group):
         return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
-def fin_table(fin: Fin) -> FinTable:
+def fin_table(fin: Any) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
-    result = _compiled(fin.model, fin.limits, file_stamp(fin.model))
+    result = _compiled(fin.model, fin.limits, file_stamp(fin.reads))
     if result is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "

@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
-from finlab.layout.axes import TURN
+from finlab.axes import TURN
 
 ROUNDING = 1e-12
 """How far [rad, Hz, rad] outside a grid a value may lie that is meant to be at its edge."""

@@ -24,8 +24,8 @@ from finlab.allocation.dual.answers import Answers
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.assets import install
+from finlab.axes import TURN
 from finlab.errors import AllocationError
-from finlab.layout.axes import TURN
 
 LEVELS = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 65)) ** 4
 """Shares of the range of sizes at which a cost is looked up: dense at both ends, where costs bend."""

@@ -10,14 +10,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from finlab.actuators.registry import groups_of
+from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Line, Plane, Response
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout.axes import wrapped
+from finlab.axes import wrapped
 from finlab.physics import Plant, plant_of
 from finlab.physics.objective import Name, cost_meter
 
@@ -38,7 +38,7 @@ class PseudoInverse:
         self.plant, inflow = plant, plant.inflow(None)
         self.groups = [
             (places, group.at(None if inflow is None else inflow[places]))
-            for places, group in groups_of(plant.layout, plant.effectiveness)
+            for places, group in groups_of(plant.layout.actuators, plant.effectiveness)
         ]
         """What the actuators can do, and by which commands."""
         self.places = sorted(

@@ -16,7 +16,7 @@ from finlab.allocation.dual.newton import Deadline, Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.layout.axes import wrapped
+from finlab.axes import wrapped
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48

@@ -4,7 +4,7 @@ from copy import copy
 
 import numpy as np
 
-from finlab.actuators.registry import groups_of
+from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
@@ -24,7 +24,7 @@ class Compiled:
         self.count = layout.n
         self.doubt = doubt
         """The same; None where it costs nothing."""
-        self.groups = groups_of(layout, plant.effectiveness)
+        self.groups = groups_of(layout.actuators, plant.effectiveness)
         self._prepare()
 
     def _prepare(self) -> None:

@@ -26,7 +26,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout.axes import axes_in, mask_of
+from finlab.axes import axes_in, mask_of
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finlab.actuators.response import POINTS
 from finlab.arrays import Array
-from finlab.layout.axes import TURN
+from finlab.axes import TURN
 
 
 class Gauges:

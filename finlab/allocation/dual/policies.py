@@ -21,7 +21,7 @@ from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.allocation.policy import Policy
 from finlab.arrays import Array
-from finlab.layout.axes import wrapped
+from finlab.axes import wrapped
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, FINE, NEARLY, ROUNDS
 

@@ -7,6 +7,7 @@ from itertools import islice, product
 
 import numpy as np
 
+from finlab.axes import command_change
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
@@ -15,7 +16,6 @@ from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.executor import map_parts
 from finlab.layout import load_layout
-from finlab.layout.axes import command_change
 from finlab.sim import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}

@@ -7,6 +7,7 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
+from finlab.axes import is_full_turn
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
@@ -14,7 +15,6 @@ from finlab.evaluation.plots import temperature_picture
 from finlab.evaluation.scoring import mean_interval, paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout
-from finlab.layout.axes import is_full_turn
 from finlab.paper.pipeline import PaperSettings
 
 PAPER_TEMPERATURE = 0.02  # the paper's choice

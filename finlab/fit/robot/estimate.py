@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.fit.robot.robot_model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import BASE, Unknowns
-from finlab.layout.axes import wrapped
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.vehicle.fossen import Dynamics
 from finlab.vehicle.vehicle import integrate

@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from finlab.actuators.actuator import Actuator, Uncertainty
+from finlab.actuators.fin.force_table_file import COLUMNS, DOUBT, POWER_COLUMN, table_text
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 from finlab.fit.robot.robot_model import shape_factor, turned_frames
 from finlab.fit.robot.unknowns import SHAPE
-from finlab.layout import Azimuth, Body, Fin, FinModelSpec, Layout, Rudder, Thruster, load_layout, save_layout
-from finlab.layout.commanded import Uncertainty
-from finlab.layout.directions import with_axes
-from finlab.layout.force_table_file import COLUMNS, DOUBT, POWER_COLUMN, table_text
-from finlab.layout.layout import MAX_DESCRIPTION_LENGTH, Actuator
-from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel
+from finlab.layout import Body, Fin, FinModelSpec, Layout, load_layout, save_layout
+from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
 from finlab.whole_file import write_whole
 
@@ -31,7 +29,7 @@ smaller one."""
 def summary(fit: RobotFit) -> tuple[str, ...]:
     """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
     doubts, unknown, seconds = fit.doubts(), fit.untold(), 0.1 * len(fit.model.motion)
-    thrusters = any(isinstance(part, Thruster | Azimuth) for part in fit.model.layout.actuators)
+    thrusters = any(part.THRUST is not None for part in fit.model.layout.actuators)
     turned = "pushes the other way than the layout says; in the layout that is written it is turned"
     lines = {
         f"{DOUBT}: {'; '.join(doubts)}": bool(doubts),
@@ -70,8 +68,8 @@ def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
     layout, share = fit.model.layout, np.exp(fit.found("strength"))
     frames = turned_frames(layout, fit.found("mounting"), lean)
     for i, part in enumerate(layout.actuators):
-        moved = with_axes(part, frames[i], np.array(part.position) - center)
-        parts.append(scaled(replace(moved, uncertainty=unsure[i]), float(share[i])))
+        moved = part.turned(frames[i], np.array(part.position) - center, uncertainty=unsure[i])
+        parts.append(moved.scaled(float(share[i])))
     return tuple(parts)
 
 
@@ -79,34 +77,7 @@ def leaned(layout: Layout, lean: Array) -> Layout:
     """Returns a robot whose actuators lean by angles (n,) [rad]; see `turned_frames`."""
     frames = turned_frames(layout, np.zeros(layout.n), lean)
     pairs = zip(layout.actuators, frames, strict=True)
-    return replace(layout, actuators=tuple(with_axes(part, frame) for part, frame in pairs))
-
-
-def scaled(part: Actuator, share: float) -> Actuator:
-    """Returns an actuator that gives a share of the force at every command.
-
-    The command of a thruster is the force that it gives: one of 0.8 has limits of 0.8 as much, and takes the
-    power of force / 0.8. A fin that is a table stays as it is.
-    """
-    if isinstance(part, Fin):
-        return part if part.model.type == "table" else replace(part, model=part.model.scaled(share))
-    if isinstance(part, Rudder):
-        return replace(part, area=share * part.area)
-    return replace(
-        part,
-        force=(share * part.force[0], share * part.force[1]),
-        dead_band=share * part.dead_band,
-        rate=None if part.rate is None else share * part.rate,
-        model=_thrust(part.model, share),
-    )
-
-
-def _thrust(model: ThrustModel, share: float) -> ThrustModel:
-    if isinstance(model, PowerTable):
-        return replace(model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows))
-    more = share**-model.exponent
-    reverse = None if model.reverse is None else more * model.reverse
-    return PowerLaw(more * model.forward, reverse, model.exponent)
+    return replace(layout, actuators=tuple(part.turned(frame) for part, frame in pairs))
 
 
 def asked_more(layout: Layout, share: Array) -> Array:
@@ -114,8 +85,8 @@ def asked_more(layout: Layout, share: Array) -> Array:
     drives of the layout's thrusters and azimuths give what is to be given."""
     factor = np.ones((layout.n, 3))
     for i, part in enumerate(layout.actuators):
-        if isinstance(part, Thruster | Azimuth):
-            factor[i, part.LIMITS.index("force")] = 1.0 / share[i]
+        if part.THRUST is not None:
+            factor[i, part.THRUST] = 1.0 / share[i]
     return factor
 
 

@@ -15,8 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.fit.robot.swim import SMOOTHED, STEP_S, Swim
 from finlab.fit.robot.unknowns import SENSORS, SHAPE, Unknowns, blocks_of
-from finlab.layout import Layout, Rudder, Thruster
-from finlab.layout.directions import with_axes
+from finlab.layout import Layout
 from finlab.layout.effectiveness import moved_effectiveness, own_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import rotation_of_angles
@@ -55,7 +54,7 @@ class RobotModel:
         self.motion = np.concatenate([swim.motion for swim in swims])
         self.alone = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
-        self.steers = np.array([isinstance(part, Rudder) for part in layout.actuators])
+        self.steers = np.array([part.BY_FLOW for part in layout.actuators])
         """Which actuators (n,) are rudders: one that leans meets the water at another angle."""
         self._by_lean = np.zeros_like(self.alone)
         self.late = [0] * len(SENSORS)
@@ -145,7 +144,7 @@ def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
     cos, sin = np.cos(lean)[:, None], np.sin(lean)[:, None]
     about_shaft = np.stack([first, cos * second + sin * third, cos * third - sin * second], axis=1)
     across = np.stack([cos * first - sin * third, second, cos * third + sin * first], axis=1)
-    thrusts = np.array([isinstance(part, Thruster) for part in layout.actuators])
+    thrusts = np.array([len(part.AXES) == 1 for part in layout.actuators])
     return np.where(thrusts[:, None, None], across, about_shaft)
 
 
@@ -161,8 +160,8 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
     parts = list(layout.actuators)
     for k in layout.indices(names):
         part = parts[k]
-        first = isinstance(part, Thruster | Rudder)
-        parts[k] = with_axes(part, np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]]))
+        first = len(part.PUSHES) == 1
+        parts[k] = part.turned(np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]]))
     return replace(layout, actuators=tuple(parts))
 
 

@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.axes import wrapped
 from finlab.layout.random_layouts import TRAINING_BOX, Numbers, random_fin_model, random_layout
 from finlab.mdn.answers import EffortRobot
 

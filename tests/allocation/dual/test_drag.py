@@ -7,10 +7,10 @@ import pytest
 
 import finlab
 from finlab import Allocator
+from finlab.actuators.rudder import Rudder
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.layout import Actuator, Thruster, load_layout
 from finlab.layout.layout import Layout
-from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerLaw
 from finlab.physics.plant import Plant
 from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab import Allocator
+from finlab.actuators.azimuth import Tilt
+from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.arrays import Array
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.layout.file import save_layout
-from finlab.layout.propellers import Tilt
-from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.physics.plant import Plant
 from tests.exhaustive import sampled
 

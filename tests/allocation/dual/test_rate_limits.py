@@ -9,10 +9,10 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.errors import CommandError
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo, load_layout
-from finlab.layout.axes import wrapped
 from finlab.physics import Plant
 from finlab.vehicle.fin_motion import LagStep
 from tests.any_robot import AnyRobot

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.axes import wrapped
 from finlab.cli import main
 from finlab.fit.robot.fitted_robot import summary, table, write_robot
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim import Swim, only_new, read_swim, replay
 from finlab.layout import Fin, FinModelSpec, Layout, Thruster, load_layout, save_layout
-from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.sim.excite import excitation
 from tests.any_robot import AnyRobot

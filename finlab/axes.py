@@ -1,4 +1,4 @@
-"""Angles, directions on a robot as files give them, and the axes of a wrench."""
+"""Angles, directions on a robot as files give them, turns of frames, and the axes of a wrench."""
 
 import math
 from collections.abc import Sequence
@@ -81,6 +81,52 @@ def axes_across(first: tuple[str, Vector | None], second: tuple[str, Vector | No
 def cross(a: Vector, b: Vector) -> Vector:
     """Returns the vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+"""The plane y = 0 as a mirror."""
+AHEAD, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+SHORT = 1e-6
+"""Length below which a vector has no direction, and an axis no part along another one."""
+DIGITS = 12
+
+
+def rotation(axis: ArrayLike, angle: float) -> Array:
+    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad]."""
+    x, y, z = np.asarray(axis, dtype=np.float64)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
+
+
+def across(axis: Array, wanted: Array) -> Array:
+    """Returns the unit vector across an axis (3,) that is nearest to another one."""
+    part = wanted - (wanted @ axis) * axis
+    return np.asarray(part / np.linalg.norm(part))
+
+
+def least_turn(old: Array, new: Array, spare: Array) -> Array:
+    """Returns the least turn (3, 3) of one unit vector to another; about `spare` where they are opposite."""
+    axis = np.cross(old, new)
+    size = float(np.linalg.norm(axis))
+    if size < SHORT:
+        return np.eye(3) if old @ new > 0.0 else rotation(spare, math.pi)
+    return rotation(axis / size, math.atan2(size, float(old @ new)))
+
+
+def held_at(angle: float, limits: tuple[float, float]) -> float:
+    """Returns an angle [rad] whole turns off, within limits where there is such a one."""
+    return angle + round((0.5 * sum(limits) - angle) / TURN) * TURN
+
+
+def arc_words(low: float, high: float) -> str:
+    """Returns an arc [rad] in degrees, in words."""
+    low, high = math.degrees(low), math.degrees(high)
+    return "any direction" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f} deg"
+
+
+def vector_words(values: Sequence[float]) -> str:
+    """Returns a vector in words."""
+    return f"({', '.join(f'{value:.3g}' for value in values)})"
 
 
 Axis = Literal["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]

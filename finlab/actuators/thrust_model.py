@@ -1,7 +1,6 @@
 """Force and power of a propeller, as a layout file gives them: a power law, or a table of measurements."""
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -10,8 +9,8 @@ from msgspec import Meta
 
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
+from finlab.files.checked import Checked
 from finlab.files.csv_table import read_table
-from finlab.layout.checked import Checked
 
 MAX_FORCE = 1e6
 """Largest force of one actuator [N]."""
@@ -146,14 +145,3 @@ def lower_hull(x: Array, y: Array) -> tuple[Array, Array]:
             kept.pop()
         kept.append(i)
     return x[kept], y[kept]
-
-
-KEYS: Mapping[str, str] = {
-    "position": "position_m",
-    "force": "force_n",
-    "dead_band": "dead_band_n",
-    "torque_per_newton": "torque_per_newton_m",
-    "time_constant": "time_constant_s",
-    "rate": "rate_n_s",
-}
-"""Keys in a file of what every propeller has."""

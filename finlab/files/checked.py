@@ -23,6 +23,7 @@ class Checked:
     """Base of frozen dataclasses that are checked on construction, by their annotations. Raises LayoutError:
     a value is none of its type, or out of bounds; the message names the key, as in a file."""
 
+    __dataclass_fields__: ClassVar[dict[str, Any]]
     KEYS: ClassVar[Mapping[str, str]] = {}
     """Fields -> their keys in a file, where the two differ."""
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {}
@@ -84,9 +85,8 @@ def form(
         kinds: types of fields that are different in the file, and of those that are there alone; None for
             a field that no file has.
     """
-    own = {field.name for field in fields(cls)}
-    annotated = get_type_hints(cls, include_extras=True).items()
-    hints = {**{name: kind for name, kind in annotated if name in own}, **kinds}
+    annotated = get_type_hints(cls, include_extras=True)
+    hints = {**{field.name: annotated[field.name] for field in fields(cls)}, **kinds}
     usual = {field.name for field in fields(cls) if field.default is not MISSING}
     free = (usual - set(required)) | set(optional)
     parts = [

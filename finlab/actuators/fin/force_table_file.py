@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
+from finlab.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable
 from finlab.files.guarded import read_file
-from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""

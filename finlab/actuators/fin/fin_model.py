@@ -1,14 +1,79 @@
-"""Fin models that a fin may follow, by name and numbers; the formulas live in `finlab.actuators.fin`."""
+"""Limits of a fin's commands, and the models that it may follow, by name and numbers."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, ClassVar, Union
 
 from msgspec import Meta, Struct, defstruct
 
+from finlab.axes import FULL_TURN_TOLERANCE, TURN
 from finlab.errors import LayoutError
+from finlab.files.checked import Checked, given
 from finlab.files.schema import checked
-from finlab.layout.checked import given
+
+MAX_AMPLITUDE = math.pi / 2
+"""Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the hull."""
+MAX_FREQUENCY = 20.0
+"""Largest frequency a layout may allow [Hz]; ten times what such servos reach."""
+
+
+Amplitude = Annotated[float, Meta(ge=0.0, le=MAX_AMPLITUDE)]
+Frequency = Annotated[float, Meta(ge=0.0, le=MAX_FREQUENCY)]
+Direction = Annotated[float, Meta(ge=-TURN, le=TURN)]
+LEAST = {"amplitude": 1e-4, "frequency": 1e-3}
+"""Least amplitude [rad] and frequency [Hz] that is not 0."""
+LEAST_WIDTH = 1e-6
+"""Least width of a range [rad, Hz] that is not 0."""
+
+
+@dataclass(frozen=True)
+class Limits(Checked):
+    """What one fin may be commanded. The defaults are the nominal limits. Checked on construction."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "amplitude": "amplitude_rad",
+        "frequency": "frequency_hz",
+        "zero_direction": "zero_direction_rad",
+    }
+    WRITTEN: ClassVar[Collection[str]] = ("amplitude", "frequency", "zero_direction")
+
+    amplitude: tuple[Amplitude, Amplitude] = (0.05, 0.6)
+    """Half amplitude [rad], (minimum, maximum)."""
+    frequency: tuple[Frequency, Frequency] = (0.1, 2.1)
+    """Frequency [Hz], (minimum, maximum)."""
+    zero_direction: tuple[Direction, Direction] = (-math.pi, math.pi)
+    """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any direction."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, key in self.KEYS.items():
+            low, high = getattr(self, name)
+            if low > high:
+                raise LayoutError(f"minimum {low:g} is above maximum {high:g}; swap them", key)
+            if name != "zero_direction" and (high < LEAST[name] or 0.0 < low < LEAST[name]):
+                raise LayoutError(
+                    f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got {low:g} "
+                    f"and {high:g}; leave the fin out if it never moves",
+                    key,
+                )
+            if 0.0 < high - low < LEAST_WIDTH:
+                raise LayoutError(
+                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one value twice", key
+                )
+        width = self.zero_direction[1] - self.zero_direction[0]
+        if width > TURN + FULL_TURN_TOLERANCE:
+            raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")
+
+    @property
+    def lower(self) -> tuple[float, float, float]:
+        """Least (amplitude [rad], frequency [Hz], zero direction [rad])."""
+        return self.amplitude[0], self.frequency[0], self.zero_direction[0]
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """Greatest (amplitude [rad], frequency [Hz], zero direction [rad])."""
+        return self.amplitude[1], self.frequency[1], self.zero_direction[1]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,383 @@
+"""The contract of a kind of actuator: all that is special about a kind stands in one file, in its class.
+
+A kind is a frozen dataclass, a subclass of `Actuator`, whose fields are what a layout file says of one. It
+declares facts (class variables), gives its law and its answer to a price (`laws`, `group`), and overrides
+what is not as usual. One line in `finlab.actuators.kinds` makes it known to all of finlab;
+`docs/actuators.md` makes one in thirty lines.
+
+Own frames are right-handed, their rows in the body frame. A command is a row of three numbers, of which a
+kind may use fewer; what it does not have is 0.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from msgspec import Meta, Struct
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.response import Group
+from finlab.arrays import Array
+from finlab.axes import (
+    AHEAD,
+    DIGITS,
+    MIRROR,
+    SHORT,
+    Vector,
+    across,
+    arc_words,
+    axes_across,
+    cross,
+    held_at,
+    least_turn,
+    vector_words,
+)
+from finlab.errors import FinlabError
+from finlab.files.checked import Checked, Name
+
+Places = NDArray[np.intp]
+"""Places of actuators among others."""
+Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
+"""A coordinate of a place on a robot, or an arm of torque [m]."""
+Place = tuple[Metres, Metres, Metres]
+Seconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
+TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
+TurnRateDegrees = Annotated[float, Meta(ge=0.06, le=57000.0)]
+
+
+@dataclass(frozen=True)
+class Uncertainty(Checked):
+    """Standard deviation of an actuator's force. Checked on construction.
+
+    Along each own direction of the actuator it is the root of (share |F|)^2 + floor^2 at a force F.
+    """
+
+    KEYS = {"floor": "floor_n"}
+
+    share: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
+    """Its part that grows with the force, as a share of the force."""
+    floor: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
+    """Its part that is there at any force [N]."""
+    common: Name | None = None
+    """Name of what the error comes from, such as a fit or a measurement; actuators of one name err together,
+    by the same share along and across their forces. None for an actuator that errs by itself."""
+    correlation: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+    """Share of the error's variance that actuators of one `common` have together."""
+
+
+class Command(Struct, frozen=True, omit_defaults=True):
+    """A command as users see it: the numbers of the row by name, and what follows from them."""
+
+    @property
+    def words(self) -> str:
+        """The command with its units, in a table."""
+        return ", ".join(f"{getattr(self, name):.3f}" for name in self.__struct_fields__)
+
+
+class Faults(NamedTuple):
+    """What has become of one actuator that still works; None for what has not."""
+
+    weak: float | None = None
+    """Share of its largest force that is left, above 0 and up to 1."""
+    torn: float | None = None
+    """Share of its force that it gives at every command, as one with a torn blade does."""
+    stuck: float | None = None
+    """Angle [rad] at which it no longer turns; it still pushes."""
+    running: Vector | None = None
+    """Command that it keeps whatever is asked."""
+
+
+class Box(NamedTuple):
+    """A number of an actuator that people edit, or two: least and greatest."""
+
+    label: str
+    """With the unit."""
+    key: str
+    """Field of the actuator, of its limits or of its law."""
+    hint: str = ""
+    step: float = 0.1
+    degrees: bool = False
+    """Whether the field is in radians."""
+    free: bool = False
+    """Whether it may be empty: nothing is said of it then; 0 empties it."""
+    law: str = ""
+    """Type of the model that it belongs to, if to one."""
+    usual: float = 0.0
+    """What is shown of an actuator without it."""
+    pair: bool = False
+
+
+class Actuator(Checked, ABC):
+    """One actuator of a robot, and the contract of its kind."""
+
+    NUMBERS: ClassVar[tuple[tuple[str, str], ...]]
+    """Numbers of the command in order, name and unit: columns of swims and of the graph file."""
+    COMMAND: ClassVar[type[Command]]
+    """The command as users see it; made of the numbers in order."""
+    LIMITS: ClassVar[tuple[str, ...]]
+    """Fields with the least and greatest of each command."""
+    RATES: ClassVar[tuple[str, ...]]
+    """Fields with how fast each command changes at most; None in one where nothing limits it."""
+    AXES: ClassVar[tuple[str, ...]]
+    """Fields with own axes: one, or two that stand across each other, the first rows of the frame."""
+    POINTED: ClassVar[int] = 0
+    """Which of these is pointed, by hand and by a search."""
+    PUSHES: ClassVar[tuple[int, ...]]
+    """Own axes along which it pushes at will."""
+    THRUST: ClassVar[int | None] = None
+    """Which command is a force, if one is."""
+    ANGLE: ClassVar[int | None] = None
+    """Which command is an angle at which the force is the same, so that a full turn has no ends."""
+    HELD: ClassVar[int] = 0
+    """Which command stays as it is where it sticks."""
+    TURNS: ClassVar[bool] = True
+    """Whether that is an angle."""
+    ARC: ClassVar[str] = ""
+    """The field with the angles that it turns through, as they are mirrored; nothing where there is none."""
+    LAGS: ClassVar[int] = 0
+    """Which command it follows with its time constant; another one at its rate."""
+    BY_FLOW: ClassVar[bool] = False
+    """Whether its force is that of the water that flows past, so that it gives nothing at rest."""
+    FAULTS: ClassVar[tuple[str, ...]] = ()
+    """What may become of it, beside being lost: `weak`, `torn`, `stuck`, `running`."""
+    LOOKS: ClassVar[str]
+    """How it is drawn: `fin`, `thruster`, `pod` or `foil`."""
+    OTHER: ClassVar[str] = ""
+    """What people call the axis that is not pointed."""
+    BOXES: ClassVar[tuple[Box, ...]] = ()
+    """What its inspector offers."""
+    LAW_BOXES: ClassVar[tuple[Box, ...]] = ()
+    """The same of its law."""
+    MODELS: ClassVar[tuple[str, ...]] = ()
+    """Formulas that its law may follow, by the type of its `model`; none where there is one law."""
+
+    name: Name
+    position: Place
+    uncertainty: Uncertainty | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.AXES) == 2:
+            first, second = ((name, getattr(self, name)) for name in self.AXES)
+            for (name, _), axis in zip((first, second), axes_across(first, second), strict=True):
+                object.__setattr__(self, name, axis)
+
+    @classmethod
+    @abstractmethod
+    def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
+        """Returns the laws of m actuators of the kind, few for many of them, each with its places among these
+        m. Raises DataError: a file that a law reads is bad."""
+
+    @classmethod
+    @abstractmethod
+    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
+        """Returns the answers to prices of m actuators with an effectiveness (m, 3, 6)."""
+
+    @classmethod
+    @abstractmethod
+    def sample(cls) -> Self:
+        """Returns one as the app adds it, at the origin, named after its kind."""
+
+    @property
+    def lower(self) -> Vector:
+        """Least command (3,), in radians and newtons; what the actuator does not have is 0."""
+        return _three([getattr(self, name)[0] for name in self.LIMITS], 0.0)
+
+    @property
+    def upper(self) -> Vector:
+        """Greatest command, as `lower`."""
+        return _three([getattr(self, name)[1] for name in self.LIMITS], 0.0)
+
+    @property
+    def rates(self) -> Vector:
+        """Fastest changes of the command [rad/s, N/s]; infinite where nothing limits them."""
+        return _three([getattr(self, name) or math.inf for name in self.RATES], math.inf)
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """Own axes in the body frame: those of `AXES`, and what stands across them."""
+        first, *others = (getattr(self, name) for name in self.AXES)
+        if not others:
+            some = [0.0, 0.0, 0.0]
+            some[min(range(3), key=lambda i: abs(first[i]))] = 1.0
+            x, y, z = cross(first, (some[0], some[1], some[2]))
+            size = math.hypot(x, y, z)
+            others = [(x / size, y / size, z / size)]
+        return first, others[0], cross(first, others[0])
+
+    @property
+    def direction(self) -> Vector:
+        """What of it is pointed: its axis, its shaft, or zero."""
+        return self.frame[self.POINTED]
+
+    @property
+    def reads(self) -> str | None:
+        """Path of the file that its law reads, None where it reads none."""
+        return None
+
+    @property
+    def model_type(self) -> str:
+        """Type of its `model`; how it looks where there is one law."""
+        return str(getattr(getattr(self, "model", None), "type", self.LOOKS))
+
+    def value(self, key: str) -> Any:
+        """Returns what it has under a key: a field of it, of its limits or of its model; None if nothing."""
+        holders = (self, getattr(self, "limits", None), getattr(self, "model", None))
+        return next((getattr(one, key) for one in holders if hasattr(one, key)), None)
+
+    def with_value(self, key: str, value: Any) -> Self:
+        """Returns it with another value under a key, as `value`; as it is where it has no such key. None
+        forgets what may be left unsaid. Raises LayoutError: it may not have that value."""
+        return replace(self, **{key: value}) if hasattr(self, key) else self
+
+    def with_model(self, kind: str) -> Self:
+        """Returns it with a model of another type of `MODELS`; what both know stays."""
+        return self
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """The faults of `FAULTS` that may befall this one."""
+        return self.FAULTS
+
+    @property
+    def delay_s(self) -> float:
+        """How late it follows [s]: its time constant, and the time in which it comes through a fifth of its
+        range at its rate."""
+        ranges = zip(self.lower, self.upper, self.rates, strict=True)
+        return float(getattr(self, "time_constant", 0.0)) + max(0.2 * (b - a) / rate for a, b, rate in ranges)
+
+    def largest(self, speed: float) -> float:
+        """Returns its largest force [N], of one `BY_FLOW` at a speed [m/s] through the water."""
+        return max(abs(self.lower[self.THRUST or 0]), abs(self.upper[self.THRUST or 0]))
+
+    def command(self, row: Array) -> Command | None:
+        """Returns a row (3,) as the kind's own type; None for a failed one, whose row is NaN."""
+        return None if np.isnan(row[0]) else self.COMMAND(*row[: len(self.NUMBERS)].tolist())
+
+    def neutral(self, now: Array | None = None) -> Array:
+        """Returns the command (3,) that pushes least, given the present one (3,)."""
+        row: Array = np.clip(0.0, np.array(self.lower), np.array(self.upper))
+        return row
+
+    def pushing(self, force: Array) -> Array:
+        """Returns the command (3,) of a force along its directions `PUSHES` [N], limits apart."""
+        row = np.zeros(3)
+        if self.THRUST is not None:
+            row[self.THRUST] = force[0] if len(force) == 1 else math.hypot(*force)
+            if len(force) > 1:
+                row[self.HELD] = math.atan2(force[1], force[0])
+        return row
+
+    @abstractmethod
+    def damaged(self, faults: Faults) -> Self:
+        """Returns it with the law and the limits that faults, those of `FAULTS`, leave."""
+
+    @abstractmethod
+    def scaled(self, share: float) -> Self:
+        """Returns one that gives a share of the force at every command; one that reads a file stays."""
+
+    @property
+    def limits_words(self) -> str:
+        """Its limits and its law in a few words, in a table."""
+        ends = zip(self.NUMBERS, self.lower, self.upper, strict=False)
+        parts = (
+            arc_words(low, high) if unit == "rad" else f"{low:g}..{high:g} {unit}"
+            for (_, unit), low, high in ends
+        )
+        return ", ".join((*parts, self.model_type))
+
+    @property
+    def direction_words(self) -> str:
+        """Where it points: the axes that its file gives, in the body frame."""
+        words = zip(self.AXES, self.frame, strict=False)
+        return ", ".join(f"{name.replace('_', ' ')} {vector_words(axis)}" for name, axis in words)
+
+    @property
+    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
+        """Joints of a robot description, from the hull on: suffix of the link's name, axis, and limits of
+        the angle [rad]."""
+        yield "", self.frame[0], None
+
+    def turned(self, frame: ArrayLike, position: ArrayLike | None = None, **changes: Any) -> Self:
+        """Returns it with other own axes (3, 3), rows in the body frame, at another place (3,) [m], and with
+        other changes."""
+        changes |= dict(zip(self.AXES, map(tuple, _plain(frame)), strict=False))
+        if position is not None:
+            changes["position"] = tuple(_plain(position))
+        return replace(self, **changes)
+
+    def image(self) -> Self:
+        """Returns it on the other side of the plane y = 0, under the same name. What turns one way about a
+        shaft turns the other way about its image: arcs and the reaction torque change sign."""
+        mirrored = self.turned(np.array(self.frame) * MIRROR, np.array(self.position) * MIRROR)
+        changes: dict[str, Any] = {}
+        if self.ARC:
+            changes[self.ARC] = tuple(-end + 0.0 for end in reversed(getattr(self, self.ARC)))
+        if hasattr(self, "torque_per_newton"):
+            changes["torque_per_newton"] = -self.torque_per_newton + 0.0
+        return replace(mirrored, **changes)
+
+    def facing(self, towards: Vector) -> Self:
+        """Returns it with its `direction` along a vector of any length; the other axis turns along as little
+        as can be, or as its kind has it. Raises FinlabError: the vector has no length."""
+        length = math.hypot(*towards)
+        if not SHORT < length < math.inf:
+            raise FinlabError(f"direction of {self.name}: expected a vector with a length, got {towards}")
+        wanted, frame, k = np.array(towards) / length, np.array(self.frame), self.POINTED
+        if np.abs(wanted - frame[k]).max() < SHORT:
+            return self
+        frame = frame @ least_turn(frame[k], wanted, frame[2 if k == 0 else 0]).T
+        frame[k] = wanted
+        return self.turned(self.settled(frame))
+
+    def settled(self, frame: Array) -> Array:
+        """Returns own axes (3, 3) after it was pointed, the first where it is wanted."""
+        return frame
+
+    def turned_about(self, towards: Vector) -> Self:
+        """Returns it turned about its `direction`, with its other axis as near to a vector of any length as
+        stands across it. Raises FinlabError: the vector points along the direction."""
+        if len(self.AXES) == 1:
+            return self
+        frame, wanted, k = np.array(self.frame), np.array(towards, dtype=np.float64), self.POINTED
+        if not SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
+            raise FinlabError(f"{self.name}: expected a direction across its {self.AXES[k]}, got {towards}")
+        frame[1 - k] = across(frame[k], wanted)
+        return self.turned(frame)
+
+
+def key_words(key: str) -> str:
+    """Returns a key of a layout file as people write it: `drag_coefficient` is Drag coefficient."""
+    text = key.replace("_", " ")
+    return text if len(text) <= 2 or text == "phi e" else text[0].upper() + text[1:]
+
+
+def ahead(frame: Array) -> Array:
+    """Returns own axes (3, 3) whose second one lies ahead, as near as the first allows."""
+    if math.hypot(*frame[0, 1:]) > SHORT:
+        frame[1] = across(frame[0], AHEAD)
+    return frame
+
+
+def held_limits(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:
+    """Returns an angle [rad] as both limits, within them where it can be; themselves where it is None."""
+    return limits if angle is None else (held_at(angle, limits),) * 2
+
+
+def weakened(interval: tuple[float, float], share: float | None) -> tuple[float, float]:
+    """Returns an interval up to a share of its greatest; itself where that is None."""
+    low, high = interval
+    return interval if share is None else (min(low, share * high), share * high)
+
+
+def _plain(values: ArrayLike) -> Any:
+    return (np.round(np.asarray(values, dtype=np.float64), DIGITS) + 0.0).tolist()
+
+
+def _three(values: list[Any], rest: float) -> Vector:
+    first, second, third = (*values, rest, rest, rest)[:3]
+    return first, second, third

@@ -1,0 +1,277 @@
+"""Thrusters that turn, all round or within an arc: pods, and tilts.
+
+Command: (angle [rad], force [N], 0). Own frame: turn_axis, zero, turn_axis x zero; at the angle a the force
+points along cos(a) zero + sin(a) (turn_axis x zero).
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from msgspec import Meta
+
+from finlab.actuators.actuator import (
+    Box,
+    Command,
+    Faults,
+    Metres,
+    Place,
+    Places,
+    Seconds,
+    TurnRate,
+    TurnRateDegrees,
+    Uncertainty,
+    held_limits,
+    weakened,
+)
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.response import Group, Plane
+from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
+from finlab.actuators.thrust_power import ThrustPower, radial_table
+from finlab.arrays import Array, Values
+from finlab.axes import (
+    FILE_TURN_TOLERANCE,
+    TURN,
+    Direction3,
+    Vector,
+    arc_words,
+    is_full_turn,
+    vector_words,
+    wrapped,
+)
+from finlab.errors import LayoutError
+from finlab.files.checked import Name
+from finlab.precision import NEARLY
+
+Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
+AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
+
+
+class AzimuthCommand(Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
+    """What a thruster that turns is told."""
+
+    angle: float
+    """Angle of its force from `zero` towards turn_axis x zero [rad]."""
+    force: float
+    """[N]."""
+    input: float | None = None
+    """As for a `ThrusterCommand`."""
+
+    @property
+    def words(self) -> str:
+        """See `Command`."""
+        return force_words(self.force, f" at {math.degrees(self.angle):.1f} deg", self.input)
+
+
+@dataclass(frozen=True)
+class Azimuth(Propeller):
+    """A thruster that turns; its command is angle and force. Checked on construction."""
+
+    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
+        "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
+        "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
+    }
+    NUMBERS, COMMAND = (("angle", "rad"), ("force", "N")), AzimuthCommand
+    LIMITS, RATES, AXES = ("arc", "force"), ("turn_rate", "rate"), ("turn_axis", "zero")
+    POINTED, PUSHES, LAGS, THRUST, ANGLE, ARC = 1, (1, 2), 1, 1, 0, "arc"
+    FAULTS, LOOKS, OTHER = ("weak", "stuck"), "pod", "Turns about"
+    SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
+    BOXES = (
+        Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
+        Box(
+            "Arc [°]", "arc", "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True, pair=True
+        ),
+        Box("Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True),
+        *Propeller.BOXES,
+    )
+    type: ClassVar[str] = "azimuth"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, body frame [m]."""
+    turn_axis: Direction3
+    """Unit vector about which the thruster turns, body frame."""
+    zero: Direction3
+    """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x zero."""
+    force: tuple[Newtons, Newtons]
+    """Least and most force [N]: below 0 for one that also pushes against its angle, above 0 for one that
+    cannot stop."""
+    model: ThrustModel
+    """What power it takes."""
+    arc: tuple[Angle, Angle] = (-math.pi, math.pi)
+    """Least and greatest angle [rad]; a full turn means any angle."""
+    dead_band: Threshold = 0.0
+    """Forces smaller than this, other than 0, cannot be held [N]."""
+    torque_per_newton: Metres = 0.0
+    """Reaction torque about the direction of the force, per force, signed [m]."""
+    turn_rate: TurnRate | None = None
+    """How fast it turns at most [rad/s]; None where nothing limits it."""
+    time_constant: Seconds = 0.1
+    """Time in which the force comes to 63 % of a new one [s]."""
+    rate: ForceRate | None = None
+    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        least, most = self.force
+        if not (least < most and most > 0.0):
+            raise LayoutError(
+                f"expected a most force above 0 and above the least, got {least:g} and {most:g}; turn `zero` "
+                "round where it only pulls",
+                "force_n",
+            )
+        if self.dead_band > self.force[1]:
+            raise LayoutError(
+                f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band_n"
+            )
+        width = self.arc[1] - self.arc[0]
+        if not 0.0 <= width <= TURN + FILE_TURN_TOLERANCE:
+            low, high = map(math.degrees, self.arc)
+            raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g}", "arc_deg")
+        check_force(self.model, self.force)
+
+    @classmethod
+    def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
+        return [(np.arange(len(parts)), AzimuthLaw(parts))]
+
+    @classmethod
+    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
+        return AzimuthGroup(parts, effectiveness)
+
+    @classmethod
+    def sample(cls) -> Self:
+        """See `Actuator`: a T200 of Blue Robotics at 16 V on a pod."""
+        up, rate = (0.0, 0.0, 1.0), math.radians(120)
+        force, model = (0.0, 51.44), PowerLaw(T200.forward)
+        return cls(
+            cls.type, (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), force, model, cls.SAMPLE_ARC, turn_rate=rate
+        )
+
+    def neutral(self, now: Array | None = None) -> Array:
+        """See `Actuator`: it keeps its angle."""
+        row = super().neutral(now)
+        if now is not None and np.isfinite(now[0]):
+            row[0] = now[0]
+        return row
+
+    def damaged(self, faults: Faults) -> Self:
+        left, (low, high) = faults.weak, self.force
+        force = self.force if left is None else weakened((max(low, left * low), high), left)
+        return replace(self, force=force, arc=held_limits(faults.stuck, self.arc))
+
+    @property
+    def limits_words(self) -> str:
+        low, high = self.force
+        return f"{arc_words(*self.arc)}, {low:g}..{high:g} N, {self.model.type}"
+
+    @property
+    def direction_words(self) -> str:
+        return f"turns about {vector_words(self.turn_axis)}, zero {vector_words(self.zero)}"
+
+    @property
+    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
+        yield "_mount", self.turn_axis, None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc
+        yield "", self.zero, None
+
+
+@dataclass(frozen=True)
+class Tilt(Azimuth):
+    """An azimuth thruster that turns within an arc. Checked on construction."""
+
+    type: ClassVar[str] = "tilt"
+    SAMPLE_ARC = (-math.pi / 3, math.pi / 3)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if is_full_turn(self.arc[1] - self.arc[0]):
+            raise LayoutError(
+                "required key is missing: the arc of a tilt is less than a full turn", "arc_deg"
+            )
+
+
+class AzimuthLaw(PropellerLaw):
+    """n turning thrusters."""
+
+    column = 1
+
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
+        force = np.zeros_like(command)
+        size = self.given(command)
+        force[..., 1], force[..., 2] = size * np.cos(command[..., 0]), size * np.sin(command[..., 0])
+        return force
+
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        force = self.force(command)
+        jacobian = np.zeros((*command.shape, 3))
+        jacobian[..., 0, 1], jacobian[..., 0, 2] = -force[..., 2], force[..., 1]
+        angle, free = command[..., 0], self.given(command) == command[..., 1]
+        jacobian[..., 1, 1], jacobian[..., 1, 2] = np.cos(angle) * free, np.sin(angle) * free
+        return force, jacobian
+
+
+class AzimuthGroup(Group):
+    """What the turning thrusters of a robot offer for prices."""
+
+    def __init__(self, azimuths: Sequence[Azimuth], effectiveness: Array) -> None:
+        """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+        self._lower = np.array([azimuth.lower for azimuth in azimuths])
+        self._upper = np.array([azimuth.upper for azimuth in azimuths])
+        self._power = ThrustPower([azimuth.model for azimuth in azimuths])
+        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
+        self.responses = [
+            _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
+            for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
+        ]
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as
+        near to 0 as the arc allows. What can be given forward and in reverse is given at the least power."""
+        size = np.hypot(force[..., 0], force[..., 1])
+        before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
+        angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
+        ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
+        if (self._lower[:, 1] >= 0.0).all():
+            return ahead
+        wanted, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
+        missing, watts = [], []
+        for way in (ahead, back):
+            force = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
+            missing.append(np.linalg.norm(force - wanted, axis=0))
+            watts.append(self._power.watts(way[..., 1]))
+        cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
+        return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)
+
+    def _pushed(self, angle: Array, force: Array) -> Array:
+        """Commands (..., m, 3) that come nearest to angles [rad] and forces [N] (..., m)."""
+        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
+        command = np.zeros((*force.shape, 3))
+        command[..., 0] = middle + wrapped(angle - middle)
+        command[..., 1] = force
+        return np.clip(command, self._lower, self._upper)
+
+    def radial_worth(self, price: Array, back: Array) -> Array:
+        least, most = self._lower[:, 1], self._upper[:, 1]
+        ahead = self._power.worth(price, np.maximum(least, 0.0), most)
+        return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
+
+
+def _plane(azimuth: Azimuth, matrix: Array, middle: float, half: float) -> Plane:
+    """What one offers; `matrix` (2, 6) is the wrench per newton."""
+    least, most = azimuth.force
+    table = radial_table(azimuth.model, 1, max(least, 0.0), most)
+    reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
+    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)
+
+
+def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
+    """Middles and halves (m,) of arcs [rad]; pi is the half of a full turn."""
+    return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))

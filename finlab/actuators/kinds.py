@@ -1,0 +1,53 @@
+"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.actuators.actuator import Actuator, Places
+from finlab.actuators.azimuth import Azimuth, Tilt
+from finlab.actuators.fin.fin import Fin
+from finlab.actuators.fin.fin_laws import file_stamp
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.response import Group
+from finlab.actuators.rudder import Rudder
+from finlab.actuators.thruster import Thruster
+from finlab.arrays import Array
+
+KINDS: dict[str, type[Actuator]] = {kind.type: kind for kind in (Fin, Thruster, Azimuth, Tilt, Rudder)}
+"""Type of an actuator in a layout -> its class."""
+
+
+def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Places, ActuatorLaw]]:
+    """Returns the laws of a robot's actuators with their places, by kind; a `DataError` at a bad table."""
+    groups: list[tuple[Places, ActuatorLaw]] = []
+    for places, kind in _kinds(actuators):
+        groups += [(places[among], law) for among, law in kind.laws([actuators[i] for i in places])]
+    return groups
+
+
+def groups_of(actuators: Sequence[Actuator], effectiveness: Array) -> list[tuple[Places, Group]]:
+    """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
+    6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
+    kinds = [(places, kind, [actuators[i] for i in places]) for places, kind in _kinds(actuators)]
+    return [(places, kind.group(parts, effectiveness[places])) for places, kind, parts in kinds]
+
+
+def _kinds(actuators: Sequence[Actuator]) -> Iterator[tuple[Places, type[Actuator]]]:
+    """The kinds of a robot's actuators, in the order in which they come, with their places; those that share
+    their law (tilts are azimuths) are one."""
+    kinds = [getattr(type(part).laws, "__func__", None) for part in actuators]
+    for kind in dict.fromkeys(kinds):
+        places = np.array([i for i, own in enumerate(kinds) if own is kind])
+        yield places, type(actuators[places[0]])
+
+
+def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
+    """Which commands (n, 3) are angles; whether they may turn freely depends on their limits."""
+    return np.array([[k == part.ANGLE for k in range(3)] for part in actuators])
+
+
+def file_stamps(actuators: Sequence[Actuator]) -> tuple[tuple[int, int] | None, ...]:
+    """Returns the stamps of the files that laws read, for what is kept until one of them changes."""
+    return tuple([file_stamp(part.reads) for part in actuators])

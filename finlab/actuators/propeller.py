@@ -1,0 +1,147 @@
+"""What thrusters have in common, fixed or turning: forces and power of a propeller, and what it is sent."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from msgspec import Meta
+
+from finlab.actuators.actuator import Actuator, Box, Command
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
+from finlab.actuators.thrust_power import ThrustPower
+from finlab.arrays import AnyArray, Array, Values
+
+ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
+Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
+T200 = PowerLaw(0.997, 1.449)
+"""Power of a T200 of Blue Robotics at 16 V."""
+LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
+
+
+class Propeller(Actuator):
+    """Base of thrusters; see `Actuator`."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "position": "position_m",
+        "force": "force_n",
+        "dead_band": "dead_band_n",
+        "torque_per_newton": "torque_per_newton_m",
+        "time_constant": "time_constant_s",
+        "rate": "rate_n_s",
+    }
+    BOXES: ClassVar[tuple[Box, ...]] = (
+        Box("Dead band [N]", "dead_band", "Forces smaller than this, but 0, cannot be held."),
+        Box("Rate [N/s]", "rate", "How fast the force changes; 0: at once.", free=True),
+        Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
+        Box("Torque/force [m]", "torque_per_newton", "Reaction torque, signed.", 0.001),
+    )
+    LAW_BOXES = (
+        Box("Ahead [W]", "forward", "Power at 1 N; F newtons take it times F^exponent.", law="power_law"),
+        Box(
+            "Astern [W]", "reverse", "The same of a negative force; 0: as ahead.", free=True, law="power_law"
+        ),
+        Box("Exponent", "exponent", "1.5 is that of an ideal propeller at rest.", law="power_law"),
+    )
+
+    MODELS = ("power_law",)
+
+    force: tuple[float, float]
+    model: ThrustModel
+    dead_band: float
+    rate: float | None
+
+    def with_value(self, key: str, value: Any) -> Self:
+        if key not in LAW_KEYS:
+            return super().with_value(key, value)
+        known = isinstance(self.model, PowerLaw)
+        return replace(self, model=replace(self.model, **{key: value})) if known else self
+
+    def with_model(self, kind: str) -> Self:
+        return replace(self, model=_law_of(self.model)) if isinstance(self.model, PowerTable) else self
+
+    def scaled(self, share: float) -> Self:
+        """See `Actuator`. The command is the force that it gives: one of 0.8 has limits of 0.8 as much, and
+        takes the power of force / 0.8."""
+        return replace(
+            self,
+            force=(share * self.force[0], share * self.force[1]),
+            dead_band=share * self.dead_band,
+            rate=None if self.rate is None else share * self.rate,
+            model=_scaled(self.model, share),
+        )
+
+    def command(self, row: Array) -> Command | None:
+        """See `Actuator`: with what its table says to send for it."""
+        if np.isnan(row[0]):
+            return None
+        numbers = row[: len(self.NUMBERS)].tolist()
+        return self.COMMAND(*numbers, input_of(self.model, numbers[-1]))
+
+
+def input_of(model: ThrustModel, force: float) -> float | None:
+    """Returns what a table says to send for a force [N], in the table's unit; None for a power law.
+
+    Where several inputs give no force, the middle of them stops the propeller.
+    """
+    if not isinstance(model, PowerTable):
+        return None
+    inputs, forces, _ = model.columns
+    first, last = np.searchsorted(forces, 0.0, "left"), np.searchsorted(forces, 0.0, "right")
+    if force == 0.0 and first < last:
+        return float(0.5 * (inputs[first] + inputs[last - 1]))
+    side = slice(max(last - 1, 0), None) if force > 0.0 else slice(0, first + 1)
+    return float(np.interp(force, forces[side], inputs[side]))
+
+
+def _law_of(table: PowerTable) -> PowerLaw:
+    _, force, power = table.columns
+    least, most = (
+        float(f"{max(power[k] / max(abs(force[k]), 1e-9) ** 1.5, 1e-6):.4g}") if force[k] else None
+        for k in (0, -1)
+    )
+    return PowerLaw(most or least or 1.0, least)
+
+
+def _scaled(model: ThrustModel, share: float) -> ThrustModel:
+    if isinstance(model, PowerTable):
+        return replace(model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows))
+    more = share**-model.exponent
+    reverse = None if model.reverse is None else more * model.reverse
+    return PowerLaw(more * model.forward, reverse, model.exponent)
+
+
+def force_words(force: float, angle: str, sent: float | None) -> str:
+    """Returns a force [N] in words, with what is to be sent for it."""
+    return f"{round(force, 3) + 0.0:.3f} N{angle}" + ("" if sent is None else f", input {sent:.5g}")
+
+
+class PropellerLaw(ActuatorLaw):
+    """n propellers, one of whose commands is a force; there is none within the dead band."""
+
+    column: int
+    """Which of the three commands it is."""
+
+    def __init__(self, parts: Sequence[Propeller]) -> None:
+        """Takes n thrusters, or n that turn."""
+        self.power_curve = ThrustPower([part.model for part in parts])
+        self.dead_band = np.array([part.dead_band for part in parts])
+
+    def given(self, command: Values) -> Any:
+        """Returns the forces (..., n) [N] of commands (..., n, 3)."""
+        return held(command[..., self.column], self.dead_band)
+
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes none."""
+        return self.power_curve.watts(self.given(command))
+
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
+        gradient = np.zeros(command.shape)
+        gradient[..., self.column] = self.power_curve.marginal(self.given(command))
+        return gradient
+
+
+def held(force: AnyArray, dead_band: Array) -> AnyArray:
+    """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
+    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force))
