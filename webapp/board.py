@@ -24,10 +24,10 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
     actuator that is `dragged`, and the scale of arrows. `before` are the last ones."""
     state, answering, improver, fitting = session.state, jobs.answering, jobs.improver, jobs.fitting
     swimming, swimmer, modes = jobs.swimming, jobs.swimming.swimmer, answering.modes
-    same = before is not None and before["layout"] is state.layout and before["health"] == state.health
+    same = before is not None and before["layout"] is state.layout and before["damage"] == state.damage
     return {
         "state": state,
-        **_of(state, "layout failed health target flow method policy network"),
+        **_of(state, "layout failed damage target flow method policy network"),
         # The layout with the limits that are left to damaged actuators.
         "able": before["able"] if same and before is not None else state.able,
         **_of(session, "saved selected selection desk display draft swim loops"),

@@ -14,14 +14,12 @@ if TYPE_CHECKING:
     from finlab.allocation.policy import Policy as Policy
     from finlab.allocation.solution import Candidates as Candidates
     from finlab.allocation.solution import Solution as Solution
-    from finlab.layout.damage import Health as Health
 
 _HOME = {"Allocation": "allocation", "BatchAllocation": "allocation", "Allocator": "allocator"}
 _HOME |= {"METHODS": "methods", "Policy": "policy", "Candidates": "solution", "Solution": "solution"}
 
 
 def __getattr__(name: str) -> object:
-    home = "finlab.layout.damage" if name == "Health" else f"finlab.allocation.{_HOME.get(name)}"
-    if home.endswith(".None"):
+    if name not in _HOME:
         raise AttributeError(f"module 'finlab.allocation' has no attribute {name!r}")
-    return getattr(import_module(home), name)
+    return getattr(import_module(f"finlab.allocation.{_HOME[name]}"), name)

@@ -15,7 +15,7 @@ from finlab.allocation.report import allocation_text, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData, Rows
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from finlab.physics.expected_miss import expected_miss
 from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
@@ -51,10 +51,8 @@ class Answer(PlainData, Generic[Number]):
 
     layout: Layout
     """The whole layout, failed actuators included, with the limits that damage has left."""
-    failed: tuple[str, ...]
-    """Names of the actuators that were left out."""
-    health: Health | None = None
-    """What was known of actuators that work in part."""
+    damage: Damage = Damage()
+    """What was known of damaged actuators; the lost ones were left out."""
     target: Array
     """Desired wrench (6,) or (N, 6), [N, N m], body frame; NaN along axes that do not count."""
     command: Array
@@ -79,6 +77,11 @@ class Answer(PlainData, Generic[Number]):
     """Gives the lazy properties; None in copies, which have them all."""
 
     @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the actuators that were left out."""
+        return tuple(self.damage.lost)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the actuators, in the order of `command`."""
         return self.layout.names
@@ -91,7 +94,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if failed."""
-        return self._by_parts(self._plant.fin_forces)
+        return self._by_parts(self._plant.body_forces)
 
     @cached_property
     def wrench(self) -> Array:

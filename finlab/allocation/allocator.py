@@ -24,6 +24,7 @@ from finlab.allocation.methods import (
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
+    WHOLE,
     Axes,
     Usable,
     axes_of,
@@ -32,6 +33,7 @@ from finlab.allocation.question import (
     check_previous,
     check_seed,
     check_wrenches,
+    damage_of,
     same_axes,
     usable,
 )
@@ -41,7 +43,7 @@ from finlab.arrays import Array
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import yardstick
@@ -67,7 +69,6 @@ class Question(NamedTuple):
 
     ready: Ready
     policy: Policy
-    health: Health | None
     flow: Array | None
     seed: int
 
@@ -144,7 +145,7 @@ class Allocator:
     def _made(self, layout: Layout, choice: MethodChoice) -> None:
         self._layout, self._choice = layout, choice
         self._scale = yardstick(layout)
-        self._whole = self._make((), None)
+        self._whole = self._make(WHOLE)
         self._prepared: dict[object, Ready] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -204,11 +205,12 @@ class Allocator:
         self,
         wrench: ArrayLike,
         *,
+        lost: Sequence[str] = (),
+        damage: Damage | None = None,
         failed: Sequence[str] = (),
         previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
-        health: Health | None = None,
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> Allocation:
@@ -217,13 +219,15 @@ class Allocator:
         Args:
             wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that is free here: it
                 takes what the cheapest answer gives it, as those do that the layout does not command.
-            failed: names of actuators that do not work; they leave the graph.
+            lost: names of actuators that do not work; they leave the graph.
+            damage: these and actuators that work in part; the result's layout has what is left of their
+                limits.
+            failed: another word for `lost`.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
                 follow answers the one that they will be in time for, which is then the result's target.
             policy: what to do when the wrench is out of reach; see `Policy`.
-            health: actuators that work in part; the result's layout has what is left of their limits.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target and seed give the same answer.
 
@@ -234,7 +238,8 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         values = check_wrenches(wrench, single=True)
-        question = self._question(failed, policy, health, flow, seed, axes_of(self._layout, values))
+        known = damage_of(damage, lost, failed)
+        question = self._question(known, policy, flow, seed, axes_of(self._layout, values))
         robot, method = question.ready.robot, question.ready.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
@@ -275,9 +280,10 @@ class Allocator:
         self,
         wrenches: ArrayLike,
         *,
+        lost: Sequence[str] = (),
+        damage: Damage | None = None,
         failed: Sequence[str] = (),
         policy: Policy | str = CLOSEST,
-        health: Health | None = None,
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
@@ -287,12 +293,13 @@ class Allocator:
         computed when it is asked for.
         """
         values = check_wrenches(wrenches, single=False)
-        question = self._question(failed, policy, health, flow, seed)
+        known = damage_of(damage, lost, failed)
+        question = self._question(known, policy, flow, seed)
         start = time.perf_counter()
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
             for axes, places in same_axes(self._layout, values):
-                method = self._ready(failed, health, axes).method
+                method = self._ready(known, axes).method
                 for rows in chunks_of(places, len(values)):
                     counts = method.layout.commanded
                     targets = values[rows] if counts.all() else np.where(counts, values[rows], 0.0)
@@ -311,9 +318,8 @@ class Allocator:
 
     def _question(
         self,
-        failed: Sequence[str],
+        damage: Damage,
         policy: Policy | str,
-        health: Health | None,
         flow: ArrayLike | None,
         seed: int,
         axes: Axes | None = None,
@@ -321,13 +327,13 @@ class Allocator:
         policy = as_policy(policy)
         check_seed(seed)
         water = check_flow(flow)
-        ready = self._ready(failed, health, axes)
+        ready = self._ready(damage, axes)
         ready.method.check_policy(policy)
-        return Question(ready, policy, health, water, int(seed))
+        return Question(ready, policy, water, int(seed))
 
     def _about(self, question: Question, target: Array, values: Array, solution: Solution) -> dict[str, Any]:
         """Fields that answers to one target and to many share; `values` are the wrenches as they came."""
-        (robot, method, plant), policy, health, flow, seed = question
+        (robot, method, plant), policy, flow, seed = question
         later = Later(
             plant.at(flow),
             partial(answer_notes, robot.healthy, method, self.checkpoint, flow, values, solution.notes),
@@ -336,14 +342,14 @@ class Allocator:
             *(() if solution.bound is None else (partial(solution.bound, solution.command),)),
         )
         return {
-            **{"target": target, "layout": robot.layout, "failed": robot.failed, "health": health},
+            **{"target": target, "layout": robot.layout, "damage": robot.damage},
             **{"scale": self._scale, "method": self.method, "checkpoint": self.checkpoint, "policy": policy},
             **{"flow": flow, "seed": seed, "unknown_fins": method.unknown_fins, "later": later},
         }
 
     def _ready_for(self, result: Allocation) -> Ready:
         """The robot as it was when it was asked."""
-        ready = self._ready(result.failed, result.health)
+        ready = self._ready(result.damage)
         if ready.robot.layout != result.layout:
             raise AllocationError(
                 f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
@@ -351,19 +357,19 @@ class Allocator:
             )
         return ready
 
-    def _ready(self, failed: Sequence[str], health: Health | None, axes: Axes | None = None) -> Ready:
+    def _ready(self, damage: Damage, axes: Axes | None = None) -> Ready:
         """The robot in a state, asked for some axes, prepared now or kept from an earlier question."""
-        if axes is None and health is None and (failed == () or failed == []):
+        if axes is None and damage is WHOLE:
             return self._whole
-        key = usable(self._layout, failed).failed, health, axes
-        ready = self._prepared.pop(key, None) or self._make(failed, health, axes)
+        key = damage, axes
+        ready = self._prepared.pop(key, None) or self._make(damage, axes)
         self._prepared[key] = ready  # the newest is last
         while len(self._prepared) > MOST_PREPARED:
             self._prepared.pop(next(iter(self._prepared)), None)
         return ready
 
-    def _make(self, failed: Sequence[str], health: Health | None, axes: Axes | None = None) -> Ready:
-        robot, choice = usable(self._layout, failed, health), self._choice
+    def _make(self, damage: Damage, axes: Axes | None = None) -> Ready:
+        robot, choice = usable(self._layout, damage), self._choice
         layout = robot.healthy if axes is None else replace(robot.healthy, axes=axes)
         method = choice.kind(layout, choice.settings, self._scale, choice.weights)
         return Ready(robot, method, plant_of(robot.layout))
@@ -377,4 +383,4 @@ def _among_all(make: Callable[[], Candidates] | None, robot: Usable) -> Candidat
     if make is None:
         return None
     own = make()
-    return own if len(robot.failed) == 0 else replace(own, command=robot.among_all(own.command))
+    return own if len(robot.damage.lost) == 0 else replace(own, command=robot.among_all(own.command))

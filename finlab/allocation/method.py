@@ -147,8 +147,9 @@ class Method(ABC):
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
         if self.fin_model is None:
             return ()
-        known, fins = (self.fin_model.type, self.fin_model.values()), self.layout.fins
-        return tuple(fin.name for fin in fins if (fin.model.type, fin.model.values()) != known)
+        known = self.fin_model.type, self.fin_model.values()
+        models = ((part.name, part.value("model")) for part in self.layout.actuators)
+        return tuple(name for name, model in models if (model.type, model.values()) != known)
 
 
 class LeastErrorMethod(Method):

@@ -1,6 +1,7 @@
 """Checks of a question: wrenches, previous commands, flow, failed and damaged actuators."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
@@ -24,13 +25,15 @@ Axes = tuple[Axis, ...]
 """Axes that a question asks for."""
 
 
+WHOLE = Damage()
+
+
 class Usable(NamedTuple):
     """The actuators of a robot, and which of them an allocator may use."""
 
     layout: Layout
     """All of them, with the limits that damage has left."""
-    failed: tuple[str, ...]
-    """Names of those that are left out."""
+    damage: Damage
     healthy: Layout
     """The others."""
     alive: NDArray[np.bool_]
@@ -41,22 +44,27 @@ class Usable(NamedTuple):
         return among_all(command, self.alive)
 
 
-def usable(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Usable:
-    """A robot some of whose actuators are lost or damaged. Raises AllocationError: `failed` is no list of
-    names, `health` no `Health`; LayoutError: an unknown actuator, or none left."""
-    if health is not None:
-        if not isinstance(health, Health):
-            raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
-        layout = health.applied_to(layout)
-    if failed == () or failed == []:
-        return Usable(layout, (), layout, np.ones(layout.n, dtype=bool))
-    if isinstance(failed, str) or not (
-        isinstance(failed, Sequence) and all(isinstance(name, str) for name in failed)
-    ):
-        hint = f"the text {failed!r}; write [{failed!r}]" if isinstance(failed, str) else repr(failed)
-        raise AllocationError(f"failed: expected a list of fin names, got {hint}")
-    alive = np.array([name not in set(failed) for name in layout.names])
-    return Usable(layout, tuple(failed), layout.without(failed), alive)
+def damage_of(damage: Damage | None, lost: Sequence[str], failed: Sequence[str]) -> Damage:
+    """What a question says of damage; `failed` means `lost`. Raises AllocationError: it is no damage, or names
+    are no list."""
+    if damage is None:
+        known = WHOLE
+    elif isinstance(damage, Damage):
+        known = damage
+    else:
+        raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
+    more = [Damage(names).lost for names in (lost, failed) if names != () and names != []]
+    return replace(known, lost=[*known.lost, *(name for names in more for name in names)]) if more else known
+
+
+def usable(layout: Layout, damage: Damage) -> Usable:
+    """A robot some of whose actuators are lost or damaged. Raises LayoutError: an unknown actuator, or none
+    left."""
+    left = damage.applied_to(layout)
+    if not damage.lost:
+        return Usable(left, damage, left, np.ones(left.n, dtype=bool))
+    alive = np.array([name not in set(damage.lost) for name in left.names])
+    return Usable(left, damage, left.without(damage.lost), alive)
 
 
 def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> Array:

@@ -15,7 +15,7 @@ from finlab.cli.shared_options import (
     Count,
     Flow,
     JsonFile,
-    Names,
+    Lost,
     Robot,
     Wrench,
     check_json_file,
@@ -58,18 +58,18 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 
 
 @verbs.command
-def show(layout: Robot, failed: Names = (), flow: Flow = None, json: JsonFile = None) -> None:
+def show(layout: Robot, lost: Lost = (), flow: Flow = None, json: JsonFile = None) -> None:
     """Print the actuators of a layout and its score card: what it can do, what it can lose.
 
     Args:
-        failed: name of an actuator that does not work.
+        lost: name of an actuator that does not work.
     """
     from finlab.analysis import score_card
     from finlab.cli.layout_text import layout_text, score_card_text
 
     check_json_file(json)
-    robot, lost = open_robot(layout, failed)
-    card = score_card(robot, lost, flow)
+    robot, gone = open_robot(layout, lost)
+    card = score_card(robot, gone, flow)
     put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
 
 

@@ -13,7 +13,7 @@ from finlab.cli.shared_options import (
     Count,
     Flow,
     JsonFile,
-    Names,
+    Lost,
     Robot,
     Wrench,
     check_json_file,
@@ -26,14 +26,14 @@ from finlab.errors import FinlabError
 def allocate(
     layout: Robot,
     wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
-    failed: Names = (),
+    lost: Lost = (),
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     robust: Annotated[float | None, arg(metavar="W")] = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
-    health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
+    weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE", aliases=["--health"])] = (),
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
@@ -46,33 +46,34 @@ def allocate(
 
     Args:
         wrench: target in the body frame [N, N m]; nan for an axis that does not count.
-        failed: name of a fin that does not work.
+        lost: name of an actuator that does not work.
         method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
         axis_weights: for `closest`: weight of each axis of the error.
         priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
-        health: a weak actuator: share that is left of its limits, such as bow=0.5.
+        weak: an actuator of less strength: share that is left of its limits, such as bow=0.5.
         torn: a fin or rudder that gives a share of its force at every command.
         stuck: a fin or azimuth that no longer turns: the angle at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
         bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
     """
-    from finlab.allocation import Allocator, Health
+    from finlab.allocation import Allocator
     from finlab.allocation.policy import policy_from
     from finlab.allocation.report import allocation_record
+    from finlab.layout.damage import Damage
 
     check_json_file(json)
     if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
         raise FinlabError("wrench: asks for nothing, since every axis is 0 or free; expected a value on one")
-    robot, lost = open_robot(layout, failed)
+    robot, gone = open_robot(layout, lost)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
-    damage = Health.parse(health, torn, stuck, running)
-    result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
+    damage = Damage.parse(gone, weak, torn, stuck, running)
+    result = allocator.allocate(wrench, damage=damage, policy=answer, flow=flow, seed=seed)
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
@@ -86,7 +87,7 @@ def export(
     output: Annotated[Path | None, arg(metavar="DIR", aliases=["-o"])] = None,
     graph: Annotated[Path | None, arg(metavar="FILE")] = None,
     zip: bool = False,
-    failed: Names = (),
+    lost: Lost = (),
     method: Literal["dual", "mdn", "paper"] = "dual",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
@@ -97,7 +98,7 @@ def export(
         output: folder to write the bundle to.
         graph: file to write the graph of actuators to (JSON, node-link form), for networkx and learners.
         zip: write one archive, DIR.zip, instead of a folder.
-        failed: name of a fin that does not work.
+        lost: name of an actuator that does not work.
         method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
         checkpoint: trained checkpoint of mdn or paper, which travels; the shipped one by default.
     """
@@ -105,18 +106,18 @@ def export(
         raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, or both")
     if output is not None and output.suffix == ".json":
         raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
-    robot, failed = open_robot(layout, failed)  # before a network is loaded
+    robot, gone = open_robot(layout, lost)  # before a network is loaded
     if graph is not None:
         from finlab.deploy.bundle import write_graph
 
-        write_graph(robot.without(failed) if failed else robot, graph)
-        print(f"{graph}: {robot.counted}, {len(robot.names) - len(failed)} nodes")
+        write_graph(robot.without(gone) if gone else robot, graph)
+        print(f"{graph}: {robot.counted}, {len(robot.names) - len(gone)} nodes")
     if output is None:
         return
     from finlab.allocation import Allocator
     from finlab.deploy.bundle import make_bundle
 
-    bundle = make_bundle(Allocator(robot, method, checkpoint=checkpoint), failed)
+    bundle = make_bundle(Allocator(robot, method, checkpoint=checkpoint), gone)
     if zip:
         output = output if output.suffix == ".zip" else output.with_name(output.name + ".zip")
         bundle.write_zip(output)

@@ -24,7 +24,7 @@ JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]  # where one
 Wrench = tuple[float, float, float, float, float, float]
 Flow = Annotated[Wrench | None, arg(metavar="VX VY VZ WX WY WZ", help=FLOW)]
 Robot = Annotated[Positional[str], arg(metavar="LAYOUT", help=LAYOUT)]
-Names = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")]
+Lost = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME", aliases=["--failed"])]
 Count = Annotated[int, arg(metavar="N")]
 Cluster = Annotated[str | None, arg(metavar="ADDRESS", help=CLUSTER)]
 

@@ -123,11 +123,11 @@ def _swim(options: Options) -> ClosedLoop:
     """The swim along a trajectory, at its start."""
     from finlab.control import FaultMonitor, make_controller
     from finlab.evaluation.method_specs import load_method_spec
-    from finlab.sim import ClosedLoop, FinFault, make_trajectory
+    from finlab.sim import ClosedLoop, Fault, make_trajectory
 
     robot, lost = open_robot(options.layout)
     world = _world(options)
-    faults = [*(FinFault(name, 0.0) for name in lost), *map(FinFault.parse, options.fail)]
+    faults = [*(Fault(name, 0.0) for name in lost), *map(Fault.parse, options.fail)]
     allocator = load_method_spec(options.method, options.checkpoint).on(robot)
     return ClosedLoop(
         robot,
@@ -167,7 +167,7 @@ def summary(log: RunLog) -> str:
 
     row = follow_row(log)
     keeps_course = log.controller != "velocity"
-    lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]
+    lost = [name for name, works in zip(log.names, log.alive[-1], strict=True) if not works]
     place = (
         f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
         f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
@@ -218,13 +218,12 @@ def monitored(loop: ClosedLoop) -> str:
     """What a monitor takes the fins for, in words."""
     from finlab.layout.damage import Damage
 
-    failed, health = Damage() if loop.verdict is None else loop.verdict.damage
+    damage = Damage() if loop.verdict is None else loop.verdict.damage
     opposed = () if loop.monitor is None else loop.monitor.opposed
     words = [f"{name} pushes the other way" for name in opposed]
-    words += [f"{name} lost" for name in failed if name not in opposed]
+    words += [f"{name} lost" for name in damage.lost if name not in opposed]
     if loop.monitor is not None and not loop.monitor.tells:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
-    if health is not None:
-        words += [f"{name} torn" for name, _ in (*health.torn, *health.weak)]
-        words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
+    words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
+    words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in damage.stuck.items()]
     return ", ".join(words) or "all fins whole"

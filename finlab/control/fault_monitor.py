@@ -37,7 +37,7 @@ class Diagnosis(NamedTuple):
     """What a monitor believes of n fins."""
 
     damage: Damage
-    """The fins that are lost, torn or stuck, for an allocator: `allocate(..., **damage._asdict())`."""
+    """The actuators that are lost, torn or stuck, for an allocator: `allocate(..., damage=damage)`."""
     probability: Array
     """Of each fin not being whole (n,), 0 to 1."""
     strength: Array
@@ -52,7 +52,7 @@ class FaultMonitor:
         monitor = FaultMonitor(layout)
         while swimming:
             verdict = monitor.step(measurement, command)  # the command that was in force until now
-            answer = allocator.allocate(wrench, **verdict.damage._asdict())
+            answer = allocator.allocate(wrench, damage=verdict.damage)
             command = monitor.probed(answer.command)
 
     A fin that rests cannot be distinguished from one that is lost: its probability stays where it was.
@@ -174,7 +174,7 @@ class FaultMonitor:
         self._coarse = np.where(far, steps, self._coarse)
         torn = [k for k in np.flatnonzero(self._torn) if parts[k] not in self._tables]
         stuck = np.flatnonzero(~np.isnan(self._held) & ~self._lost)
-        return Damage.of(
+        return Damage.known(
             self.layout,
             [names[k] for k in np.flatnonzero(self._lost)],
             {names[k]: float(self._coarse[k]) for k in torn},

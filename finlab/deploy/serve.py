@@ -154,7 +154,7 @@ class Server:
     def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
         """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""
         layout = self._robot.layout
-        forces = plant_of(layout).fin_forces(command) if forces is None else forces
+        forces = plant_of(layout).body_forces(command) if forces is None else forces
         return {"id": name, "status": status, **command_record(layout, command, forces)}
 
 

@@ -13,7 +13,6 @@ from finlab.actuators.thruster import Thruster as Thruster
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull
 from finlab.layout.damage import Damage as Damage
-from finlab.layout.damage import Health as Health
 from finlab.layout.effectiveness import layout_effectiveness as layout_effectiveness
 from finlab.layout.effectiveness import own_effectiveness as own_effectiveness
 from finlab.layout.file import layout_to_dict as layout_to_dict

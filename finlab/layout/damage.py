@@ -1,45 +1,110 @@
-"""Fins that do not work as they should: one vocabulary, and what is left of the robot.
-
-A fin is `lost` (it gives no force and leaves the layout: `failed=` of an allocator), `weak`, `torn`, `stuck`,
-`running`, or `whole`. All but the first are a `Health`: a layout with other limits, or with a smaller fin, so
-that every method accounts for it and limits hold as always.
-"""
-
-from __future__ import annotations
+"""Actuators that do not work as they should: five words, and what is left of the robot."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
 from finlab.actuators.actuator import Faults
 from finlab.actuators.fin.fin_model import Amplitude, Frequency
+from finlab.axes import Vector
 from finlab.errors import AllocationError
 from finlab.files.schema import checked
 from finlab.layout.layout import Layout
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
-"""What may be true of a fin."""
-Command = tuple[float, float, float]
+"""What may be true of an actuator."""
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
+_VALUES: Mapping[str, Any] = {
+    "weak": Share,
+    "torn": Share,
+    "stuck": Angle,
+    "running": tuple[Amplitude, Frequency, Angle],
+}
 
 
-class Damage(NamedTuple):
-    """What is known of a robot's fins, as an allocator takes it: `allocate(..., **damage._asdict())`."""
+class _Known(dict[str, Any]):
+    """Values by name that never change, so that damage is hashed."""
 
-    failed: tuple[str, ...] = ()
-    """Names of the fins that are lost."""
-    health: Health | None = None
-    """What is known of fins that work in part; None where there are none."""
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What is known of damaged actuators, by name; those that are not named are whole.
+
+    All but `lost` is a layout with other limits, or with a smaller fin, so that every method accounts for it
+    and limits hold as always. Immutable. Raises AllocationError: a share out of range, an angle that is no
+    number, names that are no list.
+    """
+
+    lost: Sequence[str] = ()
+    """Those that give no force and leave the layout."""
+    weak: Mapping[str, float] = _Known()
+    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency, or of the force."""
+    torn: Mapping[str, float] = _Known()
+    """Share of its law's thrust that one gives at every command, as a fin with a torn blade does."""
+    stuck: Mapping[str, float] = _Known()
+    """Angle [rad] at which one no longer turns; it still pushes."""
+    running: Mapping[str, Vector] = _Known()
+    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
+
+    def __post_init__(self) -> None:
+        lost = self.lost
+        if isinstance(lost, str) or not (
+            isinstance(lost, Sequence) and all(isinstance(name, str) for name in lost)
+        ):
+            hint = f"the text {lost!r}; write [{lost!r}]" if isinstance(lost, str) else repr(lost)
+            raise AllocationError(f"lost: expected a list of names, got {hint}")
+        object.__setattr__(self, "lost", tuple(lost))
+        for kind, value in _VALUES.items():
+            known = checked(getattr(self, kind), dict[str, Any], AllocationError, f"damage: {kind}")
+            each = {
+                name: checked(own, value, AllocationError, f"damage: {kind} {name}")
+                for name, own in known.items()
+            }
+            object.__setattr__(self, kind, _Known(each))
+        if both := set(self.stuck) & set(self.running):
+            raise AllocationError(f"damage: an actuator is stuck or running, got both of {', '.join(both)}")
+
+    @property
+    def partly(self) -> dict[str, Mapping[str, Any]]:
+        """What is known of those that work in part, by kind of fault."""
+        return {kind: getattr(self, kind) for kind in _VALUES if getattr(self, kind)}
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Returns the faults of one actuator that still works, by kind."""
+        return {kind: known[name] for kind, known in self.partly.items() if name in known}
+
+    def with_fault(self, name: str, kind: str, value: Any) -> "Damage":
+        """Returns it with another fault of an actuator; None mends that fault. What is stuck does not run."""
+        if kind == "lost":
+            others = tuple(other for other in self.lost if other != name)
+            return replace(self, lost=others if value is None else (*others, name))
+        out = ("stuck", "running") if kind in ("stuck", "running") and value is not None else (kind,)
+        kept: dict[str, Any] = {
+            own: {k: v for k, v in getattr(self, own).items() if k != name} for own in out
+        }
+        if value is not None:
+            kept[kind][name] = value
+        return replace(self, **kept)
+
+    def renamed(self, names: Mapping[str, str]) -> "Damage":
+        """Returns it for actuators with new names, by their old ones; others are forgotten."""
+        known = {
+            kind: {names[k]: v for k, v in own.items() if k in names} for kind, own in self.partly.items()
+        }
+        return Damage([names[name] for name in self.lost if name in names], **known)
 
     @classmethod
-    def of(
+    def known(
         cls, layout: Layout, lost: Sequence[str], torn: Mapping[str, float], stuck: Mapping[str, float]
-    ) -> Damage:
+    ) -> "Damage":
         """What actuators that are lost, torn (the share of their force that is left) and stuck (where) leave.
 
         What cannot be used any more counts as lost: a stuck rudder or thruster, whose force is no choice. A
@@ -49,96 +114,44 @@ class Damage(NamedTuple):
         turning = {name: at for name, at in stuck.items() if "stuck" in may[name]}
         blades = {name: share for name, share in torn.items() if "torn" in may[name]}
         weak = {name: share for name, share in torn.items() if name not in blades}
-        gone = (*lost, *(name for name in stuck if name not in turning))
-        partly = torn or turning
-        return cls(gone, Health.of(weak=weak, torn=blades, stuck=turning) if partly else None)
-
-
-_VALUES: Mapping[str, Any] = {
-    "weak": Share,
-    "stuck": Angle,
-    "running": tuple[Amplitude, Frequency, Angle],
-    "torn": Share,
-}
-
-
-@dataclass(frozen=True)
-class Health:
-    """What is known of damaged fins, by name; those that are not named are whole. Made with `Health.of`."""
-
-    weak: tuple[tuple[str, float], ...] = ()
-    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency of a fin."""
-    stuck: tuple[tuple[str, float], ...] = ()
-    """Zero direction [rad] at which a fin no longer turns; it still flaps."""
-    running: tuple[tuple[str, Command], ...] = ()
-    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
-    torn: tuple[tuple[str, float], ...] = ()
-    """Share, above 0 and up to 1, of its law's thrust that a fin gives at every command, as one with a torn
-    blade does."""
-
-    def __post_init__(self) -> None:
-        for kind, value in _VALUES.items():
-            known = getattr(self, kind)
-            each = [
-                (name, checked(own, value, AllocationError, f"health: {kind} {name}")) for name, own in known
-            ]
-            object.__setattr__(self, kind, tuple(each))
-        named = [name for name, _ in (*self.stuck, *self.running)]
-        if len(set(named)) < len(named):
-            raise AllocationError(f"health: a fin is stuck or running once, got {', '.join(named)}")
-
-    @classmethod
-    def of(
-        cls,
-        weak: Mapping[str, float] | None = None,
-        stuck: Mapping[str, float] | None = None,
-        running: Mapping[str, Command] | None = None,
-        torn: Mapping[str, float] | None = None,
-    ) -> Health:
-        """Health from dictionaries, by the fins' names. Raises AllocationError: a share out of range, an
-        angle that is no number."""
-        kinds = (
-            checked(kind or {}, dict[str, Any], AllocationError, "health")
-            for kind in (weak, stuck, running, torn)
-        )
-        return cls(*(tuple(kind.items()) for kind in kinds))
+        return cls((*lost, *(name for name in stuck if name not in turning)), weak, blades, turning)
 
     @classmethod
     def parse(
-        cls, weak: Sequence[str], torn: Sequence[str], stuck: Sequence[str], running: Sequence[str]
-    ) -> Health | None:
-        """Health from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`; None where all are
-        whole. Raises AllocationError: a text that says something else."""
-        if not (weak or torn or stuck or running):
-            return None
+        cls,
+        lost: Sequence[str] = (),
+        weak: Sequence[str] = (),
+        torn: Sequence[str] = (),
+        stuck: Sequence[str] = (),
+        running: Sequence[str] = (),
+    ) -> "Damage":
+        """Damage from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`. Raises
+        AllocationError: a text that says something else."""
         kept = _named("running", running, 3).items()
-        return cls.of(
-            weak={name: share for name, (share,) in _named("health", weak, 1).items()},
-            torn={name: share for name, (share,) in _named("torn", torn, 1).items()},
-            stuck={name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
-            running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
+        return cls(
+            lost,
+            {name: share for name, (share,) in _named("weak", weak, 1).items()},
+            {name: share for name, (share,) in _named("torn", torn, 1).items()},
+            {name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
+            {name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
         )
 
     def applied_to(self, layout: Layout) -> Layout:
-        """The layout with the limits that are left. Raises LayoutError: there is no fin of a name, or a fin
-        that is a table is said to have lost thrust; AllocationError: an actuator that is no fin cannot be
+        """The layout with the limits that are left; the lost ones are still there. Raises LayoutError: there
+        is no actuator of a name, or one whose law is a table is torn; AllocationError: its kind cannot be
         damaged so."""
-        return _applied(self, layout)
+        return _applied(self, layout) if self.partly else layout
 
 
 @lru_cache(maxsize=64)
-def _applied(health: Health, layout: Layout) -> Layout:
-    faults: dict[str, dict[str, Any]] = {part.name: {} for part in layout.actuators}
-    for kind, known in vars(health).items():
-        for name, value in known:
-            part = layout.part(name)
+def _applied(damage: Damage, layout: Layout) -> Layout:
+    for kind, known in damage.partly.items():
+        for part in map(layout.part, known):
             if kind not in part.FAULTS:
-                may = ", ".join(part.FAULTS)
-                raise AllocationError(f"health of {name!r}: {part.type}s may be {may} or failed, got {kind}")
-            faults[name][kind] = value
-    return replace(
-        layout, actuators=tuple(part.damaged(Faults(**faults[part.name])) for part in layout.actuators)
-    )
+                may = ", ".join((*part.FAULTS, "lost"))
+                raise AllocationError(f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}")
+    parts = (part.damaged(Faults(**damage.of(part.name))) for part in layout.actuators)
+    return replace(layout, actuators=tuple(parts))
 
 
 def _named(option: str, texts: Sequence[str], count: int) -> dict[str, tuple[float, ...]]:

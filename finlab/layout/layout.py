@@ -82,6 +82,11 @@ class Layout(Checked):
         """Names of the actuators that give nothing at rest, such as rudders."""
         return tuple(part.name for part in self.actuators if part.BY_FLOW)
 
+    @cached_property
+    def fins_alone(self) -> "Layout":
+        """The robot with its fins alone; it has some."""
+        return replace(self, actuators=self.fins)
+
     @property
     def is_of_fins(self) -> bool:
         """Whether all actuators are fins."""

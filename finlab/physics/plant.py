@@ -119,7 +119,7 @@ class Plant:
             force[..., places, :], jacobian[..., places, :, :] = answer
         return force, jacobian
 
-    def fin_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
+    def body_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each actuator's force (..., n, 3) [N] in the body frame; see `wrench`."""
         force: Array = body_force(self.forces(command, flow=flow), self.layout.frames)
         return force

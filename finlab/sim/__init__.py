@@ -17,5 +17,5 @@ from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
 from finlab.sim.task import straight as straight
-from finlab.sim.truth import FinFault as FinFault
+from finlab.sim.truth import Fault as Fault
 from finlab.sim.truth import perturbed as perturbed

@@ -38,7 +38,7 @@ class ActuatorForce:
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
         if len(of_fins):
-            self._fins = plant_of(replace(layout, actuators=layout.fins))
+            self._fins = plant_of(layout.fins_alone)
         if len(of_others):
             others = tuple(layout.actuators[i] for i in of_others)
             self._others = plant_of(replace(layout, actuators=others))

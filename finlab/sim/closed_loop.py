@@ -31,7 +31,7 @@ from finlab.sim.actuator_force import ActuatorForce
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
-from finlab.sim.truth import FinFault, checked_truth, damage_of
+from finlab.sim.truth import Fault, checked_truth, damage_of
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of
 from finlab.vehicle.fin_motion import FinMotion
@@ -84,7 +84,7 @@ class ClosedLoop:
         policy: Policy | str | None = None,
         sensors: SensorSettings | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
-        failures: Sequence[FinFault | tuple[str, float]] = (),
+        failures: Sequence[Fault | tuple[str, float]] = (),
         announced: bool = True,
         monitor: FaultMonitor | None = None,
         learner: Learner | None = None,
@@ -97,8 +97,8 @@ class ClosedLoop:
                 f"allocator: expected one for layout {layout.name!r:.60}, got one for "
                 f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
             )
-        events = [FinFault(*failure).checked() for failure in failures]
-        layout.indices([event.fin for event in events])
+        events = [Fault(*failure).checked() for failure in failures]
+        layout.indices([event.name for event in events])
         self.layout, self.allocator, self.task, self.seed = layout, allocator, task, seed
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
@@ -108,9 +108,9 @@ class ClosedLoop:
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth), current)
         """The body that really swims, and the current; it may be replaced on the way."""
-        self.fins = FinMotion(truth)
+        self.fin_motion = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
-        self._forces = ActuatorForce(truth, self.fins)
+        self._forces = ActuatorForce(truth, self.fin_motion)
         self.motion = self._forces.motion
         """The motion of all actuators."""
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
@@ -121,9 +121,9 @@ class ClosedLoop:
     def _begin(self) -> None:
         """The state at the start, and what is known then."""
         layout, n = self.layout, self.layout.n
-        self.broken: dict[str, FinFault] = {}
+        self.broken: dict[str, Fault] = {}
         """What is true: the actuators that are not whole now, by name."""
-        self._told: dict[str, FinFault] = {}
+        self._told: dict[str, Fault] = {}
         self._held = np.full(n, np.nan)
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
@@ -164,7 +164,7 @@ class ClosedLoop:
         return log_of_ticks(
             self._ticks,
             layout=self.layout.name,
-            fins=self.layout.names,
+            names=self.layout.names,
             method=self.allocator.method,
             controller=self.controller.name,
             task=self.task.name,
@@ -203,13 +203,13 @@ class ClosedLoop:
             share: of the force that a torn actuator gives.
             announced: whether the allocator knows at once; by default as the swim was made.
         """
-        fault = FinFault(name, self.time, kind, share).checked()
+        fault = Fault(name, self.time, kind, share).checked()
         index = self.layout.index(name)
         if kind == "lost":
             self.layout.without([*(other for other in self.lost if other != name), name])
         self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
         if kind == "stuck" and index in self.motion.of_fins:
-            self.fins.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
+            self.fin_motion.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
         tells = self.announced if announced is None else announced
         for known in (self.broken, self._told) if tells else (self.broken,):
             known.pop(name, None)
@@ -228,7 +228,7 @@ class ClosedLoop:
         time = self.time
         while self._pending and self._pending[0].time_s <= time + 1e-9:
             event = self._pending.pop(0)
-            self.fail(event.fin, event.kind, event.share)
+            self.fail(event.name, event.kind, event.share)
         now = self._sensors.measure(time, self.state)
         if self.monitor is not None:
             self.verdict = self.monitor.step(now, self._command)
@@ -239,7 +239,7 @@ class ClosedLoop:
         wanted = complete(self.controller.wrench(now, setpoint, self._given()))
         answer = self.allocator.allocate(
             wanted,
-            **self.damage._asdict(),
+            damage=self.damage,
             flow=self._flow,
             previous=self._answered,
             reference=self._reference(time, complete),
@@ -291,19 +291,17 @@ class ClosedLoop:
         believed = self._believed
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
-        force[list(self.layout.indices(self.damage.failed))] = 0.0
+        force[list(self.layout.indices(self.damage.lost))] = 0.0
         before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
         """What completes the controller's wrench for the actuators that work now."""
-        failed = self.damage.failed
-        if failed not in self._completion:
+        lost = tuple(self.damage.lost)
+        if lost not in self._completion:
             controller = self.controller
-            self._completion[failed] = Completion(
-                self.allocator.layout, failed, controller.axes, controller.free
-            )
-        return self._completion[failed]
+            self._completion[lost] = Completion(self.allocator.layout, lost, controller.axes, controller.free)
+        return self._completion[lost]
 
     def _alive(self) -> NDArray[np.bool_]:
         """Which actuators (n,) are not lost."""
@@ -312,11 +310,10 @@ class ClosedLoop:
 
     def _sent(self, command: Array) -> Array:
         """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
-        health = self.damage.health
-        if health is None or not health.weak:
+        if not self.damage.weak:
             return command
         result = command.copy()
-        for name, share in health.weak:
+        for name, share in self.damage.weak.items():
             index = self.layout.index(name)
             result[index, self.layout.actuators[index].THRUST or 0] /= share
         return result
@@ -338,7 +335,7 @@ class ClosedLoop:
         moved, share = self._moved(sent), np.ones(n)
         for fault in self.broken.values():
             if fault.kind == "torn":
-                share[self.layout.index(fault.fin)] = fault.share
+                share[self.layout.index(fault.name)] = fault.share
         mean, power = np.zeros((n, 6)), np.zeros((2, n))
         for k in range(n_steps):
             push = self._forces.step(moved, dt, self.vehicle.velocity_in_water(self.state), share)
@@ -364,7 +361,7 @@ class ClosedLoop:
             delivered=mean.sum(axis=0),
             command=sent,
             fin_motion=self.motion.command,
-            fin_force=mean[:, :3],
+            force=mean[:, :3],
             inertial_power=power[0],
             driving_power=power[1],
             alive=self._alive(),

@@ -8,7 +8,7 @@ robot leaves its bounds, the excitation fades until it is back.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -155,8 +155,8 @@ class Exciting(Method):
         self._calls = 0
         self._is_fin = layout.is_fin
         self._direction: Array | None = None
-        if layout.fins:
-            self._plant = plant_of(replace(layout, actuators=layout.fins))
+        if layout.n_fins:
+            self._plant = plant_of(layout.fins_alone)
             self._largest = self._most[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
             shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
             grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)

@@ -17,6 +17,8 @@ from finlab.whole_file import write_whole
 
 FORMAT = "finlab-swim"
 VERSION = 4
+_IN_FILE = {"force": "fin_force"}
+"""Columns -> their names in an NPZ file, where the two differ."""
 MAX_BYTES = 200_000_000
 """Largest log that is read, unpacked [bytes]; an hour has a quarter of it."""
 
@@ -58,8 +60,8 @@ class Tick(NamedTuple):
     lost."""
     fin_motion: AnyArray
     """What the fins did at the end of the period (n, 3), in the same units."""
-    fin_force: AnyArray
-    """Force of each fin (n, 3) in the body frame, mean over the period [N]."""
+    force: AnyArray
+    """Force of each actuator (n, 3) in the body frame, mean over the period [N]."""
     inertial_power: AnyArray
     """|I alpha omega| of each fin (n,), mean over the period [W]."""
     driving_power: AnyArray
@@ -81,7 +83,7 @@ FINS, COMMANDS = (None,), (None, 3)
 SHAPES: dict[str, tuple[int | None, ...]] = {
     "position": (3,), "quaternion": (4,), "motion": (6,), "flow": (3,), "measured": (12,), "reference": (3,),
     "asked": (6,), "allocated": (6,), "delivered": (6,), "command": COMMANDS, "fin_motion": COMMANDS,
-    "fin_force": COMMANDS, "inertial_power": FINS, "driving_power": FINS,
+    "force": COMMANDS, "inertial_power": FINS, "driving_power": FINS,
     "alive": FINS, "fault_probability": FINS, "strength": FINS, "strength_std": FINS,
 }  # fmt: skip
 """Shape of a column at each tick, None for the number of fins; the others are numbers."""
@@ -92,7 +94,8 @@ class RunLog:
     """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
 
     layout: str
-    fins: tuple[str, ...]
+    names: tuple[str, ...]
+    """Of the actuators."""
     method: str
     controller: str
     task: str
@@ -123,9 +126,10 @@ class RunLog:
     def npz(self) -> bytes:
         """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""
         meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-        meta |= {name: getattr(self, name) for name, _ in _ABOUT}
+        meta |= {"fins" if name == "names" else name: getattr(self, name) for name, _ in _ABOUT}
+        columns = {_IN_FILE.get(name, name): column for name, column in self.columns.items()}
         file = io.BytesIO()
-        np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
+        np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **columns)
         return file.getvalue()
 
     def save(self, path: str | Path) -> None:
@@ -135,7 +139,7 @@ class RunLog:
 
 _ABOUT = [(field.name, field.type) for field in fields(RunLog) if field.name != "columns"]
 _FORM = [("format", Literal["finlab-swim"]), ("version", Literal[4])]
-_About: Any = defstruct("About", [*_FORM, *_ABOUT])
+_About: Any = defstruct("About", [*_FORM, *_ABOUT], rename={"names": "fins"})
 """What an NPZ file says of a swim beside its columns."""
 
 
@@ -148,9 +152,14 @@ def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
 def load_log(path: str | Path) -> RunLog:
     """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this version."""
     what = "a swim log written by finlab simulate"
-    columns = read_arrays(path, ("meta", *Tick._fields), MAX_BYTES, what)
+    in_file = [_IN_FILE.get(name, name) for name in Tick._fields]
+    arrays = read_arrays(path, ("meta", *in_file), MAX_BYTES, what)
+    columns = {
+        "meta": arrays["meta"],
+        **{name: arrays[own] for name, own in zip(Tick._fields, in_file, strict=True)},
+    }
     about = checked(json_of(columns.pop("meta"), f"{path}: meta"), _About, DataError, f"{path}: meta")
-    n, fins = columns["time"].size, len(about.fins)
+    n, fins = columns["time"].size, len(about.names)
     shapes = {
         name: tuple(fins if size is None else size for size in SHAPES.get(name, ())) for name in columns
     }

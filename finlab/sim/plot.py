@@ -21,7 +21,7 @@ def swim_picture(log: RunLog) -> Figure:
     """The path of one swim from above and its depth over time, with the reference and each loss."""
     figure = paths_picture({log.layout: (log.time, log.reference, {log.method: (log.time, log.position)})})
     above = figure.axes[0]
-    for name, works in zip(log.fins, log.alive.T, strict=True):
+    for name, works in zip(log.names, log.alive.T, strict=True):
         if not works.all():
             x, y = log.position[int((~works).argmax()), :2]
             above.plot(x, y, "kx", markersize=8)

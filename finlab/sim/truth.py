@@ -83,22 +83,22 @@ def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] 
 
 
 KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
-"""What can become of a fin in a swim: it hangs still; it gives a share of its thrust; it beats but
+"""What can become of an actuator in a swim: it hangs still; it gives a share of its thrust; it beats but
 no longer turns; it works again as it should."""
 
 
-class FinFault(NamedTuple):
-    """One event of a swim; `("front_left", 30.0)` is a fin that is lost."""
+class Fault(NamedTuple):
+    """One event of a swim; `("front_left", 30.0)` is one that is lost."""
 
-    fin: str
+    name: str
     time_s: float
     """When [s]."""
     kind: Kind = "lost"
     share: float = 0.5
-    """Share of the thrust that is left of a torn fin, above 0 and below 1; of no meaning for the others."""
+    """Share of the thrust that is left of a torn one, above 0 and below 1; of no meaning for the others."""
 
     @classmethod
-    def parse(cls, text: str) -> "FinFault":
+    def parse(cls, text: str) -> "Fault":
         """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:torn=SHARE` says; else
         a `FinlabError`."""
         name, at, rest = text.rpartition("@")
@@ -116,22 +116,22 @@ class FinFault(NamedTuple):
             )
         return fault
 
-    def checked(self) -> "FinFault":
+    def checked(self) -> "Fault":
         """Itself; a `FinlabError` where a time, a kind or a share is none."""
         if not (math.isfinite(self.time_s) and self.time_s >= 0.0):
-            raise FinlabError(f"failure of {self.fin}: expected a time of 0 s or more, got {self.time_s}")
+            raise FinlabError(f"failure of {self.name}: expected a time of 0 s or more, got {self.time_s}")
         if self.kind not in KINDS:
-            raise FinlabError(f"failure of {self.fin}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
+            raise FinlabError(f"failure of {self.name}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
         if not 0.0 < self.share < 1.0:
             raise FinlabError(
-                f"failure of {self.fin}: expected a share of the thrust between 0 and 1, got {self.share}"
+                f"failure of {self.name}: expected a share of the thrust between 0 and 1, got {self.share}"
             )
         return self
 
 
-def damage_of(layout: Layout, faults: Mapping[str, FinFault], held: Array) -> Damage:
+def damage_of(layout: Layout, faults: Mapping[str, Fault], held: Array) -> Damage:
     """What faults, by name, leave of a robot; `held` (n,) is where actuators are stuck."""
     torn = {name: fault.share for name, fault in faults.items() if fault.kind == "torn"}
     stuck = {name: float(held[layout.index(name)]) for name, fault in faults.items() if fault.kind == "stuck"}
     lost = [name for name, fault in faults.items() if fault.kind == "lost"]
-    return Damage.of(layout, lost, torn, stuck)
+    return Damage.known(layout, lost, torn, stuck)

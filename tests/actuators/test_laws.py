@@ -171,7 +171,7 @@ def test_a_plant_judges_any_mix() -> None:
     plant = Plant(hybrid())
     command = plant.sample(np.random.default_rng(0), (6,))
     flow = np.array([1.2, 0.1, -0.1, 0.0, 0.2, 0.3])
-    force = plant.fin_forces(command, flow=flow)
+    force = plant.body_forces(command, flow=flow)
     torque = np.cross(plant.layout.position, force)
     torque[:, 0] += 0.02 * force[:, 0]
     torque[:, 3] -= 0.01 * force[:, 3]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocation, Allocator, Health, Policy
+from finlab.allocation import Allocation, Allocator, Damage, Policy
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
@@ -35,8 +35,8 @@ def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> No
     allocator = quick_allocator(method)
     layout = load_layout("A")
     previous = allocator.allocate(layout, SURGE).command
-    health = Health.of(weak={"back_left": 0.5})
-    result = allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, health=health)
+    health = Damage(weak={"back_left": 0.5})
+    result = allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, damage=health)
     for twin in round_trips(result):
         assert twin == result
         for field in fields(result):
@@ -44,9 +44,9 @@ def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> No
                 assert equal(getattr(twin, field.name), getattr(result, field.name)), field.name
         assert str(twin) == str(result) and repr(twin) == repr(result)
     assert (
-        allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, health=health) == result
+        allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, damage=health) == result
     )
-    assert allocator.allocate(layout, wrench, failed=["front_left"], health=health) != result
+    assert allocator.allocate(layout, wrench, failed=["front_left"], damage=health) != result
 
 
 def test_every_field_counts_but_the_time() -> None:
@@ -89,7 +89,7 @@ def test_all_figures_are_those_of_the_plant(method: str) -> None:
         result = quick_allocator(method).allocate(layout, wrench, failed=failed)
         plant = Plant(layout)
         np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
-        np.testing.assert_allclose(result.forces, plant.fin_forces(result.command), atol=1e-12)
+        np.testing.assert_allclose(result.forces, plant.body_forces(result.command), atol=1e-12)
         assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.scale), abs=1e-12)
         assert isinstance(result.err_norm, float)
         assert all(not np.any(result.forces[i]) for i in layout.indices(failed))
@@ -190,11 +190,11 @@ def wrenches(n: int = 6) -> np.ndarray:
 @pytest.mark.parametrize("method", ["dual", "mdn"])
 def test_policies_answer_as_in_single_calls(method: str, policy: Policy | str) -> None:
     allocator, layout, targets = quick_allocator(method), load_layout("octo"), wrenches()
-    health = Health.of(weak={layout.names[1]: 0.7})
+    health = Damage(weak={layout.names[1]: 0.7})
     failed = [layout.names[0]]
-    batch = allocator.allocate_batch(layout, targets, failed=failed, policy=policy, health=health, seed=1)
+    batch = allocator.allocate_batch(layout, targets, failed=failed, policy=policy, damage=health, seed=1)
     singles = [
-        allocator.allocate(layout, target, failed=failed, policy=policy, health=health, seed=1)
+        allocator.allocate(layout, target, failed=failed, policy=policy, damage=health, seed=1)
         for target in targets
     ]
     assert 0 < batch.reachable.sum() < len(targets)
@@ -222,7 +222,7 @@ def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     allocator, layout, targets = quick_allocator(method), load_layout("ucat"), wrenches(4)
     batch = allocator.allocate_batch(layout, targets, failed=[layout.names[2]], seed=5)
     np.testing.assert_allclose(batch.wrench, Plant(layout).wrench(batch.command), atol=1e-12)
-    np.testing.assert_allclose(batch.forces, Plant(layout).fin_forces(batch.command), atol=1e-12)
+    np.testing.assert_allclose(batch.forces, Plant(layout).body_forces(batch.command), atol=1e-12)
     np.testing.assert_allclose(batch.err_norm, np.linalg.norm((targets - batch.wrench) / batch.scale, axis=1))
     assert len(batch) == 4 and batch.effort.shape == (4,)
     assert (batch.wrench_expected is not None) == (method == "paper")
@@ -255,5 +255,5 @@ def test_a_method_that_does_not_know_the_policy_says_so_at_once() -> None:
     for policy in ("priority", Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
         with pytest.raises(AllocationError, match="minimizes the plain error"):
             allocator.allocate_batch(layout, [[0.1, 0, 0, 0, 0, 0]], policy=policy)
-    with pytest.raises(AllocationError, match="health: expected a Health, got 'weak'"):
-        allocator.allocate_batch(layout, [[0.1, 0, 0, 0, 0, 0]], health="weak")  # type: ignore[arg-type]
+    with pytest.raises(AllocationError, match="damage: expected a Damage, got 'weak'"):
+        allocator.allocate_batch(layout, [[0.1, 0, 0, 0, 0, 0]], damage="weak")  # type: ignore[arg-type]

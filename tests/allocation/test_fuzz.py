@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Health, Policy
+from finlab.allocation import Allocator, Damage, Policy
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -48,7 +48,7 @@ def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     if rng.random() < 0.3:
         kind = pick(rng, ("weak", "stuck", "running", "torn"))
         value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
-        asked["health"] = Health.of(**{kind: {names[-1]: value}})
+        asked["damage"] = Damage(**{kind: {names[-1]: value}})
     return asked
 
 
@@ -86,7 +86,7 @@ def ask(seed: int) -> None:
         try:
             result = allocator.allocate(robot, target, policy=how, **asked)
         except LayoutError as error:  # what damage leaves of a fin may be below all bounds
-            assert "must be at least" in str(error) and "health" in asked
+            assert "must be at least" in str(error) and "damage" in asked
             return
         if result.bound is not None and result.reachable:
             assert 0.0 <= result.bound <= result.power * (1 + 1e-6) + 1e-12

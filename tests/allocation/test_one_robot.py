@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.allocation import METHODS, Allocator, Health
+from finlab.allocation import METHODS, Allocator, Damage
 from finlab.allocation.allocation import CHUNK
 from finlab.allocation.allocator import MOST_PREPARED
 from finlab.allocation.method import Method
@@ -82,10 +82,10 @@ def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.
     for _ in range(3):
         allocator.allocate(SURGE)
         allocator.allocate(SURGE, failed=["front_left"])
-        allocator.allocate(SURGE, health=Health.of(weak={"back_left": 0.5}))
+        allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5}))
     assert len(made) == 2
     for k in range(MOST_PREPARED + 3):
-        allocator.allocate(SURGE, health=Health.of(weak={"back_left": 0.5 + 0.01 * k}))
+        allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5 + 0.01 * k}))
     assert len(allocator._prepared) == MOST_PREPARED
 
 

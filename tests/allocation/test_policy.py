@@ -62,7 +62,7 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
     residual = (target - result.wrench) / result.scale
     facing = residual / np.linalg.norm(residual)
     strongest = np.array([[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins])
-    thrust = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=1)
+    thrust = np.linalg.norm(Plant(layout).body_forces(strongest), axis=1)
     pulls = ((facing / result.scale) @ layout_effectiveness(layout)).reshape(-1, 2)
     return float(facing @ (target / result.scale) - thrust @ np.linalg.norm(pulls, axis=1))
 

@@ -6,13 +6,14 @@ import re
 import numpy as np
 import pytest
 
-from finlab.allocation import Health
+from finlab.allocation import Damage
 from finlab.allocation.question import (
     MAX_WRENCH,
     check_layout,
     check_previous,
     check_seed,
     check_wrenches,
+    damage_of,
     usable,
 )
 from finlab.errors import AllocationError, CommandError
@@ -23,13 +24,13 @@ ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in
 
 def test_commands_of_all_fins_are_handed_through() -> None:
     command = np.ones((2, 3, 3))
-    assert usable(ROBOT, ()).among_all(command) is command
-    assert usable(ROBOT, []).among_all(command) is command
+    assert usable(ROBOT, Damage()).among_all(command) is command
+    assert usable(ROBOT, Damage([])).among_all(command) is command
 
 
 def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
-    fins = usable(ROBOT, ["b"])
-    assert fins.failed == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
+    fins = usable(ROBOT, Damage(["b"]))
+    assert fins.damage.lost == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
     assert fins.alive.tolist() == [True, False, True]
     command = np.arange(12.0).reshape(2, 2, 3)
     full = fins.among_all(command)
@@ -39,7 +40,7 @@ def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
 
 
 def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
-    fins = usable(ROBOT, ("a",), Health.of(running={"c": (0.2, 1.0, 0.5)}))
+    fins = usable(ROBOT, Damage(["a"], running={"c": (0.2, 1.0, 0.5)}))
     kept = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
     assert fins.layout.fins[2].limits == fins.healthy.fins[1].limits == kept
     assert fins.layout.fins[1] == ROBOT.fins[1]
@@ -48,19 +49,19 @@ def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
 @pytest.mark.parametrize(
     ("failed", "sentence"),
     [
-        ("a", "failed: expected a list of fin names, got the text 'a'; write ['a']"),
-        (["a", 2], "failed: expected a list of fin names, got ['a', 2]"),
-        ({"a"}, "failed: expected a list of fin names, got {'a'}"),
+        ("a", "lost: expected a list of names, got the text 'a'; write ['a']"),
+        (["a", 2], "lost: expected a list of names, got ['a', 2]"),
+        ({"a"}, "lost: expected a list of names, got {'a'}"),
     ],
 )
 def test_failed_fins_are_a_list_of_names(failed: object, sentence: str) -> None:
     with pytest.raises(AllocationError, match=f"^{re.escape(sentence)}$"):
-        usable(ROBOT, failed)  # type: ignore[arg-type]
+        damage_of(None, failed, ())  # type: ignore[arg-type]
 
 
-def test_health_is_made_with_health_of() -> None:
-    with pytest.raises(AllocationError, match="health: expected a Health, got 'weak'; make one with"):
-        usable(ROBOT, (), "weak")  # type: ignore[arg-type]
+def test_damage_of_another_type_is_refused() -> None:
+    with pytest.raises(AllocationError, match="damage: expected a Damage, got 'weak'"):
+        damage_of("weak", (), ())  # type: ignore[arg-type]
 
 
 def test_the_largest_wrench_is_still_taken() -> None:

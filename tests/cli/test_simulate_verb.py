@@ -30,7 +30,7 @@ def test_a_log_is_written(line: list[str], tmp_path: Path, capsys: pytest.Captur
     printed = capsys.readouterr().out
     assert "ATE" in printed and "lost: front_left" in printed and "written log.npz" in printed
     log = load_log(out / "log.npz")
-    assert log.task == "line" and not log.alive[-1, log.fins.index("front_left")]
+    assert log.task == "line" and not log.alive[-1, log.names.index("front_left")]
     assert {path.name for path in out.iterdir()} == FILES
 
 
@@ -64,7 +64,7 @@ def test_a_monitor_says_what_it_finds(
     assert main([*argv, "--monitor", "-o", str(tmp_path / "swim")]) == 0
     assert "s: the monitor takes front_left lost" in capsys.readouterr().out
     log = load_log(tmp_path / "swim" / "log.npz")
-    assert log.fault_probability[-1].argmax() == log.fins.index("front_left")
+    assert log.fault_probability[-1].argmax() == log.names.index("front_left")
     assert main(argv) == 0
     assert "monitor" not in capsys.readouterr().out
 

@@ -12,7 +12,7 @@ from finlab.errors import LayoutError
 from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
-from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, make_trajectory, perturbed
+from finlab.sim import NOISE_ALONE, ClosedLoop, Fault, RunLog, make_trajectory, perturbed
 from tests.any_robot import AnyRobot
 from tests.ripple import rippled
 
@@ -21,7 +21,7 @@ PRIOR = 0.01
 """More than any fin's prior probability of being broken."""
 
 
-def swim(layout: Layout, allocator: Allocator, failures: list[FinFault], **options: object) -> ClosedLoop:
+def swim(layout: Layout, allocator: Allocator, failures: list[Fault], **options: object) -> ClosedLoop:
     """A swim with noise and a current, watched, of whose failures the allocator is not told."""
     return ClosedLoop(
         layout,
@@ -46,17 +46,17 @@ def until(loop: ClosedLoop, seconds: float) -> RunLog:
 def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None:
     loop = swim(layout_a, analytic.on(layout_a), [])
     log = until(loop, 30.0)
-    assert loop.damage.failed == () and loop.damage.health is None
+    assert loop.damage == Damage()
     assert log.fault_probability.max() < 0.5 and np.median(log.fault_probability) < PRIOR
     np.testing.assert_allclose(log.strength[-1], 1.0, atol=0.15)
 
 
 @pytest.mark.parametrize("name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)])
 def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> None:
-    loop = swim(layout_a, AnyRobot().on(layout_a), [FinFault(name, 12.0)])
+    loop = swim(layout_a, AnyRobot().on(layout_a), [Fault(name, 12.0)])
     log = until(loop, 16.0)
     fin = layout_a.index(name)
-    assert loop.damage.failed == (name,)
+    assert loop.damage.lost == (name,)
     lost = log.time >= 12.0
     assert not log.alive[lost, fin].any()
     found = float(log.time[np.isnan(log.command[:, fin, 0])][0])
@@ -70,40 +70,38 @@ def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> 
 @pytest.mark.parametrize("lost", [("front_right", "back_left"), ("front_left", "back_right")])
 def test_two_fins_lost_at_one_moment_are_found(layout_a: Layout, lost: tuple[str, str]) -> None:
     """Each alone explains as little of it as any other fin would."""
-    loop = swim(layout_a, AnyRobot().on(layout_a), [FinFault(name, 12.0) for name in lost])
+    loop = swim(layout_a, AnyRobot().on(layout_a), [Fault(name, 12.0) for name in lost])
     until(loop, 12.0)
-    assert loop.damage.failed == ()
+    assert loop.damage.lost == ()
     until(loop, 16.0)
-    assert loop.damage.failed == lost
+    assert loop.damage.lost == lost
 
 
 def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> None:
-    loop = swim(layout_a, analytic.on(layout_a), [FinFault("back_left", 12.0, "torn", 0.4)])
+    loop = swim(layout_a, analytic.on(layout_a), [Fault("back_left", 12.0, "torn", 0.4)])
     log = until(loop, 30.0)
     fin = layout_a.index("back_left")
-    assert loop.damage.failed == () and loop.damage.health is not None
+    assert loop.damage.lost == () and loop.damage.partly
     assert log.strength[-1, fin] == pytest.approx(0.4, abs=0.12)
-    assert dict(loop.damage.health.thrust)["back_left"] == pytest.approx(0.4, abs=0.15)
+    assert loop.damage.torn["back_left"] == pytest.approx(0.4, abs=0.15)
     assert 0.0 < log.strength_std[-1, fin] < 0.15
 
 
 def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobot) -> None:
-    loop = swim(layout_a, analytic.on(layout_a), [FinFault("front_left", 12.0, "stuck")])
+    loop = swim(layout_a, analytic.on(layout_a), [Fault("front_left", 12.0, "stuck")])
     log = until(loop, 20.0)
-    assert loop.damage.failed == () and loop.damage.health is not None
+    assert loop.damage.lost == () and loop.damage.partly
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
-    assert math.remainder(dict(loop.damage.health.stuck)["front_left"] - held, 2 * math.pi) == pytest.approx(
-        0.0, abs=0.35
-    )
+    assert math.remainder(loop.damage.stuck["front_left"] - held, 2 * math.pi) == pytest.approx(0.0, abs=0.35)
 
 
 def test_a_repaired_fin_is_taken_back(layout_a: Layout) -> None:
-    events = [FinFault("back_right", 10.0), FinFault("back_right", 15.0, "whole")]
+    events = [Fault("back_right", 10.0), Fault("back_right", 15.0, "whole")]
     loop = swim(layout_a, AnyRobot().on(layout_a), events)
     until(loop, 15.0)
-    assert loop.damage.failed == ("back_right",)
+    assert loop.damage.lost == ("back_right",)
     until(loop, 60.0)
-    assert loop.damage.failed == () and loop.damage.health is None
+    assert loop.damage == Damage()
 
 
 def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> None:
@@ -112,7 +110,7 @@ def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> No
         layout_a,
         analytic.on(layout_a),
         make_trajectory("lissajous"),
-        failures=[("front_left", 0.0), FinFault("front_left", 8.0)],
+        failures=[("front_left", 0.0), Fault("front_left", 8.0)],
         announced=True,
         seed=1,
     )
@@ -133,11 +131,11 @@ def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> No
 
 def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:
     monitor = FaultMonitor(layout_a)
-    assert monitor.tell("front_left", 0.0).damage.failed == ("front_left",)
-    assert monitor.tell("front_left").damage.failed == ()
+    assert monitor.tell("front_left", 0.0).damage.lost == ("front_left",)
+    assert monitor.tell("front_left").damage.lost == ()
     verdict = monitor.tell("back_left", 0.5, stuck=0.3)
-    assert verdict.damage.health is not None and dict(verdict.damage.health.stuck) == {"back_left": 0.3}
-    assert dict(verdict.damage.health.thrust) == {"back_left": 0.5}
+    assert verdict.damage.stuck == {"back_left": 0.3}
+    assert verdict.damage.torn == {"back_left": 0.5}
     assert verdict.probability[layout_a.index("back_left")] > 0.99
     with pytest.raises(LayoutError, match="no fin 'tail'"):
         monitor.tell("tail")
@@ -155,7 +153,7 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
         monitor._judge(nowhere)
         assert monitor.verdict().damage == Damage()
     monitor._judge(nowhere)
-    assert monitor.verdict().damage.failed == (layout_a.names[2],), "the second in a row decides"
+    assert monitor.verdict().damage.lost == (layout_a.names[2],), "the second in a row decides"
 
 
 @pytest.mark.parametrize("truth", ["ripple", "askew"])
@@ -165,7 +163,7 @@ def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: A
     loop = swim(layout_a, analytic.on(layout_a), [], truth=built)
     loop = rippled(loop) if truth == "ripple" else loop
     until(loop, 25.0)
-    assert loop.damage.failed == () and loop.damage.health is None
+    assert loop.damage == Damage()
 
 
 def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
@@ -178,4 +176,4 @@ def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
     for _ in range(60):
         verdict = monitor.step(still._replace(velocity=np.zeros(3)), command)
     assert verdict.strength[0] < 0.9 or verdict.probability[0] > 0.5, "the case is not hard enough"
-    assert layout_a.names[0] not in verdict.damage.failed
+    assert layout_a.names[0] not in verdict.damage.lost

@@ -71,7 +71,7 @@ def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
 def _commands(layout: Layout, thrust: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Commands at full amplitude whose frequency gives the thrusts; both laws grow with its square."""
     upper = layout.upper
-    full = np.linalg.norm(Plant(layout).fin_forces(np.where([True, True, False], upper, 0.0)), axis=-1)
+    full = np.linalg.norm(Plant(layout).body_forces(np.where([True, True, False], upper, 0.0)), axis=-1)
     return np.stack([upper[:, 0], upper[:, 1] * np.sqrt(thrust / full), angle], axis=-1)
 
 

@@ -117,7 +117,7 @@ def test_restricted_zero_directions_confine_the_force_as_described():
     rng = np.random.default_rng(0)
     lower = layout.lower
     upper = layout.upper
-    force = Plant(layout).fin_forces(rng.uniform(lower, upper, (500, 4, 3)))
+    force = Plant(layout).body_forces(rng.uniform(lower, upper, (500, 4, 3)))
     i = layout.index
     assert force[:, [i("front_left"), i("front_right")], 0].min() >= -1e-9
     assert force[:, i("back_left"), 2].min() > 0.0

@@ -22,7 +22,7 @@ from finlab.layout import (
     own_effectiveness,
     parse_layout,
 )
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
 from tools.schemas import PACKAGE
@@ -155,7 +155,7 @@ def test_fins_with_any_shaft_push_as_a_formula_of_its_own_says():
     force = thrust * (np.cos(phi) * zero + np.sin(phi) * np.cross(shaft, zero))
     wrench = np.concatenate([force.sum(1), np.cross(place, force).sum(1)], axis=-1)
     np.testing.assert_allclose(Plant(layout).wrench(command), wrench, atol=1e-12)
-    np.testing.assert_allclose(Plant(layout).fin_forces(command), force, atol=1e-12)
+    np.testing.assert_allclose(Plant(layout).body_forces(command), force, atol=1e-12)
 
 
 def test_the_effectiveness_is_force_and_lever():
@@ -237,7 +237,7 @@ def test_what_works_for_fins_only_says_so():
 
 def test_damage_leaves_the_other_actuators_as_they_are():
     layout = parse_layout(GOOD)
-    health = Health.of(weak={"side": 0.5, "lift": 0.5, "pod": 0.5}, stuck={"nose": 0.1})
+    health = Damage(weak={"side": 0.5, "lift": 0.5, "pod": 0.5}, stuck={"nose": 0.1})
     damaged = health.applied_to(layout)
     assert damaged.names == layout.names
     assert damaged.upper[[0, 2, 3], [0, 0, 1]].tolist() == [0.3, 25.72, 15.0]
@@ -257,7 +257,7 @@ def test_damage_leaves_the_other_actuators_as_they_are():
 )
 def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):
     with pytest.raises(AllocationError, match=why):
-        Health.of(**damage).applied_to(parse_layout(GOOD))
+        Damage(**damage).applied_to(parse_layout(GOOD))
 
 
 UNCERTAIN = {"share": 0.05, "floor_n": 0.1, "common": "bench", "correlation": 0.4}

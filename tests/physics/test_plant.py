@@ -52,7 +52,7 @@ def test_forces_sum_to_the_wrench_and_are_in_the_body_frame():
     layout = load_layout(shipped_layouts()["mixed"])
     command = random_commands(layout, 1)[0]
     plant = Plant(layout)
-    force = plant.fin_forces(command)
+    force = plant.body_forces(command)
     np.testing.assert_allclose(force.sum(0), plant.wrench(command)[:3], atol=1e-12)
     shaft = np.array(
         [[math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0] for fin in layout.fins]
@@ -68,7 +68,7 @@ def test_a_row_of_nan_is_a_failed_fin():
     np.testing.assert_allclose(
         Plant(layout).wrench(command), Plant(rest).wrench(command[:, [0, 2, 3]]), atol=1e-12
     )
-    assert not Plant(layout).fin_forces(command)[:, 1].any()
+    assert not Plant(layout).body_forces(command)[:, 1].any()
 
 
 @pytest.fixture

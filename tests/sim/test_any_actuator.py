@@ -9,7 +9,7 @@ from finlab import Allocator, load_layout
 from finlab.control import FaultMonitor
 from finlab.evaluation.experiments.hard_days import OTHER_HEAVY
 from finlab.layout import Layout
-from finlab.sim import NO_NOISE, ClosedLoop, FinFault, RunLog, make_trajectory, straight
+from finlab.sim import NO_NOISE, ClosedLoop, Fault, RunLog, make_trajectory, straight
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
 @pytest.mark.parametrize("kind", ["lost", "torn", "stuck"])
 @pytest.mark.parametrize("announced", [True, False])
 def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str, announced: bool) -> None:
-    fault = FinFault(heavy.names[1], 15.0, kind)  # type: ignore[arg-type]
+    fault = Fault(heavy.names[1], 15.0, kind)  # type: ignore[arg-type]
     loop = ClosedLoop(
         heavy, Allocator(heavy), make_trajectory("circle"), failures=[fault], announced=announced, seed=2
     )
@@ -54,11 +54,11 @@ def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str
 
 def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: Layout) -> None:
     path = make_trajectory("lissajous")
-    lost = FinFault(heavy.names[0], 0.5 * path.duration_s)
+    lost = Fault(heavy.names[0], 0.5 * path.duration_s)
     whole = ClosedLoop(heavy, Allocator(heavy), path, seed=0).run()
     loop = ClosedLoop(heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0)
     assert error(loop.run()) < 1.1 * error(whole)
-    assert loop.damage.failed == (lost.fin,)
+    assert loop.damage.lost == (lost.fin,)
 
 
 def test_a_body_that_is_less_damped_in_yaw_than_its_model_is_not_spun(heavy: Layout) -> None:
@@ -72,7 +72,7 @@ def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
         heavy,
         Allocator(heavy),
         make_trajectory("circle"),
-        failures=[FinFault(heavy.names[0], 0.0, "torn", 0.4)],
+        failures=[Fault(heavy.names[0], 0.0, "torn", 0.4)],
     )
     log = loop.run()
     late = log.asked[150:-2] - log.delivered[151:-1]
@@ -84,8 +84,7 @@ def test_a_rudder_that_is_torn_or_stuck_is_told_to_the_allocator() -> None:
     path = make_trajectory("station")
     loop = ClosedLoop(torpedo, Allocator(torpedo), path, monitor=FaultMonitor(torpedo), announced=True)
     loop.fail("rudder_top", "torn", 0.5)
-    health = loop.damage.health
-    assert health is not None and dict(health.thrust) == {"rudder_top": 0.5}
-    assert health.applied_to(torpedo).actuators[1].area == pytest.approx(0.5 * torpedo.actuators[1].area)
+    assert loop.damage.torn == {"rudder_top": 0.5}
+    assert loop.damage.applied_to(torpedo).actuators[1].area == pytest.approx(0.5 * torpedo.actuators[1].area)
     loop.fail("elevator_left", "stuck")
-    assert loop.damage.failed == ("elevator_left",)
+    assert loop.damage.lost == ("elevator_left",)

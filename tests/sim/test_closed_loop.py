@@ -14,7 +14,7 @@ from finlab.layout import Layout
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
-    FinFault,
+    Fault,
     RunLog,
     Tick,
     load_log,
@@ -70,9 +70,9 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
     lost = layout_a.index("front_left")
     assert [bool(tick.alive[lost]) for tick in ticks] == [True] * 5 + [False] * 3
     assert np.isnan(ticks[-1].command[lost]).all()
-    assert np.abs(ticks[-1].fin_force[lost]).max() < 0.01, "it hangs, and the robot is slow"
+    assert np.abs(ticks[-1].force[lost]).max() < 0.01, "it hangs, and the robot is slow"
     swim.mend("front_left")
-    assert swim.step().alive.all() and swim.damage.failed == ()
+    assert swim.step().alive.all() and swim.damage.lost == ()
     swim.fail("front_left")
     swim.fail("back_left")
     assert not swim.controllable, "both left fins lost leave surge and yaw tied to each other"
@@ -113,22 +113,22 @@ def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
 
 
 def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobot) -> None:
-    events = [FinFault("front_left", 2.0), FinFault("back_left", 2.0, "torn", 0.5)]
-    events += [FinFault("back_right", 2.0, "stuck"), FinFault("back_left", 4.0, "whole")]
+    events = [Fault("front_left", 2.0), Fault("back_left", 2.0, "torn", 0.5)]
+    events += [Fault("back_right", 2.0, "stuck"), Fault("back_left", 4.0, "whole")]
     swim = ClosedLoop(
         layout_a, analytic.on(layout_a), make_trajectory("circle"), failures=events, announced=False
     )
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
     after = log.time >= 2.0
-    assert swim.damage.failed == () and swim.damage.health is None and swim.lost == ("front_left",)
+    assert swim.damage.lost == () and swim.damage.health is None and swim.lost == ("front_left",)
     assert set(swim.broken) == {"front_left", "back_right"}
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()
-    assert not log.fin_force[after, lost].any(), "a fin that hangs still gives nothing"
+    assert not log.force[after, lost].any(), "a fin that hangs still gives nothing"
     assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
-    law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
-    share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]
+    law = np.linalg.norm(swim._plant.body_forces(log.fin_motion), axis=-1)
+    share = np.linalg.norm(log.force, axis=-1)[:, weak] / law[:, weak]
     assert np.median(share[after & (log.time < 4.0)]) == pytest.approx(0.5, abs=0.06)
     assert np.median(share[log.time > 4.0]) == pytest.approx(1.0, abs=0.06)
     assert np.isnan(log.fault_probability).all(), "nobody watches"
@@ -140,20 +140,20 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
     swim.fail("front_left", "torn", 0.4)
     swim.fail("back_left", "stuck")
     assert swim.damage.health is not None
-    assert swim.damage.health.thrust == (("front_left", 0.4),)
+    assert swim.damage.torn == (("front_left", 0.4),)
     (name, angle), fin = swim.damage.health.stuck[0], layout_a.index("back_left")
-    assert name == "back_left" and angle == swim.fins.value[2][fin]
+    assert name == "back_left" and angle == swim.fin_motion.value[2][fin]
     assert swim.step().command[fin, 2] == pytest.approx(angle, abs=1e-9)
     swim.mend("front_left", announced=False)
-    assert dict(swim.damage.health.thrust) == {"front_left": 0.4}, "nobody said that it is whole"
+    assert dict(swim.damage.torn) == {"front_left": 0.4}, "nobody said that it is whole"
     swim.mend("front_left")
-    assert swim.damage.health.thrust == ()
+    assert swim.damage.torn == ()
 
 
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])
 def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share: float) -> None:
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
-        FinFault("front_left", 1.0, kind, share).checked()
+        Fault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
         ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle")).fail("front_left", kind, share)
 

@@ -52,7 +52,7 @@ def test_steady_fins_give_the_plants_force(name: str) -> None:
     for _ in range(400):
         motion.step(command, DT)
     force = ActuatorForce(layout, motion).of_fins(DT)
-    wanted = np.linalg.norm(Plant(layout).fin_forces(command), axis=1)
+    wanted = np.linalg.norm(Plant(layout).body_forces(command), axis=1)
     np.testing.assert_allclose(np.linalg.norm(force, axis=1), wanted, rtol=1e-6)
 
 

@@ -13,7 +13,7 @@ from finlab.allocation import Allocator
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
-from finlab.sim import FinFault, make_trajectory
+from finlab.sim import Fault, make_trajectory
 from tests.webapp.stand_in import page_of, until
 from tests.webapp.test_swimming import SHORT, now
 from webapp.markup.swim_card import pace_words, swim_card
@@ -175,9 +175,9 @@ def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer is not None
     swim = swimming.swimmer.swim
-    assert swim.layout == UCAT and swim.damage.failed == ("back_right",)
+    assert swim.layout == UCAT and swim.damage.lost == ("back_right",)
     (weak,) = plan.weak
-    assert swim.broken[weak] == FinFault(weak, 0.0, "torn", 0.7) and weak not in swim.told
+    assert swim.broken[weak] == Fault(weak, 0.0, "torn", 0.7) and weak not in swim.told
     assert swim.controller.name == "tracking"
 
 

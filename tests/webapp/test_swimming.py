@@ -133,7 +133,7 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     until(lambda: swimming.swimmer.shown.lost == ("front_left",))
     assert swimmer.shown.failed == () and swimmer.shown.found == ()
     assert "does not know yet" in swim_card(*now(swimming))
-    while not swimmer.swim.damage.failed and swimmer.swim.time < 20.0:
+    while not swimmer.swim.damage.lost and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found

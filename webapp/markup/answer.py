@@ -10,7 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import nice_limit
@@ -96,7 +96,7 @@ def swatch(index: int, failed: bool = False) -> str:
 
 
 def fin_table(
-    layout: Layout, health: Health | None, allocation: Allocation | None, full: Array, selected: str | None
+    layout: Layout, damage: Damage, allocation: Allocation | None, full: Array, selected: str | None
 ) -> str:
     """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
     limits = None if allocation is None else saturated(allocation)
@@ -105,7 +105,7 @@ def fin_table(
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (remark := damage_words(health, fin.name)):
+        if not failed and (remark := damage_words(damage, fin.name)):
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5

@@ -1,7 +1,8 @@
 """Sentences and numbers as people read them: fixed width, a real minus sign, three significant digits."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -11,7 +12,7 @@ from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.righting import righting_words
 from finlab.vehicle.vehicle import Vehicle
@@ -183,12 +184,12 @@ def parts_word(layout: Layout) -> str:
     return "fins" if layout.is_of_fins else "actuators"
 
 
-def damage_words(health: Health | None, name: str) -> str:
+def damage_words(damage: Damage, name: str) -> str:
     """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
-    if health is None:
-        return ""
-    parts = [f"weak {100 * share:.0f} %" for other, share in health.weak if other == name]
-    parts += [f"torn, {100 * share:.0f} % left" for other, share in health.torn if other == name]
-    parts += [f"stuck at {math.degrees(angle):.0f}°" for other, angle in health.stuck if other == name]
-    parts += ["runs on" for other, _ in health.running if other == name]
-    return ", ".join(parts).replace("-", "−")
+    said: dict[str, Callable[[Any], str]] = {
+        "weak": lambda share: f"weak {100 * share:.0f} %",
+        "torn": lambda share: f"torn, {100 * share:.0f} % left",
+        "stuck": lambda angle: f"stuck at {math.degrees(angle):.0f}°",
+        "running": lambda command: "runs on",
+    }
+    return ", ".join(said[kind](value) for kind, value in damage.of(name).items()).replace("-", "−")

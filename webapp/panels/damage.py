@@ -9,7 +9,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Actuator, Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from webapp.handles import numbered
 from webapp.markup.words import button_colors
 from webapp.page import Page
@@ -135,16 +135,15 @@ def _may(kind: str) -> Callable[[str | None, Layout], bool]:
     return may
 
 
-def _is(kind: str) -> Callable[[str | None, Layout, Health | None], bool]:
-    return lambda selected, layout, health: _part(selected, layout).name in dict(getattr(health, kind, ()))
+def _is(kind: str) -> Callable[[str | None, Layout, Damage], bool]:
+    return lambda selected, layout, damage: kind in damage.of(_part(selected, layout).name)
 
 
-def _of(kind: str, full: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
-    """What is known of it, in units for people; `whole` where it has no such fault."""
+def _of(kind: str, full: Any, unit: Any) -> Callable[[str | None, Layout, Damage], Any]:
+    """What is known of it, in units for people; `full` where it has no such fault."""
 
-    def value(selected: str | None, layout: Layout, health: Health | None) -> Any:
-        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, full)
-        scaled = np.multiply(known, unit)
+    def value(selected: str | None, layout: Layout, damage: Damage) -> Any:
+        scaled = np.multiply(damage.of(_part(selected, layout).name).get(kind, full), unit)
         return tuple(scaled.tolist()) if scaled.ndim else float(scaled)
 
     return value

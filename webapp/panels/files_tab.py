@@ -6,7 +6,6 @@ import shlex
 import viser
 
 from finlab.layout import Layout
-from finlab.layout.damage import Health
 from webapp.handles import add_html
 from webapp.markup.words import html, marker
 from webapp.page import Page
@@ -66,16 +65,15 @@ def command_line(state: State) -> str:
     file = bundle_name(layout) if has_files(layout) else design_name(layout)
     words = ["finlab", "allocate", file, "--wrench"]
     words += [f"{value:g}" for value in state.target]
-    for name in state.failed:
-        words += ["--failed", name]
-    health = state.health or Health()
-    for name, share in health.weak:
-        words += ["--health", f"{name}={share:g}"]
-    for name, share in health.torn:
-        words += ["--torn", f"{name}={share:g}"]
-    for name, angle in health.stuck:
+    damage = state.damage
+    for name in damage.lost:
+        words += ["--lost", name]
+    for kind, shares in (("weak", damage.weak), ("torn", damage.torn)):
+        for name, share in shares.items():
+            words += [f"--{kind}", f"{name}={share:g}"]
+    for name, angle in damage.stuck.items():
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
-    for name, (amplitude, frequency, angle) in health.running:
+    for name, (amplitude, frequency, angle) in damage.running.items():
         words += ["--running", f"{name}={amplitude:g},{frequency:g},{math.degrees(angle):g}"]
     if state.flow is not None:
         words += ["--flow", *(f"{value:g}" for value in state.flow)]

@@ -34,8 +34,8 @@ def add_commands(page: Page) -> None:
         lambda layout, failed: (layout.names, failed, ()),
     )
     page.add_html(
-        lambda layout, health, able, shown, selected, flow: fin_table(
-            layout, health, shown, full_thrust(able, flow), selected
+        lambda layout, damage, able, shown, selected, flow: fin_table(
+            layout, damage, shown, full_thrust(able, flow), selected
         )
     )
 

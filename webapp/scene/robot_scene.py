@@ -12,7 +12,7 @@ from finlab.analysis import Improvement
 from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
@@ -122,7 +122,7 @@ class RobotScene:
         selected: str | None,
         task: str,
         failed: tuple[str, ...],
-        health: Health | None,
+        damage: Damage,
         dragged: int | None,
         swims: bool,
     ) -> None:
@@ -132,9 +132,9 @@ class RobotScene:
         for node in self._fins[drawn.n :]:
             node.hide()
         edited = selected if task == "Design" and not swims else None
-        stuck = () if health is None or swims else dict(health.stuck)
+        stuck = () if swims else damage.stuck
         for i, part in enumerate(drawn.actuators):
-            remark = "" if swims or part.name in failed else damage_words(health, part.name)
+            remark = "" if swims or part.name in failed else damage_words(damage, part.name)
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])

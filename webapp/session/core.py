@@ -10,6 +10,7 @@ from finlab.allocation.policy import AXES
 from finlab.axes import axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.layout.damage import Damage
 from webapp.session.looking import DRAWERS, TASKS, Desk, Display, SearchRequest
 from webapp.session.state import LEAST, MAX_SPEED, History, State, Steps, chosen, number
 from webapp.session.swim_plan import SwimSettings
@@ -168,7 +169,7 @@ class Core:
         self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
 
     def damage(self, name: str, kind: str, value: Any) -> None:
-        """An actuator has a fault of a kind, one of `Health`: a share, an angle [rad], a command; None mends
+        """An actuator has a fault of a kind, see `Damage`: a share, an angle [rad], a command; None mends
         that."""
         verb = "Mend" if value is None else FAULT_VERBS.get(kind, "Damage")
         self._commit(f"{verb} {name}", self.state.with_fault(name, kind, value), f"{kind} {name}")
@@ -182,7 +183,7 @@ class Core:
 
     def mend_all(self) -> None:
         """All actuators are whole again."""
-        self._commit("Mend all", replace(self.state, failed=(), health=None))
+        self._commit("Mend all", replace(self.state, damage=Damage()))
 
     # What is looked at; none of it is part of undo.
 

@@ -11,6 +11,7 @@ from finlab.errors import FinlabError
 from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
+from finlab.layout.damage import Damage
 from webapp.session import actuator_edits, layout_edits
 from webapp.session.actuator_edits import followed, partner, unlinked
 from webapp.session.core import Core
@@ -41,7 +42,7 @@ class Session(Core):
         """Another layout, of which some may have failed; the target stays, damage and links are forgotten.
         `step` is what undo calls it."""
         method = method_for(layout, self.state.method)
-        anew = replace(self.state, layout=layout, failed=failed, health=None, links=(), method=method)
+        anew = replace(self.state, layout=layout, damage=Damage(failed), links=(), method=method)
         self._commit(step or f"Open {layout.name}", anew)
         self.saved = layout
 

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -13,7 +13,7 @@ from finlab.allocation.policy import AXES, KINDS
 from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage
 from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
 
@@ -43,9 +43,7 @@ class State:
     """A layout, its failures and the question asked of it."""
 
     layout: Layout
-    failed: tuple[str, ...] = ()
-    health: Health | None = None
-    """What is known of actuators that work in part; None where all others are whole."""
+    damage: Damage = Damage()
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
     temperature: float | None = None
@@ -67,11 +65,16 @@ class State:
     @property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
-        return self.layout if self.health is None else self.health.applied_to(self.layout)
+        return self.damage.applied_to(self.layout)
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the actuators that are lost."""
+        return tuple(self.damage.lost)
 
     def asking(self, other: "State") -> "State":
         """The same robot with the question of another state: what is asked for, of whom, and how."""
-        robot = {key: getattr(self, key) for key in ("layout", "failed", "health", "links")}
+        robot = {key: getattr(self, key) for key in ("layout", "damage", "links")}
         return replace(other, **robot, method=method_for(self.layout, other.method))
 
     def with_target(self, axis: int, value: Any) -> "State":
@@ -85,32 +88,22 @@ class State:
         """One actuator failed or repaired."""
         self.layout.index(name)
         lost = set(self.failed) ^ {name}
-        return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
+        return self.with_lost(name for name in self.layout.names if name in lost)
+
+    def with_lost(self, names: Iterable[str]) -> "State":
+        """Other actuators are lost."""
+        return replace(self, damage=replace(self.damage, lost=tuple(names)))
 
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
         """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend that."""
-        part = self.layout.actuators[self.layout.index(name)]
+        part = self.layout.part(name)
         chosen(kind, f"fault of {name}, a {part.type}", part.FAULTS)
         checked = None if value is None else _checked_fault(name, kind, value)
-        held = ("stuck", "running")  # one that runs on is not stuck as well
-        out = held if kind in held and checked is not None else (kind,)
-        kinds = {
-            word: tuple(pair for pair in pairs if pair[0] != name or word not in out)
-            for word, pairs in self._faults()
-        }
-        if checked is not None:
-            kinds[kind] += ((name, checked),)
-        return self._with_faults(kinds)
+        return self._with_damage(self.damage.with_fault(name, kind, checked))
 
-    def _faults(self) -> list[tuple[str, tuple[Any, ...]]]:
-        """What is damaged how: names and values by field of `Health`."""
-        return [(field.name, getattr(self.health, field.name, ())) for field in fields(Health)]
-
-    def _with_faults(self, kinds: dict[str, tuple[Any, ...]]) -> "State":
-        health = Health(**kinds) if any(kinds.values()) else None
-        if health is not None:
-            health.applied_to(self.layout)  # says what cannot be
-        return replace(self, health=health)
+    def _with_damage(self, damage: Damage) -> "State":
+        damage.applied_to(self.layout)  # says what cannot be
+        return replace(self, damage=damage)
 
     def with_layout(self, layout: Layout, renamed: Mapping[str, str] = MappingProxyType({})) -> "State":
         """Another layout; damage and links of actuators that still exist stay, also of those that are
@@ -118,15 +111,10 @@ class State:
         names = {old: renamed.get(old, old) for old in self.layout.names}
         now = {old: new for old, new in names.items() if new in layout.names}
         lost = {now.get(name) for name in self.failed}
-        return replace(
-            self,
-            layout=layout,
-            failed=tuple(name for name in layout.names if name in lost),
-            links=tuple((now[a], now[b]) for a, b in self.links if a in now and b in now),
-            method=method_for(layout, self.method),
-        )._with_faults(
-            {kind: tuple((now[old], v) for old, v in pairs if old in now) for kind, pairs in self._faults()}
-        )
+        damage = replace(self.damage.renamed(now), lost=[name for name in layout.names if name in lost])
+        links = tuple((now[a], now[b]) for a, b in self.links if a in now and b in now)
+        method = method_for(layout, self.method)
+        return replace(self, layout=layout, links=links, method=method)._with_damage(damage)
 
     def with_setting(self, key: str, value: Any) -> "State":
         """The temperature, the method, the policy or the network changed."""

@@ -10,7 +10,7 @@ from finlab.control import CONTROLLERS, make_controller, steerable_loss
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
-from finlab.sim import SHIPPED, FinFault, SensorSettings, Trajectory, make_trajectory
+from finlab.sim import SHIPPED, Fault, SensorSettings, Trajectory, make_trajectory
 from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(
@@ -86,7 +86,7 @@ class SwimSettings:
             day.sensors,
             affected if day.weak is not None else (),
             1.0 if day.weak is None else day.weak,
-            tuple(FinFault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
+            tuple(Fault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
             self.announced,
             self.controller,
         )
@@ -120,6 +120,6 @@ class Plan(NamedTuple):
     """Fins that are weak, unannounced."""
     share: float = 1.0
     """Of their thrust that these give."""
-    losses: tuple[FinFault, ...] = ()
+    losses: tuple[Fault, ...] = ()
     announced: bool = True
     controller: str = "tracking"

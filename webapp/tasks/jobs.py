@@ -9,6 +9,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
+from finlab.layout.damage import Damage
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State, compared
 from webapp.tasks.answering import Answering, Refining
@@ -170,7 +171,7 @@ class Jobs:
             for task in (self.answering, self.analyst, self.ranging):
                 task.forget()
         self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn, state.flow))
-        self.ranging.ask(State(state.able, state.failed, target=state.target, speed=state.speed))
+        self.ranging.ask(State(state.able, Damage(state.failed), target=state.target, speed=state.speed))
         self.answering.ask()
 
     def _beside(self) -> None:

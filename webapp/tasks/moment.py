@@ -78,7 +78,7 @@ def row_of(tick: Tick) -> Array:
     power = float(tick.driving_power.sum())
     surge = tick.asked[0], tick.delivered[0]
     head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, *surge)
-    force = np.linalg.norm(tick.fin_force, axis=1)
+    force = np.linalg.norm(tick.force, axis=1)
     return np.concatenate([head, tick.position, force, tick.fault_probability])
 
 

@@ -210,9 +210,8 @@ class Solver:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
             state.target,
-            failed=state.failed,
+            damage=state.damage,
             policy=state.policy,
-            health=state.health,
             flow=state.flow,
             seed=0,
         )

@@ -56,7 +56,7 @@ class Swimmer:
         self._found = {
             name: self._found.get(name, swim.time - self.period_s - swim.broken[name].time_s)
             for name in unknown
-            if name in swim.damage.failed
+            if name in swim.damage.lost
         }
 
     def log(self) -> RunLog:
@@ -73,14 +73,14 @@ class Swimmer:
             time=swim.time,
             pose=swim.state[:7].copy(),
             motion=swim.motion.command,
-            angle=swim.fins.angle,
-            force=np.zeros((n, 3)) if last is None else last.fin_force,
+            angle=swim.fin_motion.angle,
+            force=np.zeros((n, 3)) if last is None else last.force,
             asked=np.zeros(6) if last is None else last.asked,
             delivered=np.zeros(6) if last is None else last.delivered,
             reference=swim.task.setpoint(swim.time).position,
             flow=np.array(swim.vehicle.current),
             lost=swim.lost,
-            failed=swim.damage.failed,
+            failed=tuple(swim.damage.lost),
             found=tuple(self._found.items()),
             doubted=tuple(name for name, chance in zip(self.fins, chances, strict=True) if chance > 0.5),
             controllable=swim.controllable,

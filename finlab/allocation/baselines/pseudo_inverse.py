@@ -186,10 +186,10 @@ class FixedFrequency(ModelBased):
     @cached_property
     def _inverse(self) -> PseudoInverse:
         layout, fins = self.layout, []
-        for fin in layout.fins:
-            (low, high), wanted = fin.limits.frequency, self.settings.frequency
+        for fin in layout.actuators:
+            (low, high), wanted = fin.value("frequency"), self.settings.frequency
             held = min(max(wanted, low), high)
-            fins.append(replace(fin, limits=replace(fin.limits, frequency=(held, held))))
+            fins.append(fin.with_value("frequency", (held, held)))
         plant = plant_of(replace(layout, actuators=tuple(fins))).counting(layout.commanded)
         return PseudoInverse(plant.at(self.plant.flow), self.sigma)
 

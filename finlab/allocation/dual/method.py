@@ -213,7 +213,7 @@ class Dual(Method):
     def _unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: with what doubt
         costs, or of the smooth shape that stands for a measured table."""
-        measured = any(fin.model.type == "table" for fin in self.layout.fins)
+        measured = any(part.reads for part in self.layout.actuators)
         return measured or self.compiled.doubt is not None
 
     def _forces(

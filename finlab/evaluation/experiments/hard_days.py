@@ -15,7 +15,7 @@ from finlab.control import FaultMonitor, steers
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Body, Layout, load_layout
-from finlab.sim import ClosedLoop, FinFault, SensorSettings, Trajectory, make_trajectory, perturbed
+from finlab.sim import ClosedLoop, Fault, SensorSettings, Trajectory, make_trajectory, perturbed
 
 TWO = ("A", "C")  # those that swim most of the days: a symmetric one and one that is not
 CURRENT = (0.05, -0.05, 0.0)  # 7 cm/s across the path [m/s]
@@ -101,7 +101,7 @@ class HardDay:
     def swim(self, case: Case, method: MethodSpec, seed: int) -> ClosedLoop:
         """A swim of `cases()`, ready to start; the seed is of noise, biases and mixed fins."""
         robot, path = self.robot(case.layout, seed), self.path()
-        failures = [FinFault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
+        failures = [Fault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
         loop = ClosedLoop(
             robot,
             method.on(robot),

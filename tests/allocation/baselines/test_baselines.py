@@ -66,7 +66,7 @@ def test_two_fins_turn_the_robot(method: str) -> None:
     result = make(method).allocate(layout, [0.0, 0.0, 0.0, 0.0, 0.0, 0.4])
     # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a positive
     # zero direction 0 pushes the left fin backward and the right one forward.
-    np.testing.assert_allclose(Plant(layout).fin_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
+    np.testing.assert_allclose(Plant(layout).body_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
 
 
 @pytest.mark.parametrize("method", EXACT)

@@ -139,7 +139,7 @@ def test_a_previous_command_that_is_the_answer_stays(method: AnyRobot, penta: La
     for tick in (0, 50, 120):
         before = free.command[tick]
         result = method.allocate(penta, smooth_path(0)[tick], previous=before)
-        np.testing.assert_allclose(result.forces, plant.fin_forces(before), atol=1e-3)
+        np.testing.assert_allclose(result.forces, plant.body_forces(before), atol=1e-3)
         again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
         np.testing.assert_allclose(again.forces, result.forces, atol=1e-3)
         assert result.power < 1.005 * free.cost[tick]

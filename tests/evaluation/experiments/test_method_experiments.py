@@ -88,7 +88,7 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
     fins = [Fin(name, (0.0, y, 0.0), -math.pi / 2, limits) for name, y in (("port", 0.2), ("star", -0.2))]
     layout = Layout("pair", tuple(fins))
     full = np.array([[*limits.upper[:2], 0.5 * sum(arc)]] * 2)
-    return layout, float(np.linalg.norm(Plant(layout).fin_forces(full)[0]))
+    return layout, float(np.linalg.norm(Plant(layout).body_forces(full)[0]))
 
 
 def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
     braking = [loop.vehicle.derivative(motion, [0.0] * 6)[7] for loop in (damped, plain)]
     assert braking[0] == pytest.approx(2.0 * braking[1], rel=0.05) and braking[1] < 0.0
     torn = DAYS["weak"].swim(Case("A", ("front_left",)), analytic, 0)
-    assert torn.broken["front_left"].share == 0.7 and not torn.told and torn.damage.health is None
+    assert torn.broken["front_left"].share == 0.7 and not torn.told and not torn.damage.partly
 
 
 def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:

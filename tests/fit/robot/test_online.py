@@ -13,7 +13,7 @@ from finlab.fit.robot.fitted_robot import leaned
 from finlab.fit.robot.online import OnlineFit
 from finlab.layout import FinModelSpec
 from finlab.physics import plant_of
-from finlab.sim import ClosedLoop, FinFault, make_trajectory
+from finlab.sim import ClosedLoop, Fault, make_trajectory
 
 
 @pytest.mark.parametrize("name", ["A", "bluerov2_heavy"])
@@ -32,7 +32,7 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     learner, monitor = OnlineFit(layout), FaultMonitor(layout)
     loop = ClosedLoop(
         layout, Allocator(layout), make_trajectory("lissajous", 61.0), truth=truth, learner=learner, seed=2,
-        failures=[FinFault(each, 0.0, "torn", 0.8) for each in layout.names], announced=False,
+        failures=[Fault(each, 0.0, "torn", 0.8) for each in layout.names], announced=False,
         monitor=monitor if name == "A" else None,
     )  # fmt: skip
     before = missed(loop.allocator)

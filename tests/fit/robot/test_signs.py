@@ -84,7 +84,7 @@ def test_the_monitor_names_it_within_seconds_and_the_robot_keeps_its_way(motor: 
     )  # fmt: skip
     while loop.time < 4.0:
         loop.step()
-    assert monitor.opposed == monitor.verdict().damage.failed == (() if motor is None else (motor,))
+    assert monitor.opposed == monitor.verdict().damage.lost == (() if motor is None else (motor,))
     while loop.time < 30.0:  # through a probe of what is not used
         loop.step()
     assert monitor.opposed == (() if motor is None else (motor,))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.fin_model import FinModelSpec
-from finlab.allocation import Allocator, Health
+from finlab.allocation import Allocator, Damage
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
@@ -24,13 +24,13 @@ def penta() -> Layout:
 
 
 def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> None:
-    health = Health.of(weak={"bow": 0.4})
-    result = search.allocate(penta, TARGET, health=health)
+    health = Damage(weak={"bow": 0.4})
+    result = search.allocate(penta, TARGET, damage=health)
     assert result.err_norm < 1e-5
     whole = penta.fins[penta.index("bow")].limits
     amplitude, frequency, _ = result.command[penta.index("bow")]
     assert amplitude <= 0.4 * whole.amplitude[1] and frequency <= 0.4 * whole.frequency[1]
-    far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], health=health)
+    far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], damage=health)
     assert np.linalg.norm(far.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.forces)
 
 
@@ -38,9 +38,9 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
 def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: Layout, kind: str) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout, bow = replace(penta, actuators=fins), penta.index("bow")
-    result = search.allocate(layout, TARGET, health=Health.of(thrust={"bow": 0.4}))
+    result = search.allocate(layout, TARGET, damage=Damage(thrust={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told, law = result.forces, Plant(layout).fin_forces(result.command)
+    told, law = result.forces, Plant(layout).body_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
     np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
     np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
@@ -49,13 +49,13 @@ def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: La
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
     with pytest.raises(LayoutError, match="cannot be scaled"):
         FinModelSpec("table", (("path", "fin.csv"),)).scaled(0.5)
-    with pytest.raises(AllocationError, match="health: thrust bow: expected a number of at most 1, got 1.5"):
-        Health.of(thrust={"bow": 1.5})
+    with pytest.raises(AllocationError, match="damage: thrust bow: expected a number of at most 1, got 1.5"):
+        Damage(thrust={"bow": 1.5})
 
 
 def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> None:
     for angle in (0.7, -2.0, 0.7 + 2 * math.pi):
-        result = search.allocate(penta, TARGET, health=Health.of(stuck={"bow": angle}))
+        result = search.allocate(penta, TARGET, damage=Damage(stuck={"bow": angle}))
         assert result.err_norm < 1e-5
         assert math.cos(result.command[penta.index("bow"), 2] - angle) == pytest.approx(1.0)
 
@@ -63,7 +63,7 @@ def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> N
 @pytest.mark.parametrize("method", ["dual", "sqp"])
 def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -> None:
     kept = (0.4, 1.2, 1.0)
-    result = Allocator(penta, method).allocate(TARGET, health=Health.of(running={"bow": kept}))
+    result = Allocator(penta, method).allocate(TARGET, damage=Damage(running={"bow": kept}))
     np.testing.assert_allclose(result.command[penta.index("bow")], kept)
     assert result.err_norm < (1e-5 if method == "dual" else 0.02)
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command), atol=1e-12)
@@ -71,15 +71,15 @@ def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -
 
 def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
     name = penta.names[1]
-    result = search.allocate(penta, TARGET, failed=[name], health=Health.of(stuck={"bow": 0.2}))
+    result = search.allocate(penta, TARGET, failed=[name], damage=Damage(stuck={"bow": 0.2}))
     assert np.isnan(result.command[1]).all() and result.command[penta.index("bow"), 2] == pytest.approx(0.2)
-    batch = search.allocate_batch(penta, [TARGET] * 2, failed=[name], health=Health.of(stuck={"bow": 0.2}))
+    batch = search.allocate_batch(penta, [TARGET] * 2, failed=[name], damage=Damage(stuck={"bow": 0.2}))
     assert batch.command[:, penta.index("bow"), 2] == pytest.approx(0.2)
 
 
 def test_whole_fins_are_left_alone(penta: Layout) -> None:
-    assert Health().applied_to(penta) == penta
-    changed = Health.of(weak={"bow": 0.5}).applied_to(penta)
+    assert Damage().applied_to(penta) == penta
+    changed = Damage(weak={"bow": 0.5}).applied_to(penta)
     same = [a == b for a, b in zip(changed.fins, penta.fins, strict=True)]
     assert same.count(False) == 1
 
@@ -92,9 +92,9 @@ def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
         {"stuck": {"bow": 0.1}, "running": {"bow": (0.1, 1.0, 0.0)}},
     ):
         with pytest.raises(AllocationError, match="bow"):
-            Health.of(**bad)  # type: ignore[arg-type]
+            Damage(**bad)  # type: ignore[arg-type]
     with pytest.raises(FinlabError, match="nobody"):
-        search.allocate(penta, TARGET, health=Health.of(weak={"nobody": 0.5}))
+        search.allocate(penta, TARGET, damage=Damage(weak={"nobody": 0.5}))
 
 
 def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,7 +103,7 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
     assert main(["allocate", "A", *wrench, *damage]) == 0
     printed = capsys.readouterr().out
     assert "30.0" in printed
-    for wrong in (["--health", "front_left"], ["--stuck", "front_left=up"], ["--running", "back_left=1,2"]):
+    for wrong in (["--weak", "front_left"], ["--stuck", "front_left=up"], ["--running", "back_left=1,2"]):
         assert main(["allocate", "A", *wrench, *wrong]) == 2
         assert f"{wrong[0][2:]}: expected NAME=" in capsys.readouterr().err
 
@@ -111,9 +111,9 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": (1.0, 2.0)}}, {"weak": 3}]
 )
-def test_health_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
-    with pytest.raises(AllocationError, match="health: .*expected .*, got "):
-        Health.of(**wrong)  # type: ignore[arg-type]
+def test_damage_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
+    with pytest.raises(AllocationError, match="damage: .*expected .*, got "):
+        Damage(**wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_a_stuck_fin_is_held_at_the_turn_within_its_limits(
     penta: Layout, arc: tuple[float, float], angle: float, held: float
 ) -> None:
     limits = Limits((0.1, 0.5), (0.2, 2.0), arc)
-    layout = Health.of(stuck={"bow": angle}).applied_to(penta.replace_actuator("bow", limits=limits))
+    layout = Damage(stuck={"bow": angle}).applied_to(penta.replace_actuator("bow", limits=limits))
     left = layout.fins[layout.index("bow")].limits
     assert left.zero_direction == pytest.approx((held, held))
     assert (left.amplitude, left.frequency) == ((0.1, 0.5), (0.2, 2.0))
@@ -145,7 +145,7 @@ def test_what_is_left_of_a_weak_fins_limits(
 ) -> None:
     """The upper limits shrink; a lower one only where it would lie above."""
     whole = penta.replace_actuator("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
-    layout = Health.of(weak={"bow": share}).applied_to(whole)
+    layout = Damage(weak={"bow": share}).applied_to(whole)
     left = layout.fins[layout.index("bow")].limits
     assert left.amplitude == pytest.approx(amplitude) and left.frequency == pytest.approx(frequency)
     assert left.zero_direction == (0.0, 1.0)
