@@ -42,6 +42,6 @@ class RippleForce(ActuatorForce):
 
 def rippled(loop: ClosedLoop) -> ClosedLoop:
     """The swim, at its start, with fins whose forces swing."""
-    loop._forces = RippleForce(loop.layout, loop.fins)
+    loop._forces = RippleForce(loop.layout, loop.fin_motion)
     loop.motion = loop._forces.motion
     return loop

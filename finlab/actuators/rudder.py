@@ -45,7 +45,7 @@ PEAK = 0.995
 LEAST_DRAG = 1e-3
 """Drag coefficient per squared lift coefficient that counts at least, so that each price has one answer."""
 
-EFFICIENCY = 0.9
+_EFFICIENCY = 0.9
 """Induced drag of an elliptic wing over that of such a foil (Whicker and Fehlner, 1958)."""
 Deflection = Annotated[float, Meta(ge=-math.pi / 2, le=math.pi / 2)]
 DeflectionDegrees = Annotated[float, Meta(ge=-90.0, le=90.0)]
@@ -153,7 +153,7 @@ class Rudder(Actuator):
     @property
     def induced(self) -> float:
         """Drag coefficient per squared lift coefficient."""
-        return 1.0 / (math.pi * EFFICIENCY * self.aspect_ratio)
+        return 1.0 / (math.pi * _EFFICIENCY * self.aspect_ratio)
 
     @classmethod
     def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:

@@ -3,6 +3,7 @@ through a table of measurements."""
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -10,6 +11,16 @@ from finlab.actuators.response import RadialTable, price_grid
 from finlab.actuators.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 from finlab.arrays import AnyArray, Array
 from finlab.precision import NOTHING
+
+
+class PowerCurve(Protocol):
+    """Watts over newtons: convex, least at rest."""
+
+    def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
+
+    def answer(self, price: Array) -> Array:
+        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
 
 
 class ByPower:
@@ -114,15 +125,16 @@ _sides_of = lru_cache(maxsize=256)(Sides)
 class ThrustPower:
     """Watts over newtons, convex, of n propellers, whatever their models; those of one model together."""
 
-    def __init__(self, models: Sequence[ThrustModel]) -> None:
-        """Takes n models."""
-        kinds = [model if isinstance(model, PowerTable) else None for model in models]
-        self._groups: list[tuple[AnyArray | slice, ByPower | Sides]] = []
+    def __init__(self, models: Sequence[ThrustModel | PowerCurve]) -> None:
+        """Takes n models, or curves themselves."""
+        kinds = [None if isinstance(model, PowerLaw) else model for model in models]
+        self._groups: list[tuple[AnyArray | slice, PowerCurve]] = []
         for kind in dict.fromkeys(kinds):
             own = [i for i, other in enumerate(kinds) if other == kind]
             laws = [model for model in models if isinstance(model, PowerLaw)]
             places = slice(None) if len(own) == len(models) else np.array(own)
-            self._groups.append((places, ByPower(laws) if kind is None else _sides_of(kind)))
+            curve = _sides_of(kind) if isinstance(kind, PowerTable) else kind
+            self._groups.append((places, ByPower(laws) if curve is None else curve))
 
     def watts(self, force: AnyArray) -> AnyArray:
         """Returns the power [W] of forces (..., n) [N], negative ones in reverse."""
@@ -152,7 +164,7 @@ class ThrustPower:
         return result
 
 
-def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> RadialTable:
+def radial_table(model: ThrustModel | PowerCurve, sign: int, least: float, most: float) -> RadialTable:
     """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least` to `most`
     [N]."""
     own = ThrustPower([model])

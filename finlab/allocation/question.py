@@ -45,16 +45,16 @@ class Usable(NamedTuple):
 
 
 def damage_of(damage: Damage | None, lost: Sequence[str], failed: Sequence[str]) -> Damage:
-    """What a question says of damage; `failed` means `lost`. Raises AllocationError: it is no damage, or names
-    are no list."""
+    """What a question says of damage; `failed` means `lost`. Raises AllocationError: it is none, or names are
+    no list."""
     if damage is None:
         known = WHOLE
     elif isinstance(damage, Damage):
         known = damage
     else:
         raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
-    more = [Damage(names).lost for names in (lost, failed) if names != () and names != []]
-    return replace(known, lost=[*known.lost, *(name for names in more for name in names)]) if more else known
+    more = [name for names in (lost, failed) for name in (Damage(names).lost if len(names) else ())]
+    return replace(known, lost=[*known.lost, *more]) if more else known
 
 
 def usable(layout: Layout, damage: Damage) -> Usable:

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.azimuth import Azimuth
+from finlab.actuators.azimuth import Azimuth, AzimuthGroup, AzimuthLaw
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line
 from finlab.actuators.rudder import Rudder, RudderGroup, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
-from finlab.actuators.thruster import AzimuthGroup, AzimuthLaw, Thruster, ThrusterGroup, ThrusterLaw
+from finlab.actuators.thruster import Thruster, ThrusterGroup, ThrusterLaw
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.azimuth import Azimuth
+from finlab.actuators.azimuth import Azimuth, AzimuthLaw
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.rudder import Rudder, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.actuators.thrust_power import ByPower, Sides
-from finlab.actuators.thruster import AzimuthLaw, Thruster, ThrusterLaw
+from finlab.actuators.thruster import Thruster, ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant

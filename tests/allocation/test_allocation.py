@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocation, Allocator, Damage, Policy
+from finlab.allocation import Allocation, Allocator, Policy
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
-from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
+from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
@@ -58,7 +58,7 @@ def test_every_field_counts_but_the_time() -> None:
         {"command": result.command[:3]},
         {"wrench_expected": result.wrench},
         {"previous": result.command},
-        {"failed": ("front_left",)},
+        {"damage": Damage(["front_left"])},
         {"seed": 1},
     ):
         assert replace(result, **changed) != result, changed

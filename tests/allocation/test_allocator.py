@@ -87,7 +87,7 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
     [
         ({"failed": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
         ({"failed": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
-        ({"failed": "bow"}, AllocationError, r"expected a list of fin names, got the text 'bow'; write"),
+        ({"failed": "bow"}, AllocationError, r"expected a list of names, got the text 'bow'; write"),
         ({"previous": np.zeros((4, 3))}, CommandError, r"previous: expected a command of shape \(3, 3\) for"),
         ({"previous": "rest"}, CommandError, "previous: "),
         ({"previous": [[math.inf] * 3] * 3}, CommandError, "previous: "),

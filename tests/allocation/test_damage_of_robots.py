@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.fin_model import FinModelSpec
-from finlab.allocation import Allocator, Damage
+from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
-from finlab.layout import Layout, Limits, load_layout
+from finlab.layout import Damage, Layout, Limits, load_layout
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot
 
@@ -38,7 +38,7 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
 def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: Layout, kind: str) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout, bow = replace(penta, actuators=fins), penta.index("bow")
-    result = search.allocate(layout, TARGET, damage=Damage(thrust={"bow": 0.4}))
+    result = search.allocate(layout, TARGET, damage=Damage(torn={"bow": 0.4}))
     assert result.err_norm < 1e-5
     told, law = result.forces, Plant(layout).body_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
@@ -49,8 +49,8 @@ def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: La
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
     with pytest.raises(LayoutError, match="cannot be scaled"):
         FinModelSpec("table", (("path", "fin.csv"),)).scaled(0.5)
-    with pytest.raises(AllocationError, match="damage: thrust bow: expected a number of at most 1, got 1.5"):
-        Damage(thrust={"bow": 1.5})
+    with pytest.raises(AllocationError, match="damage: torn bow: expected a number of at most 1, got 1.5"):
+        Damage(torn={"bow": 1.5})
 
 
 def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Damage, Policy
+from finlab.allocation import Allocator, Policy
 from finlab.errors import LayoutError
-from finlab.layout import Layout
+from finlab.layout import Damage, Layout
 from finlab.physics import plant_of
 from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.allocation import METHODS, Allocator, Damage
+from finlab.allocation import METHODS, Allocator
 from finlab.allocation.allocation import CHUNK
 from finlab.allocation.allocator import MOST_PREPARED
 from finlab.allocation.method import Method
 from finlab.errors import AllocationError
-from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics.objective import yardstick
 from tests.allocation.quick import QUICK
 

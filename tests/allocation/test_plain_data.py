@@ -54,7 +54,7 @@ FILES = [
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
     *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("response", "fin/fin_response", "thruster")),
-    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "registry")),
+    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "kinds")),
 ]
 
 

@@ -6,7 +6,6 @@ import re
 import numpy as np
 import pytest
 
-from finlab.allocation import Damage
 from finlab.allocation.question import (
     MAX_WRENCH,
     check_layout,
@@ -17,7 +16,7 @@ from finlab.allocation.question import (
     usable,
 )
 from finlab.errors import AllocationError, CommandError
-from finlab.layout import Fin, Layout, Limits
+from finlab.layout import Damage, Fin, Layout, Limits
 
 ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in enumerate("abc")))
 

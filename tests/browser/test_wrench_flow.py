@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from finlab.layout import Damage
 from finlab.sim import load_log
 from webapp.session.state import COMPARED
 
@@ -55,7 +56,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     page.until(lambda: "weak 50 %, stuck at" in page.text(".damage") and not page.view.busy)
     assert page.view.shown.command[2, 2] == pytest.approx(now), "it is stuck where it was"
     page.press("All")
-    page.until(lambda: session.state.damage is None)
+    page.until(lambda: session.state.damage == Damage())
     page.page.locator(".damage").wait_for(state="detached")
 
 

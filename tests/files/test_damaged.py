@@ -126,7 +126,7 @@ def swim_log(path: Path) -> Path:
     rng = np.random.default_rng(0)
     sizes = {"position": 3, "quaternion": 4, "motion": 6, "flow": 3, "measured": 12, "reference": 3}
     sizes |= {name: 6 for name in ("asked", "allocated", "delivered")}
-    triples = ("command", "fin_motion", "fin_force")
+    triples = ("command", "fin_motion", "force")
 
     def value(name: str, k: int) -> object:
         if name in ("time", "reference_surge", "solve_ms"):
@@ -137,7 +137,7 @@ def swim_log(path: Path) -> Path:
 
     ticks = [Tick(**{name: value(name, k) for name in Tick._fields}) for k in range(320)]  # type: ignore[arg-type]
     about = dict.fromkeys(("method", "controller", "task", "water"), "x")
-    log_of_ticks(ticks, layout="pair", fins=PAIR.names, seed=0, **about).save(path)
+    log_of_ticks(ticks, layout="pair", names=PAIR.names, seed=0, **about).save(path)
     return path
 
 

@@ -249,10 +249,10 @@ def test_damage_leaves_the_other_actuators_as_they_are():
 @pytest.mark.parametrize(
     ("damage", "why"),
     [
-        ({"stuck": {"lift": 0.1}}, "'lift': thrusters may be weak or failed, got stuck"),
-        ({"weak": {"rudder": 0.5}}, "'rudder': rudders may be torn or failed"),
-        ({"torn": {"lift": 0.5}}, "'lift': thrusters may be weak or failed"),
-        ({"running": {"pod": (0.1, 1.0, 0.0)}}, "'pod': azimuths may be weak, stuck or failed"),
+        ({"stuck": {"lift": 0.1}}, "'lift': thrusters may be weak, lost, got stuck"),
+        ({"weak": {"rudder": 0.5}}, "'rudder': rudders may be torn, lost"),
+        ({"torn": {"lift": 0.5}}, "'lift': thrusters may be weak, lost"),
+        ({"running": {"pod": (0.1, 1.0, 0.0)}}, "'pod': azimuths may be weak, stuck, lost"),
     ],
 )
 def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):

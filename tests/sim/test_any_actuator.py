@@ -58,7 +58,7 @@ def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: 
     whole = ClosedLoop(heavy, Allocator(heavy), path, seed=0).run()
     loop = ClosedLoop(heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0)
     assert error(loop.run()) < 1.1 * error(whole)
-    assert loop.damage.lost == (lost.fin,)
+    assert loop.damage.lost == (lost.name,)
 
 
 def test_a_body_that_is_less_damped_in_yaw_than_its_model_is_not_spun(heavy: Layout) -> None:

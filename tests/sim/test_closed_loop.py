@@ -97,7 +97,7 @@ def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: P
     log = swim.log
     log.save(tmp_path / "log.npz")
     read = load_log(tmp_path / "log.npz")
-    assert (read.fins, read.method, read.seed, read.n_ticks) == (layout_a.names, "analytic", 3, 5)
+    assert (read.names, read.method, read.seed, read.n_ticks) == (layout_a.names, "analytic", 3, 5)
     for name in Tick._fields:
         np.testing.assert_array_equal(getattr(read, name), getattr(log_of_ticks_like(log, ticks), name))
     (tmp_path / "bad.npz").write_bytes(b"no archive")
@@ -108,7 +108,9 @@ def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: P
 
 def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     """The same log made anew from its ticks."""
-    about = {name: getattr(log, name) for name in ("layout", "fins", "method", "controller", "task", "water")}
+    about = {
+        name: getattr(log, name) for name in ("layout", "names", "method", "controller", "task", "water")
+    }
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
 
@@ -121,7 +123,7 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
     after = log.time >= 2.0
-    assert swim.damage.lost == () and swim.damage.health is None and swim.lost == ("front_left",)
+    assert swim.damage.lost == () and not swim.damage.partly and swim.lost == ("front_left",)
     assert set(swim.broken) == {"front_left", "back_right"}
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()
@@ -139,15 +141,14 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
     swum(swim, 1.0)
     swim.fail("front_left", "torn", 0.4)
     swim.fail("back_left", "stuck")
-    assert swim.damage.health is not None
-    assert swim.damage.torn == (("front_left", 0.4),)
-    (name, angle), fin = swim.damage.health.stuck[0], layout_a.index("back_left")
+    assert swim.damage.torn == {"front_left": 0.4}
+    ((name, angle),), fin = swim.damage.stuck.items(), layout_a.index("back_left")
     assert name == "back_left" and angle == swim.fin_motion.value[2][fin]
     assert swim.step().command[fin, 2] == pytest.approx(angle, abs=1e-9)
     swim.mend("front_left", announced=False)
-    assert dict(swim.damage.torn) == {"front_left": 0.4}, "nobody said that it is whole"
+    assert swim.damage.torn == {"front_left": 0.4}, "nobody said that it is whole"
     swim.mend("front_left")
-    assert swim.damage.torn == ()
+    assert swim.damage.torn == {}
 
 
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])

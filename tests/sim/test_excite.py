@@ -34,7 +34,7 @@ def test_every_axis_and_every_fin_is_varied(swim: RunLog) -> None:
         assert counts.min() > 10
         # Amplitude and frequency are no function of each other, or the law of the fin could not be told.
         assert abs(np.corrcoef(command[:, 0], command[:, 1])[0, 1]) < 0.8
-    force = swim.fin_force.reshape(len(swim.time), -1)
+    force = swim.force.reshape(len(swim.time), -1)
     assert np.linalg.matrix_rank(force - force.mean(axis=0), tol=1.0) >= min(
         force.shape[1], 2 * layout.n_fins
     )

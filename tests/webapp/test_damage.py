@@ -43,7 +43,7 @@ def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
     assert damage_words(state.damage, "front_right") == ""
     assert state.layout == UCAT, "the layout itself stays whole"
     line = command_line(state)
-    assert "--health front_left=0.5" in line and "--stuck back_left=30" in line
+    assert "--weak front_left=0.5" in line and "--stuck back_left=30" in line
 
 
 def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None:
@@ -52,18 +52,18 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
     session.damage("front_left", "stuck", 1.0)
     session.toggle_failure("front_left")
     session.mend("front_left")
-    assert session.state.damage is None and session.state.failed == ()
+    assert session.state.damage == Damage()
     session.undo()
     session.undo()
-    assert session.state.damage == Damage((("front_left", 0.3),), (("front_left", 1.0),))
+    assert session.state.damage == Damage(weak={"front_left": 0.3}, stuck={"front_left": 1.0})
     session.damage("front_left", "stuck", None)
-    assert session.state.damage == Damage((("front_left", 0.3),))
+    assert session.state.damage == Damage(weak={"front_left": 0.3})
     session.select("front_left")
     session.delete()
-    assert session.state.damage is None
+    assert session.state.damage == Damage()
     session.undo()
     session.mend_all()
-    assert session.state.damage is None
+    assert session.state.damage == Damage()
 
 
 VALUES = {"weak": 0.5, "torn": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
@@ -76,23 +76,22 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
         for kind, value in VALUES.items():
             if kind in part.FAULTS:
                 session.damage(part.name, kind, value)
-                assert dict(getattr(session.state.damage, kind))[part.name] == value
+                assert session.state.damage.of(part.name)[kind] == value
             else:
                 with pytest.raises(FinlabError, match="fault of"):
                     session.damage(part.name, kind, value)
             assert session.state.able.names == session.state.layout.names
     name, known = session.state.layout.names[0], session.state.damage
     session.rename(name, "other")
-    assert known is not None and session.state.damage is not None
-    assert [n for n, _ in session.state.damage.weak].count("other") == [n for n, _ in known.weak].count(name)
+    assert session.state.damage.of("other") == known.of(name)
     session.mend_all()
-    assert session.state.damage is None
+    assert session.state.damage == Damage()
 
 
 def test_a_fin_that_runs_on_is_not_stuck_as_well(session: Session) -> None:
     session.damage("front_left", "stuck", 0.3)
     session.damage("front_left", "running", (0.3, 1.0, 0.2))
-    assert session.state.damage == Damage(running=(("front_left", (0.3, 1.0, 0.2)),))
+    assert session.state.damage == Damage(running={"front_left": (0.3, 1.0, 0.2)})
     assert "--running front_left=0.3,1,11.4592" in command_line(session.state)
 
 

@@ -11,7 +11,7 @@ import pytest
 from finlab.analysis import mirror_pairs
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.layout import Fin, load_layout
+from finlab.layout import Damage, Fin, load_layout
 from tests.webapp.stand_in import page_of, running, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
@@ -129,7 +129,7 @@ def test_what_is_proposed_can_be_built(worker: Worker) -> None:
 )
 def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worker: Worker) -> None:
     layout = load_layout(robot)
-    state = State(layout, failed=layout.names[:lost], speed=1.0)
+    state = State(layout, Damage(layout.names[:lost]), speed=1.0)
     improver = Improver(page_of(worker))
     improver.start(state, SearchRequest())
     until(lambda: improver.progress is not None or improver.error is not None)

@@ -12,7 +12,7 @@ from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
-from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
+from finlab.layout import Azimuth, Damage, Fin, Layout, Rudder, Thruster, load_layout
 from tests.webapp.test_faults import Tab
 from tests.webapp.test_faults_in_handlers import handles, use
 from webapp.markup.answer import fin_table
@@ -121,9 +121,11 @@ def test_a_file_goes_out_and_comes_back(
 def test_each_actuator_has_a_row_with_its_type_and_force() -> None:
     state = State(FISH, target=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     answer = Solver().solve(state)
-    table = fin_table(state.layout, None, answer, full_thrust(FISH), None)
+    table = fin_table(state.layout, state.damage, answer, full_thrust(FISH), None)
     assert "azimuth, " in table and "rudder, " in table and table.count("<tr") == 5
-    assert "thruster" in fin_table(BLUEROV, None, Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None)
+    assert "thruster" in fin_table(
+        BLUEROV, Damage(), Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None
+    )
     listed = actuator_list(state, ("rudder",))
     assert "rudder" in listed and "azimuth" in listed
     assert isinstance(BLUEROV.actuators[0], Thruster)

@@ -8,7 +8,7 @@ import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.layout import load_layout
+from finlab.layout import Damage, load_layout
 from tests.webapp.stand_in import turn_fin
 from webapp.markup.answer import wrench_bars
 from webapp.session import Session
@@ -60,7 +60,7 @@ def test_undo_is_of_the_robot_and_not_of_the_question(session: Session) -> None:
     session.set_setting("policy", "priority")
     asked = session.state
     assert session.undo() == f"Fail {name}" and session.state.failed == ()
-    assert session.state == replace(asked, failed=())
+    assert session.state == replace(asked, damage=Damage())
     session.keep_least("effort")
     session.redo()
     assert session.state == replace(asked, method="mdn")

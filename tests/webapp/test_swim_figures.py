@@ -12,7 +12,7 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
-from finlab.layout import Layout, load_layout
+from finlab.layout import Damage, Layout, load_layout
 from finlab.sim import Fault, make_trajectory
 from tests.webapp.stand_in import page_of, until
 from tests.webapp.test_swimming import SHORT, now
@@ -144,8 +144,8 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
         with pytest.raises(FinlabError, match="lost-two takes 2 of the 2 working fins away"):
             chosen("lost-two").plan(State(robot))
         return
-    (loss,) = chosen("lost-in-current").plan(State(robot, failed=(robot.names[0],))).losses
-    assert loss.fin in robot.names[1:]
+    (loss,) = chosen("lost-in-current").plan(State(robot, damage=Damage((robot.names[0],)))).losses
+    assert loss.name in robot.names[1:]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def swimming() -> Any:
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
     settings = chosen("weak")
-    plan = settings.plan(State(UCAT, failed=("back_right",), method="analytic"))._replace(path=SHORT)
+    plan = settings.plan(State(UCAT, damage=Damage(("back_right",)), method="analytic"))._replace(path=SHORT)
     swimming.start(plan)
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer is not None
