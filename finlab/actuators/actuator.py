@@ -219,6 +219,10 @@ class Actuator(Checked, ABC):
         """Path of the file that its law reads, None where it reads none."""
         return None
 
+    def reading(self, path: str) -> Self:
+        """Returns it with another file that its law reads."""
+        return self
+
     @property
     def model_type(self) -> str:
         """Type of its `model`; how it looks where there is one law."""

@@ -37,9 +37,7 @@ from finlab.axes import (
     TURN,
     Direction3,
     Vector,
-    arc_words,
     is_full_turn,
-    vector_words,
     wrapped,
 )
 from finlab.errors import LayoutError
@@ -164,15 +162,6 @@ class Azimuth(Propeller):
         left, (low, high) = faults.weak, self.force
         force = self.force if left is None else weakened((max(low, left * low), high), left)
         return replace(self, force=force, arc=held_limits(faults.stuck, self.arc))
-
-    @property
-    def limits_words(self) -> str:
-        low, high = self.force
-        return f"{arc_words(*self.arc)}, {low:g}..{high:g} N, {self.model.type}"
-
-    @property
-    def direction_words(self) -> str:
-        return f"turns about {vector_words(self.turn_axis)}, zero {vector_words(self.zero)}"
 
     @property
     def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:

@@ -1,6 +1,12 @@
-"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here."""
+"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here.
 
+Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds its own to
+`KINDS`.
+"""
+
+import os
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,3 +57,7 @@ def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
 def file_stamps(actuators: Sequence[Actuator]) -> tuple[tuple[int, int] | None, ...]:
     """Returns the stamps of the files that laws read, for what is kept until one of them changes."""
     return tuple([file_stamp(part.reads) for part in actuators])
+
+
+for _module in filter(None, os.environ.get("FINLAB_KINDS", "").split(",")):
+    import_module(_module)

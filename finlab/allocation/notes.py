@@ -9,7 +9,7 @@ from finlab.actuators.kinds import KINDS, file_stamps
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.axes import axes_in, wrapped
-from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, TableLaw, make_law
 from finlab.physics.table_error import grid_uncertainty
 from finlab.precision import NEARLY
@@ -86,9 +86,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     first = layout.description.partition("\n")[0]
     notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
-    for fin, stamp in zip(layout.actuators, stamps, strict=True):
-        if not isinstance(fin, Fin):
-            continue
+    for fin, stamp in zip(layout.fins, file_stamps(layout.fins), strict=True):
         notes += [note.replace("{name}", fin.name) for note in _notes_of(fin.model, fin.limits, stamp)]
     return tuple(notes)
 

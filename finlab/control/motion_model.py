@@ -136,7 +136,7 @@ class MotionModel:
             self._any_unsure = True in self.unsure.tolist()
         both = moves.turned_to(np.array([moves.command] * 2), np.array([held, other]))
         force = self._plant.force(both, flow=flow)
-        # One that does not work gives nothing, but for a thruster or a rudder that is stuck.
+        # One that does not work gives nothing, but for one that is stuck and cannot be used.
         force *= (moves.pushes | ~(np.isnan(held) | self._turned_off))[:, None]
         self._thrust = force[0]
         now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0]

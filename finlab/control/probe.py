@@ -68,7 +68,7 @@ class Probe:
         return result
 
     def _trial(self, index: int, direction: float) -> tuple[float, float, float]:
-        """The command of one that is tried, which is or points at a direction [rad]; a rudder amidships."""
+        """The command of one that is tried, which is or points at a direction [rad]."""
         part = self._parts[index]
         if self._of_fins[index]:
             return self._command(index, 0.0, math.copysign(FORCE_N, math.sin(direction)))

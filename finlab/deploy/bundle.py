@@ -40,7 +40,7 @@ from finlab.bundle_files import (
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.archive import packed
-from finlab.layout import Actuator, Fin, FinModelSpec, Layout
+from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.file import FORMAT as LAYOUT_FORMAT
 from finlab.layout.file import layout_to_dict
 from finlab.layout.file_form import plain
@@ -146,13 +146,12 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     tables: dict[str, bytes] = {}
     parts = []
     for part in layout.actuators:
-        if isinstance(part, Fin) and part.model.type == "table":
-            path = str(part.model.values()["path"])
+        if path := part.reads:
             content = table_bytes(path)
             if len(content) > LARGEST_TABLE:
                 raise DataError(f"{path}: is larger than {LARGEST_TABLE:,} bytes, too large for a bundle")
             tables[table_name(content)] = content
-            part = replace(part, model=FinModelSpec("table", (("path", table_name(content)),)))
+            part = part.reading(table_name(content))
         parts.append(part)
     return replace(layout, actuators=tuple(parts)), tables
 
@@ -173,8 +172,8 @@ def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
 def features_of(part: Actuator) -> dict[str, float]:
     """Returns the features of an actuator by name and unit."""
     found = dict(zip(("x [m]", "y [m]", "z [m]"), part.position, strict=True))
-    if isinstance(part, Fin) and part.mounting_angle is not None:
-        found["alpha [rad]"] = part.mounting_angle
+    if (angle := part.value("mounting_angle")) is not None:
+        found["alpha [rad]"] = angle
     else:
         for name, axis in zip(("first axis", "second axis"), part.frame, strict=False):
             found |= {f"{name} {one}": float(value) for one, value in zip("xyz", axis, strict=True)}

@@ -18,7 +18,7 @@ from finlab.exchange import Exchange, read_robot
 from finlab.files.archive import unpacked
 from finlab.files.guarded import decoded, read_file
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
-from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.file_form import under
 from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, robot_of
@@ -113,12 +113,11 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     by_name = {Path(path).name: path for path in parts}
     actuators, missing = [], []
     for part in layout.actuators:
-        if isinstance(part, Fin) and part.model.type == "table":
-            path = str(part.model.values()["path"])
+        if path := part.reads:
             path = path if path in parts else by_name.get(Path(path).name, path)
             if path not in parts:
                 raise LayoutError(
-                    f"fin {part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
+                    f"{part.type} {part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
                     "along; put the layout and its tables into one ZIP archive, and open that",
                     source=source,
                 )

@@ -49,8 +49,8 @@ def _form(cls: type[Checked], **others: Any) -> Any:
     keys = {name: key for name, (key, _) in cls.DEGREES.items()}
     kinds = {name: kind for name, (_, kind) in cls.DEGREES.items()}
     hints = get_type_hints(cls)
-    for kind, own in _FORMS:
-        kinds |= {name: own for name, hint in hints.items() if hint in (kind, kind | None)}
+    for name in (field.name for field in fields(cls)):
+        kinds |= {name: own for kind, own in _FORMS if hints[name] in (kind, kind | None)}  # noqa: B035
     return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
 
 

@@ -79,7 +79,7 @@ class Layout(Checked):
 
     @cached_property
     def by_flow(self) -> tuple[str, ...]:
-        """Names of the actuators that give nothing at rest, such as rudders."""
+        """Names of the actuators that give nothing at rest: their force is that of the flow."""
         return tuple(part.name for part in self.actuators if part.BY_FLOW)
 
     @cached_property

@@ -99,8 +99,8 @@ class ActuatorMotion:
 
     @property
     def direction(self) -> Array:
-        """Where each actuator (n,) would stay if it stuck: a fin's zero direction, the angle of an azimuth or
-        of a rudder [rad], a thruster's force [N]."""
+        """Where each actuator (n,) would stay if it stuck: a fin's zero direction, another one's angle
+        [rad], or a force [N]."""
         others = self.others.value[np.arange(len(self.of_others)), self._held[self.of_others]]
         return self.joined(self.fins.value[2], others)
 

@@ -236,6 +236,9 @@ class Fin(Actuator):
     def reads(self) -> str | None:
         return str(self.model.values()["path"]) if self.model.type == "table" else None
 
+    def reading(self, path: str) -> Self:
+        return replace(self, model=FinModelSpec("table", (("path", path),)))
+
     def value(self, key: str) -> Any:
         known = self.model.values()
         return known[key] if key in known else super().value(key)

@@ -55,13 +55,13 @@ class RobotModel:
         self.alone = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
         self.steers = np.array([part.BY_FLOW for part in layout.actuators])
-        """Which actuators (n,) are rudders: one that leans meets the water at another angle."""
+        """Which actuators (n,) the flow drives: one that leans meets the water at another angle."""
         self._by_lean = np.zeros_like(self.alone)
         self.late = [0] * len(SENSORS)
         """Whole steps by which each sensor is late, as far as is known."""
 
     def meet(self, flow: Array) -> None:
-        """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which rudders feel."""
+        """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which some actuators feel."""
         if self._plant.feels_flow:
             self.alone = self._plant.forces(self.motion, flow=flow[:, None])
             _, slopes = self._plant.force_and_jacobian(np.nan_to_num(self.motion), flow=flow[:, None])
