@@ -20,10 +20,10 @@ from finlab.errors import FinlabError
 
 EXAMPLES = {
     "": "finlab allocate A --wrench 1 0 0.5 0 0 0.1",
-    "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --failed front_right --json",
+    "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --lost front_right --json",
     "layout": "finlab layout show A",
     "layout check": "finlab layout check my_robot.yaml",
-    "layout show": "finlab layout show A --failed front_right",
+    "layout show": "finlab layout show A --lost front_right",
     "layout optimize": "finlab layout optimize A --fins front_right front_left -o better.yaml",
     "layout convert": "finlab layout convert robot.urdf my_robot.yaml",
     "data": "finlab data generate -o runs/data --layouts 200 --commands 500",

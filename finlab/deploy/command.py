@@ -133,7 +133,15 @@ def _parser() -> argparse.ArgumentParser:
     ).add_argument
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
     one("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
-    one("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
+    one(
+        "--lost",
+        "--failed",
+        dest="failed",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="actuator that is lost",
+    )
     one("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
     through = "velocity relative to the water [m/s, rad/s]"
