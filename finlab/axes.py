@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.arrays import Array
+from finlab.arrays import AnyArray, Array
 from finlab.errors import LayoutError
 
 TURN = 2.0 * math.pi
@@ -27,6 +27,14 @@ def is_full_turn(arc: Any) -> Any:
 def wrapped(angle: ArrayLike) -> Array:
     """Returns the same angles within [-pi, pi) [rad]."""
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
+
+
+def feasible(command: AnyArray, lower: Array, upper: Array, angle: NDArray[np.bool_]) -> AnyArray:
+    """Returns commands (..., n, 3) brought within limits (n, 3) exactly: those that are angles (n, 3) wrap
+    towards the middle of theirs, then all clip."""
+    seam = 0.5 * (lower + upper) - math.pi
+    turned = np.where(angle, np.mod(command - seam, TURN) + seam, command)
+    return np.asarray(np.clip(turned, lower, upper))
 
 
 def command_change(command: ArrayLike) -> Array:

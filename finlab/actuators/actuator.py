@@ -1,8 +1,8 @@
 """The contract of a kind of actuator: all that is special about a kind stands in one file, in its class.
 
 A kind is a frozen dataclass, a subclass of `Actuator`, whose fields are what a layout file says of one. It
-declares facts (class variables), gives its law and its answer to a price (`laws`, `group`), and overrides
-what is not as usual. One line in `finlab.actuators.kinds` makes it known to all of finlab;
+declares facts (class variables), its law and its answer to a price among them, and overrides what is not as
+usual. One line in `finlab.actuators.kinds` makes it known to all of finlab;
 `docs/actuators.md` makes one in thirty lines.
 
 Own frames are right-handed, their rows in the body frame. A command is a row of three numbers, of which a
@@ -20,7 +20,6 @@ from msgspec import Meta, Struct
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import Group
 from finlab.arrays import Array
 from finlab.axes import (
     AHEAD,
@@ -114,6 +113,10 @@ class Box(NamedTuple):
 class Actuator(Checked, ABC):
     """One actuator of a robot, and the contract of its kind."""
 
+    LAW: ClassVar[type[Any]]
+    """The `ActuatorLaw` of m actuators; kinds that have it in common are answered together."""
+    GROUP: ClassVar[type[Any]]
+    """The `Group` of answers to prices, of m actuators and an effectiveness (m, 3, 6)."""
     NUMBERS: ClassVar[tuple[tuple[str, str], ...]]
     """Numbers of the command in order, name and unit: columns of swims and of the graph file."""
     COMMAND: ClassVar[type[Command]]
@@ -167,15 +170,10 @@ class Actuator(Checked, ABC):
                 object.__setattr__(self, name, axis)
 
     @classmethod
-    @abstractmethod
     def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
         """Returns the laws of m actuators of the kind, few for many of them, each with its places among these
         m. Raises DataError: a file that a law reads is bad."""
-
-    @classmethod
-    @abstractmethod
-    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
-        """Returns the answers to prices of m actuators with an effectiveness (m, 3, 6)."""
+        return [(np.arange(len(parts)), cls.LAW(parts))]
 
     @classmethod
     @abstractmethod

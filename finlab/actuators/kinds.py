@@ -37,15 +37,15 @@ def groups_of(actuators: Sequence[Actuator], effectiveness: Array) -> list[tuple
     """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
     6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
     kinds = [(places, kind, [actuators[i] for i in places]) for places, kind in _kinds(actuators)]
-    return [(places, kind.group(parts, effectiveness[places])) for places, kind, parts in kinds]
+    return [(places, kind.GROUP(parts, effectiveness[places])) for places, kind, parts in kinds]
 
 
 def _kinds(actuators: Sequence[Actuator]) -> Iterator[tuple[Places, type[Actuator]]]:
     """The kinds of a robot's actuators, in the order in which they come, with their places; those that share
     their law (tilts are azimuths) are one."""
-    kinds = [getattr(type(part).laws, "__func__", None) for part in actuators]
-    for kind in dict.fromkeys(kinds):
-        places = np.array([i for i, own in enumerate(kinds) if own is kind])
+    laws = [type(part).LAW for part in actuators]
+    for law in dict.fromkeys(laws):
+        places = np.array([i for i, own in enumerate(laws) if own is law])
         yield places, type(actuators[places[0]])
 
 

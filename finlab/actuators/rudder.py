@@ -23,7 +23,6 @@ from finlab.actuators.actuator import (
     Command,
     Faults,
     Place,
-    Places,
     Seconds,
     TurnRate,
     TurnRateDegrees,
@@ -52,144 +51,6 @@ DeflectionDegrees = Annotated[float, Meta(ge=-90.0, le=90.0)]
 StallDegrees = Annotated[float, Meta(ge=5.0, le=70.0)]
 Slope = Annotated[float, Meta(ge=0.05, le=10.0)]
 Coefficient = Annotated[float, Meta(ge=0.0, le=10.0)]
-
-
-class RudderCommand(Command, frozen=True, rename={"deflection": "deflection_rad"}):
-    """What a rudder is told."""
-
-    deflection: float
-    """Angle of its chord from `zero` towards shaft x zero [rad]."""
-
-    @property
-    def words(self) -> str:
-        """See `Command`."""
-        return f"{math.degrees(self.deflection):.1f} deg"
-
-
-@dataclass(frozen=True)
-class Rudder(Actuator):
-    """A foil on a shaft; its command is the deflection. Checked on construction.
-
-    Its force is that of the flow: with the speed U across the shaft and the angle a between chord and flow,
-    lift 1/2 density U^2 area CL(a) across the flow and drag 1/2 density U^2 area CD(a) along it. At rest it
-    gives nothing.
-    """
-
-    KEYS: ClassVar[Mapping[str, str]] = {
-        "position": "position_m",
-        "area": "area_m2",
-        "lift_slope": "lift_slope_per_rad",
-        "drag": "drag_coefficient",
-        "density": "density_kg_m3",
-        "time_constant": "time_constant_s",
-    }
-    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
-        "deflection": ("deflection_deg", tuple[DeflectionDegrees, DeflectionDegrees]),
-        "stall": ("stall_deg", StallDegrees),
-        "rate": ("rate_deg_s", TurnRateDegrees),
-    }
-    NUMBERS, COMMAND = (("deflection", "rad"),), RudderCommand
-    LIMITS, RATES, AXES, PUSHES = ("deflection",), ("rate",), ("shaft", "zero"), (2,)
-    ARC, BY_FLOW, FAULTS, LOOKS, OTHER = "deflection", True, ("torn",), "foil", "Leading edge"
-    BOXES = (
-        Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
-        Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
-        Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
-    )
-    LAW_BOXES = (
-        Box("Area [m²]", "area", "Of the foil.", 0.001),
-        Box("Aspect ratio", "aspect_ratio", "2 span²/area for a foil on a hull."),
-        Box("Lift slope [1/rad]", "lift_slope", "0: by the aspect ratio.", free=True),
-        Box("Drag", "drag", "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
-        Box("Stall [°]", "stall", "Angle to the flow at which it separates.", 1.0, True),
-    )
-    type: ClassVar[str] = "rudder"
-
-    name: Name
-    """Unique within its layout."""
-    position: Place
-    """Where the force acts, the centre of pressure, body frame [m]."""
-    shaft: Direction3
-    """Unit vector of the shaft, body frame."""
-    zero: Direction3
-    """Unit vector across it: from the trailing to the leading edge at deflection 0; it turns towards shaft x
-    zero."""
-    area: Annotated[float, Meta(ge=1e-6, le=1000.0)]
-    """Area of the foil [m^2]."""
-    deflection: tuple[Deflection, Deflection]
-    """Least and greatest deflection [rad]."""
-    aspect_ratio: Annotated[float, Meta(ge=0.05, le=100.0)]
-    """Effective aspect ratio, 2 span^2 / area for a foil on a hull."""
-    lift_slope: Slope | None = None
-    """Lift coefficient per angle [1/rad]; from the aspect ratio after Whicker and Fehlner when None."""
-    drag: Coefficient = 0.0065
-    """Drag coefficient without lift; the default is that of a NACA 0015 section."""
-    stall: Annotated[float, Meta(ge=0.08, le=1.23)] = 0.47
-    """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a plate."""
-    density: Annotated[float, Meta(ge=500.0, le=2000.0)] = 1000.0
-    """Density of the water [kg/m^3]."""
-    time_constant: Seconds = 0.1
-    """Time in which the deflection comes to 63 % of a new one [s]."""
-    rate: TurnRate | None = None
-    """How fast the deflection changes at most [rad/s]; None where nothing limits it."""
-    uncertainty: Uncertainty | None = None
-    """How far its force may be from that; None where nothing is known of it."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.deflection[0] < self.deflection[1]:
-            low, high = map(math.degrees, self.deflection)
-            raise LayoutError(
-                f"expected a least below the greatest angle, got {low:g} and {high:g}", "deflection_deg"
-            )
-
-    @property
-    def slope(self) -> float:
-        """Lift coefficient per angle [1/rad], given or from the aspect ratio."""
-        if self.lift_slope is not None:
-            return self.lift_slope
-        return 1.8 * math.pi * self.aspect_ratio / (math.hypot(self.aspect_ratio, 2.0) + 1.8)
-
-    @property
-    def induced(self) -> float:
-        """Drag coefficient per squared lift coefficient."""
-        return 1.0 / (math.pi * _EFFICIENCY * self.aspect_ratio)
-
-    @classmethod
-    def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
-        return [(np.arange(len(parts)), RudderLaw(parts))]
-
-    @classmethod
-    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
-        return RudderGroup(parts, effectiveness)
-
-    @classmethod
-    def sample(cls) -> Self:
-        """See `Actuator`: a tail fin of REMUS 100."""
-        up, ends = (0.0, 0.0, 1.0), (-math.pi / 6, math.pi / 6)
-        return cls("rudder", (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), 0.00665, ends, 2.21)
-
-    def largest(self, speed: float) -> float:
-        angle = min(self.stall, max(map(abs, self.deflection)))
-        return 0.5 * self.density * self.area * speed**2 * self.slope * angle
-
-    def damaged(self, faults: Faults) -> Self:
-        return self if faults.torn is None else self.scaled(faults.torn)
-
-    def scaled(self, share: float) -> Self:
-        return replace(self, area=share * self.area)
-
-    @property
-    def limits_words(self) -> str:
-        return f"{arc_words(*self.deflection)}, {self.area:g} m^2"
-
-    @property
-    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
-        yield "", self.shaft, self.deflection
-
-    def settled(self, frame: Array) -> Array:
-        """See `Actuator`: the leading edge lies ahead."""
-        return ahead(frame)
 
 
 class Coefficients(NamedTuple):
@@ -225,7 +86,7 @@ class RudderLaw(ActuatorLaw):
 
     feels_flow = True
 
-    def __init__(self, rudders: Sequence[Rudder]) -> None:
+    def __init__(self, rudders: Sequence["Rudder"]) -> None:
         """Takes n rudders."""
         self.slope = np.array([rudder.slope for rudder in rudders])
         self.drag = np.array([rudder.drag for rudder in rudders])
@@ -288,7 +149,7 @@ class RudderGroup(Group):
 
     feels_flow = True
 
-    def __init__(self, rudders: Sequence[Rudder], effectiveness: Array) -> None:
+    def __init__(self, rudders: Sequence["Rudder"], effectiveness: Array) -> None:
         """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; they are at rest."""
         self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
@@ -383,3 +244,134 @@ class RudderGroup(Group):
 
     def reach(self, lower: Array, upper: Array) -> Array:
         return np.pad(self._lift(np.stack([lower[:, 0], upper[:, 0]], axis=-1)), ((0, 0), (0, 2)))
+
+
+class RudderCommand(Command, frozen=True, rename={"deflection": "deflection_rad"}):
+    """What a rudder is told."""
+
+    deflection: float
+    """Angle of its chord from `zero` towards shaft x zero [rad]."""
+
+    @property
+    def words(self) -> str:
+        """See `Command`."""
+        return f"{math.degrees(self.deflection):.1f} deg"
+
+
+@dataclass(frozen=True)
+class Rudder(Actuator):
+    """A foil on a shaft; its command is the deflection. Checked on construction.
+
+    Its force is that of the flow: with the speed U across the shaft and the angle a between chord and flow,
+    lift 1/2 density U^2 area CL(a) across the flow and drag 1/2 density U^2 area CD(a) along it. At rest it
+    gives nothing.
+    """
+
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "position": "position_m",
+        "area": "area_m2",
+        "lift_slope": "lift_slope_per_rad",
+        "drag": "drag_coefficient",
+        "density": "density_kg_m3",
+        "time_constant": "time_constant_s",
+    }
+    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
+        "deflection": ("deflection_deg", tuple[DeflectionDegrees, DeflectionDegrees]),
+        "stall": ("stall_deg", StallDegrees),
+        "rate": ("rate_deg_s", TurnRateDegrees),
+    }
+    LAW, GROUP = RudderLaw, RudderGroup
+    NUMBERS, COMMAND = (("deflection", "rad"),), RudderCommand
+    LIMITS, RATES, AXES, PUSHES = ("deflection",), ("rate",), ("shaft", "zero"), (2,)
+    ARC, BY_FLOW, FAULTS, LOOKS, OTHER = "deflection", True, ("torn",), "foil", "Leading edge"
+    BOXES = (
+        Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
+        Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
+        Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
+    )
+    LAW_BOXES = (
+        Box("Area [m²]", "area", "Of the foil.", 0.001),
+        Box("Aspect ratio", "aspect_ratio", "2 span²/area for a foil on a hull."),
+        Box("Lift slope [1/rad]", "lift_slope", "0: by the aspect ratio.", free=True),
+        Box("Drag", "drag", "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
+        Box("Stall [°]", "stall", "Angle to the flow at which it separates.", 1.0, True),
+    )
+    type: ClassVar[str] = "rudder"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, the centre of pressure, body frame [m]."""
+    shaft: Direction3
+    """Unit vector of the shaft, body frame."""
+    zero: Direction3
+    """Unit vector across it: from the trailing to the leading edge at deflection 0; it turns towards shaft x
+    zero."""
+    area: Annotated[float, Meta(ge=1e-6, le=1000.0)]
+    """Area of the foil [m^2]."""
+    deflection: tuple[Deflection, Deflection]
+    """Least and greatest deflection [rad]."""
+    aspect_ratio: Annotated[float, Meta(ge=0.05, le=100.0)]
+    """Effective aspect ratio, 2 span^2 / area for a foil on a hull."""
+    lift_slope: Slope | None = None
+    """Lift coefficient per angle [1/rad]; from the aspect ratio after Whicker and Fehlner when None."""
+    drag: Coefficient = 0.0065
+    """Drag coefficient without lift; the default is that of a NACA 0015 section."""
+    stall: Annotated[float, Meta(ge=0.08, le=1.23)] = 0.47
+    """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a plate."""
+    density: Annotated[float, Meta(ge=500.0, le=2000.0)] = 1000.0
+    """Density of the water [kg/m^3]."""
+    time_constant: Seconds = 0.1
+    """Time in which the deflection comes to 63 % of a new one [s]."""
+    rate: TurnRate | None = None
+    """How fast the deflection changes at most [rad/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.deflection[0] < self.deflection[1]:
+            low, high = map(math.degrees, self.deflection)
+            raise LayoutError(
+                f"expected a least below the greatest angle, got {low:g} and {high:g}", "deflection_deg"
+            )
+
+    @property
+    def slope(self) -> float:
+        """Lift coefficient per angle [1/rad], given or from the aspect ratio."""
+        if self.lift_slope is not None:
+            return self.lift_slope
+        return 1.8 * math.pi * self.aspect_ratio / (math.hypot(self.aspect_ratio, 2.0) + 1.8)
+
+    @property
+    def induced(self) -> float:
+        """Drag coefficient per squared lift coefficient."""
+        return 1.0 / (math.pi * _EFFICIENCY * self.aspect_ratio)
+
+    @classmethod
+    def sample(cls) -> Self:
+        """See `Actuator`: a tail fin of REMUS 100."""
+        up, ends = (0.0, 0.0, 1.0), (-math.pi / 6, math.pi / 6)
+        return cls("rudder", (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), 0.00665, ends, 2.21)
+
+    def largest(self, speed: float) -> float:
+        angle = min(self.stall, max(map(abs, self.deflection)))
+        return 0.5 * self.density * self.area * speed**2 * self.slope * angle
+
+    def damaged(self, faults: Faults) -> Self:
+        return self if faults.torn is None else self.scaled(faults.torn)
+
+    def scaled(self, share: float) -> Self:
+        return replace(self, area=share * self.area)
+
+    @property
+    def limits_words(self) -> str:
+        return f"{arc_words(*self.deflection)}, {self.area:g} m^2"
+
+    @property
+    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
+        yield "", self.shaft, self.deflection
+
+    def settled(self, frame: Array) -> Array:
+        """See `Actuator`: the leading edge lies ahead."""
+        return ahead(frame)

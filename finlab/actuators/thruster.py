@@ -6,12 +6,11 @@ reaction torque of the propeller is part of the effectiveness.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from finlab.actuators.actuator import Box, Command, Faults, Metres, Place, Places, Seconds, Uncertainty
-from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.actuator import Box, Command, Faults, Metres, Place, Seconds, Uncertainty
 from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
@@ -20,6 +19,58 @@ from finlab.arrays import Array, Values
 from finlab.axes import Direction3, unit_vector
 from finlab.errors import LayoutError
 from finlab.files.checked import Name
+
+
+class ThrusterLaw(PropellerLaw):
+    """n thrusters."""
+
+    column = 0
+
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
+        force = np.zeros_like(command)
+        force[..., 0] = self.given(command)
+        return force
+
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        jacobian = np.zeros((*command.shape, 3))
+        force = self.force(command)
+        jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
+        return force, jacobian
+
+
+class ThrusterGroup(Group):
+    """What the thrusters of a robot offer for prices."""
+
+    def __init__(self, thrusters: Sequence["Thruster"], effectiveness: Array) -> None:
+        """Takes thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+        self._sign = np.array([1.0 if thruster.force[1] > 0.0 else -1.0 for thruster in thrusters])
+        self.responses = [
+            _line(thruster, sign * matrix[0])
+            for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
+        ]
+        self._limits = np.array([thruster.force for thruster in thrusters])
+        self._power = ThrustPower([thruster.model for thruster in thrusters])
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        command = np.zeros((*force.shape[:-1], 3))
+        command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
+        return command
+
+    def radial_worth(self, price: Array, back: Array) -> Array:
+        return self._power.worth(self._sign * price, *self._limits.T)
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        ends = self._sign[:, None] * np.stack([lower[:, 0], upper[:, 0]], axis=-1)
+        return np.pad(np.sort(ends, axis=-1), ((0, 0), (0, 2)))
+
+
+def _line(thruster: "Thruster", along: Array) -> Line:
+    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in reverse."""
+    least, most = thruster.force
+    if most <= 0.0:
+        return Line(along, radial_table(thruster.model, -1, 0.0, -least), band=thruster.dead_band)
+    reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
+    return Line(along, radial_table(thruster.model, 1, 0.0, most), reverse, thruster.dead_band)
 
 
 class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
@@ -40,6 +91,7 @@ class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
 class Thruster(Propeller):
     """A thruster with a fixed axis; its command is the force. Checked on construction."""
 
+    LAW, GROUP = ThrusterLaw, ThrusterGroup
     NUMBERS, COMMAND = (("force", "N"),), ThrusterCommand
     LIMITS, RATES, AXES, PUSHES = ("force",), ("rate",), ("axis",), (0,)
     THRUST, TURNS, FAULTS, LOOKS = 0, False, ("weak",), "thruster"
@@ -86,14 +138,6 @@ class Thruster(Propeller):
         check_force(self.model, self.force)
 
     @classmethod
-    def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
-        return [(np.arange(len(parts)), ThrusterLaw(parts))]
-
-    @classmethod
-    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
-        return ThrusterGroup(parts, effectiveness)
-
-    @classmethod
     def sample(cls) -> Self:
         """See `Actuator`: a T200 of Blue Robotics at 16 V, as shipped layouts have it."""
         return cls("thruster", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-39.91, 51.44), T200)
@@ -101,55 +145,3 @@ class Thruster(Propeller):
     def damaged(self, faults: Faults) -> Self:
         left, (low, high) = faults.weak, self.force
         return self if left is None else replace(self, force=(left * low, left * high))
-
-
-class ThrusterLaw(PropellerLaw):
-    """n thrusters."""
-
-    column = 0
-
-    def force(self, command: Values, inflow: Array | None = None) -> Values:
-        force = np.zeros_like(command)
-        force[..., 0] = self.given(command)
-        return force
-
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        jacobian = np.zeros((*command.shape, 3))
-        force = self.force(command)
-        jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
-        return force, jacobian
-
-
-class ThrusterGroup(Group):
-    """What the thrusters of a robot offer for prices."""
-
-    def __init__(self, thrusters: Sequence[Thruster], effectiveness: Array) -> None:
-        """Takes thrusters and the wrench (m, 3, 6) per newton along each own axis."""
-        self._sign = np.array([1.0 if thruster.force[1] > 0.0 else -1.0 for thruster in thrusters])
-        self.responses = [
-            _line(thruster, sign * matrix[0])
-            for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
-        ]
-        self._limits = np.array([thruster.force for thruster in thrusters])
-        self._power = ThrustPower([thruster.model for thruster in thrusters])
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        command = np.zeros((*force.shape[:-1], 3))
-        command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
-        return command
-
-    def radial_worth(self, price: Array, back: Array) -> Array:
-        return self._power.worth(self._sign * price, *self._limits.T)
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        ends = self._sign[:, None] * np.stack([lower[:, 0], upper[:, 0]], axis=-1)
-        return np.pad(np.sort(ends, axis=-1), ((0, 0), (0, 2)))
-
-
-def _line(thruster: Thruster, along: Array) -> Line:
-    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in reverse."""
-    least, most = thruster.force
-    if most <= 0.0:
-        return Line(along, radial_table(thruster.model, -1, 0.0, -least), band=thruster.dead_band)
-    reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
-    return Line(along, radial_table(thruster.model, 1, 0.0, most), reverse, thruster.dead_band)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array, solve
+from finlab.axes import feasible
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
 from finlab.precision import NOTHING
@@ -19,6 +20,8 @@ from finlab.precision import NOTHING
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
 strong fins on long levers are singular to rounding."""
+ZERO_DIRECTION = np.array([False, False, True])
+"""Which numbers of a fin's command are angles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +65,7 @@ class CommandProblem:
 
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first."""
-        seam = 0.5 * (self.lower[:, 2] + self.upper[:, 2]) - np.pi
-        within = command.copy()
-        within[..., 2] = np.mod(command[..., 2] - seam, 2.0 * np.pi) + seam
-        np.maximum(within, self.lower, out=within)
-        return np.minimum(within, self.upper, out=within)
+        return feasible(command, self.lower, self.upper, ZERO_DIRECTION)
 
 
 class Refined(NamedTuple):

@@ -117,8 +117,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
             path = path if path in parts else by_name.get(Path(path).name, path)
             if path not in parts:
                 raise LayoutError(
-                    f"{part.type} {part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
-                    "along; put the layout and its tables into one ZIP archive, and open that",
+                    f"{part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come along; "
+                    "put the layout and its tables into one ZIP archive, and open that",
                     source=source,
                 )
             part = replace(part, model=stored_table(parts[path], folder / TABLE_FOLDER))

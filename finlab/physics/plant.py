@@ -17,7 +17,7 @@ from finlab.actuators.kinds import file_stamps, free_angles, laws_of
 from finlab.actuators.law import ActuatorLaw, Blade
 from finlab.actuators.propeller import held
 from finlab.arrays import Array
-from finlab.axes import TURN, is_full_turn
+from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
@@ -163,9 +163,7 @@ class Plant:
 
     def feasible(self, command: Array) -> Array:
         """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else clips."""
-        values = np.asarray(command, np.float64)
-        wrapped = self.lower + np.mod(values - self.lower, TURN)
-        return np.clip(np.where(self.turns, wrapped, values), self.lower, self.upper)
+        return feasible(np.asarray(command, np.float64), self.lower, self.upper, self.turns)
 
     @cached_property
     def _dead_band(self) -> Array | None:

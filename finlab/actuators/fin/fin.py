@@ -26,8 +26,7 @@ from finlab.actuators.actuator import (
 from finlab.actuators.fin.fin_laws import stack_laws
 from finlab.actuators.fin.fin_model import FIN_MODELS, MAX_FREQUENCY, FinModelSpec, Limits, Parameter
 from finlab.actuators.fin.fin_response import FinGroup, fin_table
-from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import Group
+from finlab.actuators.law import ActuatorLaw, FinLaw
 from finlab.arrays import Array
 from finlab.axes import (
     AHEAD,
@@ -144,6 +143,7 @@ class Fin(Actuator):
     }
     WRITTEN: ClassVar[Collection[str]] = ("limits", "model")
     type: ClassVar[str] = "fin"
+    LAW, GROUP = FinLaw, FinGroup
     NUMBERS, COMMAND = (("A", "rad"), ("f", "Hz"), ("phi", "rad")), FinCommand
     AXES, PUSHES, ANGLE, HELD = ("shaft", "zero"), (1, 2), 2, 2
     FAULTS, LOOKS, OTHER = ("weak", "torn", "stuck", "running"), "fin", "Zero"
@@ -221,11 +221,6 @@ class Fin(Actuator):
     @classmethod
     def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
         return stack_laws([fin.model for fin in parts])
-
-    @classmethod
-    def group(cls, parts: Sequence[Any], effectiveness: Array) -> Group:
-        """See `Actuator`. Errors as for `FinGroup`."""
-        return FinGroup(parts, effectiveness)
 
     @classmethod
     def sample(cls) -> Self:
