@@ -84,11 +84,7 @@ def browser() -> Iterator[Any]:
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as home:
         chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM,
-            headless=True,
-            chromium_sandbox=False,
-            args=FLAGS,
-            downloads_path=home,
+            executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS, downloads_path=home
         )
         yield chromium
         chromium.close()
