@@ -20,6 +20,7 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-gpu-compositing",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -70,7 +71,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         server = start_server()
         app = App(server, Solver(), load_layout("ucat"), Display(shadows=False, frozen=True))
-        yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
+        yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.1", app, server)
         app.stop()
         stop_server(server)
 
