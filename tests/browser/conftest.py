@@ -61,12 +61,14 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
     No shadows and still fins, so that software rendering keeps up.
     """
+    from finlab.files.worker import prepare
     from finlab.layout import load_layout
     from webapp.app import App
     from webapp.session import Display
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
+    prepare(["webapp.session.files", "webapp.tasks.fitting"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         server = start_server()
