@@ -16,7 +16,6 @@ from webapp.markup.swim_card import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
-from webapp.tasks import moment
 from webapp.tasks.moment import ERROR, FORCES, TIME
 from webapp.tasks.solver import Solver
 from webapp.tasks.swimming import LAG_S, Swimming
@@ -114,7 +113,7 @@ def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
 
 
 def test_a_long_record_is_thinned(swimming: Swimming, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(moment, "POINTS", 100)
+    monkeypatch.setattr("webapp.tasks.swimmer.POINTS", 100)
     begin(swimming, path=make_trajectory("circle"))
     swimming.set_running(False)
     swimmer = swimming.swimmer
