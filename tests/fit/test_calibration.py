@@ -1,4 +1,4 @@
-"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, the law is known."""
+"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, a known law."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -102,7 +102,6 @@ BAD = [
     ("body.mass_kg", 0, "must lie within"),
     ("body.weight", 1, "unknown key"),
     ("body.added_mass", [1, 2, 3], "6 values, got 3"),
-    ("body.added_mass[5]", -6, "must lie within"),
     ("body.inertia_kgm2[0]", 0, "must lie within"),
     ("body.hull.shape", "sphere", "expected one of box"),
     ("body.hull.size_m", ..., "missing beside shape"),
@@ -112,9 +111,13 @@ BAD = [
 ]
 
 
-TABLE = edited("fins", 0, "model", value={"type": "table"})
 CHANGED = [(key, changed(key, value), why) for key, value, why in BAD]
-CHANGED.append(("fins[0].model.path", TABLE, "required key is missing"))
+CHANGED += [
+    ("fins[0].model.path", edited("fins", 0, "model", value={"type": "table"}), "required key is missing"),
+    ("body.added_mass[5]", edited("body", "added_mass", value=[1, 2, 3, 4, 5, -6]), "must lie within"),
+    ("body.inertia_kgm2[0]", edited("body", "inertia_kgm2", value=[0, 1, 1]), "must lie within"),
+    ("body.hull.mesh", edited("body", "hull", value={"mesh": "hull.exe"}), "expected a .stl"),
+]
 
 
 @pytest.mark.parametrize(("key", "data", "why"), CHANGED)
