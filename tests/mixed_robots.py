@@ -27,8 +27,6 @@ KINDS = (
     "all",
 )
 """Kinds of robot; in `holes` fins cannot rest, their least force is up to 5 % of the largest."""
-CONVEX = ("thrusters", "azimuths", "fins", "fins any shaft", "fins uneven", "mixed")
-"""Kinds of robot whose sets of forces are convex, but for the rest of a fin."""
 T200 = {"type": "power_law", "forward": 0.997, "reverse": 1.449, "exponent": 1.5}
 """A T200 thruster at 16 V: watts over N^1.5."""
 T200_FORCE = [-39.91, 51.44]

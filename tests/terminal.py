@@ -1,11 +1,15 @@
-"""The command on a terminal, for tests of what a person sees first."""
+"""The command on a terminal: what a person sees first, and the sentence of a refusal."""
 
 import os
 import pty
 import subprocess
 import sys
 import termios
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
+
+from finlab.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -26,3 +30,12 @@ def first_shown(*words: str) -> tuple[str, float]:
         process.wait()
         os.close(leader)
     return shown, (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def refused(argv: list[str]) -> str:
+    """The one sentence in which the command `finlab ARGV` says what is wrong."""
+    with redirect_stderr(StringIO()) as stream:
+        assert main(argv) == 2
+    error = stream.getvalue()
+    assert error.startswith("finlab: error: ") and error.count("\n") == 1, error
+    return error

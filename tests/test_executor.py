@@ -19,7 +19,7 @@ from finlab.executor import map_parts, on_cluster
 
 WRENCH = [
     *("eval", "wrench", "--split", "id,tables,thrusters", "--methods", "dual,qp"),
-    *("--layouts", "8", "--targets", "3", "--seed", "5", "--json"),
+    *("--layouts", "4", "--targets", "2", "--seed", "5", "--json"),
 ]
 
 
@@ -79,7 +79,7 @@ def test_rows_are_those_of_one_process(
 ) -> None:
     address, pids = cluster
     assert main([*WRENCH, str(tmp_path / "alone.json")]) == 0
-    killer = threading.Timer(1.5, os.kill, (pids[0], signal.SIGKILL))
+    killer = threading.Timer(1.0, os.kill, (pids[0], signal.SIGKILL))
     killer.start()
     assert main([*WRENCH, str(tmp_path / "cluster.json"), "--cluster", address]) == 0
     killer.join()

@@ -30,14 +30,7 @@ from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.axes import (
-    FILE_TURN_TOLERANCE,
-    TURN,
-    Direction3,
-    Vector,
-    is_full_turn,
-    wrapped,
-)
+from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, is_full_turn, wrapped
 from finlab.errors import LayoutError
 from finlab.files.checked import Name
 from finlab.precision import NEARLY

@@ -127,10 +127,7 @@ class Thruster(Propeller):
         object.__setattr__(self, "axis", unit_vector("axis", self.axis))
         least, most = self.force
         if not least <= 0.0 <= most or least == most:
-            raise LayoutError(
-                f"must include 0, and more than that, got {least:g} and {most:g}",
-                "force_n",
-            )
+            raise LayoutError(f"must include 0, and more than that, got {least:g} and {most:g}", "force_n")
         if self.dead_band > max(-least, most):
             raise LayoutError(
                 f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"

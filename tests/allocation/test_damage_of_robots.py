@@ -14,6 +14,7 @@ from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Damage, Layout, Limits, load_layout
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot
+from tests.terminal import refused
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
 
@@ -104,8 +105,7 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
     printed = capsys.readouterr().out
     assert "30.0" in printed
     for wrong in (["--weak", "front_left"], ["--stuck", "front_left=up"], ["--running", "back_left=1,2"]):
-        assert main(["allocate", "A", *wrench, *wrong]) == 2
-        assert f"{wrong[0][2:]}: expected NAME=" in capsys.readouterr().err
+        assert f"{wrong[0][2:]}: expected NAME=" in refused(["allocate", "A", *wrench, *wrong])
 
 
 @pytest.mark.parametrize(

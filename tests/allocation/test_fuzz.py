@@ -93,10 +93,7 @@ def ask(seed: int) -> None:
         batch = allocator.allocate_batch(
             robot, [target, 0.3 * target], policy=how, failed=asked.get("failed", ())
         )
-    for found, limited in (
-        (result.command, result.layout),
-        *((each, robot) for each in batch.command),
-    ):
+    for found, limited in ((result.command, result.layout), *((each, robot) for each in batch.command)):
         works = [fin not in result.failed for fin in robot.names]
         assert np.isfinite(found[works]).all() and np.isnan(np.delete(found, np.flatnonzero(works), 0)).all()
         assert ((found >= limited.lower) & (found <= limited.upper))[works].all()

@@ -20,6 +20,7 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-gpu-compositing",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -60,17 +61,19 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
     No shadows and still fins, so that software rendering keeps up.
     """
+    from finlab.files.worker import prepare
     from finlab.layout import load_layout
     from webapp.app import App
     from webapp.session import Display
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
+    prepare(["webapp.session.files", "webapp.tasks.fitting"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         server = start_server()
         app = App(server, Solver(), load_layout("ucat"), Display(shadows=False, frozen=True))
-        yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
+        yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.1", app, server)
         app.stop()
         stop_server(server)
 
@@ -84,11 +87,7 @@ def browser() -> Iterator[Any]:
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as home:
         chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM,
-            headless=True,
-            chromium_sandbox=False,
-            args=FLAGS,
-            downloads_path=home,
+            executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS, downloads_path=home
         )
         yield chromium
         chromium.close()

@@ -177,10 +177,6 @@ class Page:
 
         self.until(there, told=lambda: f"{label} shows {seen!r}, not {text!r}; {self.session.state}")
 
-    def shows_last(self, label: str, text: str) -> None:
-        """The same of the last box."""
-        self.until(lambda: self.row(label).last.input_value() == text)
-
     def type(self, label: str, value: str, place: int = -1) -> None:
         """Type into a number box."""
         box = self.row(label)

@@ -84,7 +84,7 @@ def test_a_robot_from_nothing_to_another_browser(
     page.until(lambda: page.page.locator(".fl-ask").count() == 0)
     there = browser.new_context(viewport={"width": 900, "height": 600})
     tab, known = there.new_page(), set(served.app.views)
-    tab.goto(link.replace("?", "?fixedDpr=0.3&"))
+    tab.goto(link.replace("?", "?fixedDpr=0.1&"))
 
     def others() -> list[Any]:
         return [view.session for key, view in served.app.views.items() if key not in known]

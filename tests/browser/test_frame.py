@@ -10,8 +10,9 @@ import pytest
 from webapp.session.looking import DRAWERS, TASKS
 
 SIZES = ((1400, 860), (900, 700))
-SETTLE_MS = 300
-"""Until the page has laid itself out, new parts have their names, and colours have faded in."""
+NAMING_MS = 120
+"""Until new parts have their names."""
+SETTLED = "() => !document.getAnimations().some((one) => one instanceof CSSTransition)"
 REGIONS = """() => {
   const shown = (e) => e && getComputedStyle(e).visibility === 'visible' && e.getClientRects().length > 0;
   const found = {};
@@ -54,6 +55,12 @@ def resized(page: Any) -> Iterator[Any]:
     page.page.set_viewport_size(before)
 
 
+def settle(page: Any) -> None:
+    """Wait until the page has laid itself out, new parts have their names, and colors have faded in."""
+    page.rest(NAMING_MS)
+    page.page.wait_for_function(SETTLED)
+
+
 def overlaps(boxes: dict[str, dict[str, float]]) -> list[str]:
     """Pairs of boxes that share more than a pixel."""
     found = []
@@ -73,7 +80,7 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
     for task in TASKS:
         for name in DRAWERS[task] or (task,):
             page.tab(name)
-            page.rest(SETTLE_MS)
+            settle(page)
             boxes = page.page.evaluate(REGIONS)
             assert overlaps(boxes) == [], f"{name} at {width} x {height}"
             assert {"top", "right", "canvas"} <= set(boxes), name
@@ -164,7 +171,7 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
     page.catch_up()
     page.rest(600)
     before = drawn()
-    page.rest(2500)
+    page.rest(1500)
     assert drawn() == before, "a page that nobody touches draws no frame"
     blade = "() => window.__viserMutable.nodeRefFromName['/robot/fins/0/turn/blade'].quaternion.x"
     still = page.page.evaluate(blade)
@@ -187,7 +194,8 @@ def test_what_is_typed_counts_with_enter(page: Any) -> None:
 
 AXE = files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
 """axe-core itself, as its wrapper for Python ships it."""
-RUN = "rules => axe.run(document, { resultTypes: ['violations'], ...(rules && { runOnly: rules }) })"
+RUN = """rules => axe.run(
+  document, { resultTypes: ['violations'], preload: false, ...(rules && { runOnly: rules }) })"""
 SCHEME = "scheme => document.documentElement.dataset.mantineColorScheme === scheme"
 GRAVE = ("moderate", "serious", "critical")
 """Impacts that are mended before anything lands."""
@@ -196,7 +204,7 @@ GRAVE = ("moderate", "serious", "critical")
 def findings(page: Any, rules: list[str] | None = None) -> list[str]:
     """What it finds that is grave on what is seen now, one line for each kind; by some rules, or by all."""
     tab = page.page
-    page.rest(SETTLE_MS)
+    settle(page)
     if not tab.evaluate("() => typeof axe === 'object'"):
         tab.evaluate(AXE)
     found = []
@@ -213,7 +221,7 @@ def test_no_serious_finding_light_or_dark(page: Any) -> None:
     assert findings(page) == [], "nothing selected"
     page.key("n")
     for task in TASKS:
-        for name in (task, *DRAWERS.get(task, ())):
+        for name in DRAWERS[task] or (task,):
             page.tab(name)
             assert findings(page) == [], name
     page.key("Control+k")
@@ -224,7 +232,7 @@ def test_no_serious_finding_light_or_dark(page: Any) -> None:
     page.key("Alt+1")
     page.page.wait_for_function(SCHEME, arg="dark")
     for task in TASKS:
-        for name in (task, *DRAWERS.get(task, ())):
+        for name in DRAWERS[task] or (task,):
             page.tab(name)
             assert findings(page, ["color-contrast"]) == [], f"{name}, dark"
     page.tab("Comparison")

@@ -9,6 +9,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.layout import load_layout
+from tests.terminal import refused
 
 
 def test_check_accepts_every_shipped_layout(capsys: pytest.CaptureFixture[str]) -> None:
@@ -30,9 +31,8 @@ def test_check_names_file_and_key_of_each_bad_file(
     assert "'nowhere.yaml' is neither a file nor a shipped layout; shipped are A, B, C, D" in second
 
 
-def test_check_wants_a_layout(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["layout", "check"]) == 2
-    assert "expected at least one file" in capsys.readouterr().err
+def test_check_wants_a_layout() -> None:
+    assert "expected at least one file" in refused(["layout", "check"])
 
 
 def test_show_lists_fins_and_what_they_can_push(capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,18 +112,15 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
         (["--fins", "front_right", "--rounds", "0"], "rounds: expected a number of at least 1"),
     ],
 )
-def test_wrong_questions(
-    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_questions(arguments: list[str], message: str, tmp_path: Path) -> None:
     output = tmp_path / "never.yaml"
-    assert main(["layout", "optimize", "A", *arguments, "-o", str(output)]) == 2
-    assert message in capsys.readouterr().err
+    assert message in refused(["layout", "optimize", "A", *arguments, "-o", str(output)])
     assert not output.exists()
 
 
-def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["layout", "optimize", "A", "--fins", "front_right", "-o", "no/where.yaml"]) == 2
-    assert "output: expected a file in an existing folder" in capsys.readouterr().err
+def test_a_folder_that_is_not_there() -> None:
+    error = refused(["layout", "optimize", "A", "--fins", "front_right", "-o", "no/where.yaml"])
+    assert "output: expected a file in an existing folder" in error
 
 
 def test_show_prints_the_score_card(capsys: pytest.CaptureFixture[str]) -> None:
@@ -144,6 +141,5 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert record["axes"][0] == "surge"
 
 
-def test_show_of_an_unknown_failed_fin(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["layout", "show", "A", "--failed", "nobody"]) == 2
-    assert "has no fin 'nobody'" in capsys.readouterr().err
+def test_show_of_an_unknown_failed_fin() -> None:
+    assert "has no fin 'nobody'" in refused(["layout", "show", "A", "--failed", "nobody"])

@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from finlab import load_layout
-from finlab.control import (
-    Controller,
-    Measurement,
-    Setpoint,
-    TrackingController,
-    gains_for,
-)
+from finlab.control import Controller, Measurement, Setpoint, TrackingController, gains_for
 from finlab.control.tracking_controller import BEHIND_S
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo
@@ -65,11 +59,7 @@ def test_no_more_than_the_bounds_is_asked_for(robot: Layout) -> None:
 
 
 def error(
-    robot: Layout,
-    pilot: Controller,
-    truth: Layout | None = None,
-    current: float = 0.0,
-    path: str = "circle",
+    robot: Layout, pilot: Controller, truth: Layout | None = None, current: float = 0.0, path: str = "circle"
 ) -> float:
     """Root mean square distance from a path [m]."""
     path_, flow = make_trajectory(path), (current, 0.0, 0.0)

@@ -69,8 +69,10 @@ def test_the_method_with_networks_answers_with_those_of_this_finlab(of_mdn: Bund
     assert load_robot(tmp_path).allocate(WRENCH) == desk.allocate(WRENCH)
 
 
-@pytest.mark.parametrize(("method", "fixture"), [("mdn", "untrained_mdn"), ("paper", "untrained_checkpoint")])
-@pytest.mark.parametrize("archive", [False, True])
+@pytest.mark.parametrize(
+    ("method", "fixture", "archive"),
+    [("mdn", "untrained_mdn", False), ("paper", "untrained_checkpoint", True)],
+)
 def test_networks_of_ones_own_travel(
     method: str, fixture: str, archive: bool, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

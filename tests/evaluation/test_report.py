@@ -22,6 +22,7 @@ from finlab.evaluation.document import FORMATS, Column, Table, to_markdown, to_t
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.evaluation.plots import candidates_picture, fins_picture, temperature_picture
 from finlab.evaluation.report_page import PAGE, TABLES, make_report
+from tests.terminal import refused
 
 TINY: dict[str, dict[str, Any]] = {
     "wrench": {"split": ("id", "tables"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
@@ -125,13 +126,9 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
         ("-o somewhere --sections nothing", "sections: expected some of all, wrench, "),
     ],
 )
-def test_bad_input_is_one_sentence(
-    arguments: str, message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_one_sentence(arguments: str, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(Path(report_page.__file__).parents[2])
-    assert main(["eval", "report", *arguments.split()]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+    assert message in refused(["eval", "report", *arguments.split()])
     assert not os.path.exists("somewhere")
 
 
@@ -183,7 +180,7 @@ SMALL = {
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_the_verb_draws_its_picture(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_verb_draws_its_picture(name: str, tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     path = tmp_path / "picture.png"
     assert main(["eval", name, *SMALL[name], "--plot", str(path)]) == 0
@@ -223,17 +220,11 @@ def test_a_picture_shows_the_rows() -> None:
 @pytest.mark.parametrize(
     ("file", "message"), [("picture.jpg", "ends in .png"), ("none/picture.png", "in an existing folder")]
 )
-def test_a_picture_that_cannot_be_is_refused(
-    file: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["eval", "wrench", "--plot", str(tmp_path / file)]) == 2
-    assert message in capsys.readouterr().err
+def test_a_picture_that_cannot_be_is_refused(file: str, message: str, tmp_path: Path) -> None:
+    assert message in refused(["eval", "wrench", "--plot", str(tmp_path / file)])
 
 
-def test_without_matplotlib_one_sentence_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_matplotlib_one_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert main(["eval", "wrench", "--plot", str(tmp_path / "picture.png")]) == 2
-    error = capsys.readouterr().err
-    assert "matplotlib is not installed" in error and "[plot]" in error and len(error.splitlines()) == 1
+    error = refused(["eval", "wrench", "--plot", str(tmp_path / "picture.png")])
+    assert "matplotlib is not installed" in error and "[plot]" in error

@@ -12,6 +12,7 @@ import finlab
 from finlab.allocation import Allocator
 from finlab.cli import main
 from finlab.deploy.command import main as runtime
+from tests.terminal import refused
 
 HEAVY = str(Path(__file__).parent / "bluerov2_heavy.urdf")
 WRENCH = [20.0, 0.0, 10.0, 0.0, 0.0, 2.0]
@@ -59,10 +60,10 @@ def test_a_shipped_robot_of_thrusters_runs_in_the_runtime(
     assert rest["status"] == "neutral" and all(part["force_n"] == 0.0 for part in rest["actuators"])
 
 
-def test_the_form_of_the_output_must_be_clear(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["layout", "convert", HEAVY, str(tmp_path / "60999_rov")]) == 2
-    assert "its end says no form; say --to layout, urdf, sdf, px4, ardusub, matrix" in capsys.readouterr().err
+def test_the_form_of_the_output_must_be_clear(tmp_path: Path) -> None:
+    error = refused(["layout", "convert", HEAVY, str(tmp_path / "60999_rov")])
+    assert "its end says no form; say --to layout, urdf, sdf, px4, ardusub, matrix" in error
     assert main(["layout", "convert", HEAVY, str(tmp_path / "60999_rov"), "--to", "px4"]) == 0
-    assert main(["layout", "convert", "nowhere.urdf", str(tmp_path / "x.yaml")]) == 2
-    assert "'nowhere.urdf' is neither a file nor a shipped layout" in capsys.readouterr().err
+    error = refused(["layout", "convert", "nowhere.urdf", str(tmp_path / "x.yaml")])
+    assert "'nowhere.urdf' is neither a file nor a shipped layout" in error
     assert "param set-default CA_ROTOR_COUNT 8" in (tmp_path / "60999_rov").read_text()

@@ -1,12 +1,7 @@
-"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, the law is known.
+"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, a known law."""
 
-`python -m tests.fit.test_calibration SEED...` prints the table for other seeds.
-"""
-
-import sys
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -65,13 +60,3 @@ def test_fitted_fins_miss_as_much_as_they_say(kind: str, tmp_path: Path) -> None
     miss, expected = (np.concatenate(part) for part in zip(*rows, strict=True))
     assert 0.5 < ratio(miss, expected) < 2.0
     assert (np.abs(np.log(np.sqrt(np.mean(miss**2, axis=0) / np.mean(expected**2, axis=0)))) < 1.1).all()
-
-
-if __name__ == "__main__":
-    with TemporaryDirectory() as place:
-        for law_name in LAWS:
-            own = [miss_and_expected(law_name, int(seed), Path(place)) for seed in sys.argv[1:]]
-            m, e = (np.concatenate(part) for part in zip(*own, strict=True))
-            each = " ".join(f"{ratio(*row):.2f}" for row in own)
-            axes = " ".join(f"{value:.2f}" for value in np.sqrt(np.mean(m**2 / e**2, axis=0)))
-            print(f"{law_name:10} {ratio(m, e):.2f}  by seed {each}  by axis {axes}", flush=True)

@@ -23,8 +23,7 @@ def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> Force
 
 
 @pytest.mark.parametrize(
-    ("half", "scale", "far"),
-    crossed(HALVES, [1e-3, 1.0, 1e3], [0.2, 5.0, 1e4], every=5),
+    ("half", "scale", "far"), crossed(HALVES, [1e-3, 1.0, 1e3], [0.2, 5.0, 1e4], every=5)
 )
 def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: float) -> None:
     """At the optimum each fin's force is the farthest that its set has along the pull."""

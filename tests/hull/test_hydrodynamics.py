@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from finlab.hull.hydrodynamics import (
-    HullSolid,
-    ellipsoid_added_mass,
-    friction_damping,
-    pressure_damping,
-)
+from finlab.hull.hydrodynamics import HullSolid, ellipsoid_added_mass, friction_damping, pressure_damping
 
 
 def box(size: tuple[float, float, float], center: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:

@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.errors import LayoutError
-from finlab.layout import (
-    Fin,
-    Layout,
-    Limits,
-    layout_effectiveness,
-    random_layout,
-)
+from finlab.layout import Fin, Layout, Limits, layout_effectiveness, random_layout
 from finlab.layout.effectiveness import force_effectiveness
 from finlab.layout.random_layouts import TRAINING_BOX
 

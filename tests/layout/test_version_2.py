@@ -193,11 +193,7 @@ BAD = [
     ("actuators[2].axis", edited(2, axis=[0, 1, 1]), "a unit vector, got one of length 1.41421"),
     ("actuators[2].axis", edited(2, axis=...), "required key is missing"),
     ("actuators[2].force_n", edited(2, force_n=[3, 2]), ""),
-    (
-        "actuators[2].model.exponent",
-        edited(2, model={**LAW, "exponent": 1.0}),
-        "must lie within",
-    ),
+    ("actuators[2].model.exponent", edited(2, model={**LAW, "exponent": 1.0}), "must lie within"),
     ("actuators[3].turn_axis", edited(3, turn_axis=[0, 0, 2]), ""),
     ("actuators[5].deflection_deg", edited(5, deflection_deg=[25, -25]), "25 and -25"),
 ]

@@ -131,10 +131,7 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
         ([HEADER], "no rows"),
         ([HEADER, "1,2,3,4"], "line 2 has 4 values"),
         ([HEADER, "1,2,x,4,5,6"], "line 2, column phi, holds 'x', which is not a number"),
-        (
-            [HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"],
-            "line 9, column Fx, holds 'nan', which is not finite",
-        ),
+        ([HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"], "line 9, column Fx, holds 'nan', which is not finite"),
         ([HEADER, *BLOCK[:-1]], "do not fill the grid of 2 amplitudes, 2 frequencies and 2 zero directions"),
         ([HEADER, *BLOCK[:-1]], "the row A = 0.2, f = 2, phi = 1 is missing"),
         ([HEADER, *BLOCK[:-1], "0.2,2,1,,1,2"], "line 9, column Fx, is empty; leave no gaps"),

@@ -69,10 +69,7 @@ def test_a_body_that_is_less_damped_in_yaw_than_its_model_is_not_spun(heavy: Lay
 
 def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
     loop = ClosedLoop(
-        heavy,
-        Allocator(heavy),
-        make_trajectory("circle"),
-        failures=[Fault(heavy.names[0], 0.0, "torn", 0.4)],
+        heavy, Allocator(heavy), make_trajectory("circle"), failures=[Fault(heavy.names[0], 0.0, "torn", 0.4)]
     )
     log = loop.run()
     late = log.asked[150:-2] - log.delivered[151:-1]

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.cli import main
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Layout, load_layout
 from finlab.sim import RunLog
 from finlab.sim.excite import BOUNDS, Exciting, excitation
 from finlab.vehicle.attitude import euler
+from tests.terminal import refused
 
 
 @pytest.fixture(scope="module", params=["A", "penta"])
@@ -50,11 +50,11 @@ def test_commands_give_the_wrench_where_the_fins_can() -> None:
     assert len({round(answer.command[0, 0], 3) for answer in answers}) > 1
 
 
-def test_what_cannot_be_shaken_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_shaken_is_refused() -> None:
     layout: Layout = load_layout("A")
     with pytest.raises(FinlabError, match="rudders of layout torpedo give nothing on the spot"):
         excitation(load_layout("torpedo"), 60.0)
     with pytest.raises(DataError, match="30 to 300 s, got 301"):
         excitation(layout, 301.0)
-    assert main(["simulate", "A", "--excite", "--fail", "front_left@3"]) == 2
-    assert "leave --controller, --fail, --monitor and --learn out" in capsys.readouterr().err
+    error = refused(["simulate", "A", "--excite", "--fail", "front_left@3"])
+    assert "leave --controller, --fail, --monitor and --learn out" in error

@@ -104,9 +104,6 @@ def test_a_fault_of_ours_is_told_and_the_page_goes_on(
     assert view.shown is not None and view.shown.target[0] == 0.3
 
 
-__all__ = ["app", "server", "view"]
-
-
 def link(text: str) -> str:
     """A design link that unpacks to a text."""
     return "y" + base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")

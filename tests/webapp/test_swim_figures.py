@@ -148,12 +148,7 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
     assert loss.name in robot.names[1:]
 
 
-@pytest.mark.parametrize(
-    ("key", "wrong"),
-    [
-        ("scenario", "hexa"),
-    ],
-)
+@pytest.mark.parametrize(("key", "wrong"), [("scenario", "hexa")])
 def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
     with pytest.raises(FinlabError):
         SwimSettings().with_value(key, wrong)

@@ -15,7 +15,7 @@ import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
 from finlab.layout import load_layout
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import load_stand_in, until
 from webapp import app as app_module
 from webapp.app import App, SessionStore
 from webapp.session import Session
@@ -127,13 +127,6 @@ def app(monkeypatch: pytest.MonkeyPatch) -> Iterator[App]:
 
 def port_of(app: App) -> int:
     return app._server.get_port()
-
-
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture

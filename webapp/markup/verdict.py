@@ -7,12 +7,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.physics.objective import REACHED
-from webapp.markup.words import (
-    authority_sentence,
-    listed,
-    three_digits,
-    unlearned_sentence,
-)
+from webapp.markup.words import authority_sentence, listed, three_digits, unlearned_sentence
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb

@@ -143,10 +143,7 @@ def _bench(path: Path, done: Upload) -> Fitted:
 
     def within(table: PowerTable) -> dict[str, Any]:
         least, most = table.rows[0][1], table.rows[-1][1]
-        return {
-            "model": table,
-            "force": (max(least, 0.0) if done.part.TURNS else least, most),
-        }
+        return {"model": table, "force": (max(least, 0.0) if done.part.TURNS else least, most)}
 
     with suppress(LayoutError):
         return Fitted(done, within(in_worker(PowerTable.read, path)))

@@ -209,11 +209,7 @@ class Solver:
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
-            state.target,
-            damage=state.damage,
-            policy=state.policy,
-            flow=state.flow,
-            seed=0,
+            state.target, damage=state.damage, policy=state.policy, flow=state.flow, seed=0
         )
 
 

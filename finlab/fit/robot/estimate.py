@@ -96,12 +96,7 @@ def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
 
 
 def fit_windows(
-    model: RobotModel,
-    unknowns: Unknowns,
-    windows: Windows,
-    deviation: Array,
-    vector: Array,
-    start: Array,
+    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array, start: Array
 ) -> Fitted:
     """Unknowns from windows, by the standard deviation of each channel (12,), from a vector (size,) on and
     from the beginnings of the windows `start` (12, W)."""

@@ -123,8 +123,7 @@ def make(method: str, objective: Name) -> AnyRobot:
 
 
 @pytest.mark.parametrize(
-    ("objective", "name", "method"),
-    crossed(["power", "effort"], MODELS, METHODS, every=9),
+    ("objective", "name", "method"), crossed(["power", "effort"], MODELS, METHODS, every=9)
 )
 def test_every_method_on_every_fin(
     method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]

@@ -33,8 +33,7 @@ def pair(model: PowerLaw | PowerTable) -> Layout:
     sides = (("left", 0.5), ("right", -0.5))
     ends, arc = (LEAST, MOST), (-HALF, HALF)
     return Layout(
-        "pair",
-        tuple(Tilt(name, (-1.0, y, 0.0), (0, 0, 1), (1, 0, 0), ends, model, arc) for name, y in sides),
+        "pair", tuple(Tilt(name, (-1.0, y, 0.0), (0, 0, 1), (1, 0, 0), ends, model, arc) for name, y in sides)
     )
 
 

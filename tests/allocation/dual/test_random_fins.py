@@ -38,11 +38,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
 
 @pytest.mark.parametrize(
     ("limits", "kinds"),
-    crossed(
-        ["nominal", "varied"],
-        [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS],
-        every=7,
-    ),
+    crossed(["nominal", "varied"], [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS], every=7),
 )
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
     method = AnyRobot()

@@ -73,7 +73,9 @@ def test_a_tumbling_robot_tells_its_reversed_lift_motor_too(tmp_path: Path) -> N
     assert fitted(layout, tmp_path / "swim.npz").opposed == ("lift_front_right",)
 
 
-@pytest.mark.parametrize("motor", ["front_left", "lift_rear_right", None])
+@pytest.mark.parametrize(
+    "motor", [pytest.param("front_left", marks=pytest.mark.exhaustive), "lift_rear_right", None]
+)
 def test_the_monitor_names_it_within_seconds_and_the_robot_keeps_its_way(motor: str | None) -> None:
     layout = load_layout("bluerov2_heavy")
     truth = layout if motor is None else opposed_in(layout, [motor])

@@ -66,28 +66,40 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
     assert 1.0 <= spread["used"] <= SMOKE.network.n_components + 1e-4
 
 
-def test_it_learns(tmp_path: Path) -> None:
-    finished = train_mdn("smoke", tmp_path)
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("trained")
+    train_mdn("smoke", folder)
+    return folder
+
+
+def with_answers(trained: Path, folder: Path) -> Path:
+    """A folder for a run with the answers of one that has ended."""
+    shutil.copytree(trained / "answers", folder / "answers")
+    return folder
+
+
+def test_it_learns(trained: Path, tmp_path: Path) -> None:
+    finished = read_checkpoint(trained)
     assert finished.training["mdn"]["steps_done"] == 30
-    assert read_checkpoint(tmp_path).network_of(ForceNetworkConfig) == SMOKE.network
-    with (tmp_path / "log.csv").open(newline="") as file:
+    assert finished.network_of(ForceNetworkConfig) == SMOKE.network
+    with (trained / "log.csv").open(newline="") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     assert [row["step"] for row in rows] == [0, 20, 29]
     assert rows[-1]["imitation"] < rows[0]["imitation"]
     assert rows[-1]["seconds"] >= rows[1]["seconds"]
-    assert train_mdn("smoke", tmp_path, steps=10).sha256 != finished.sha256
+    assert train_mdn("smoke", with_answers(trained, tmp_path), steps=10).sha256 != finished.sha256
 
 
-def test_time_that_is_up_ends_the_run(tmp_path: Path) -> None:
-    cut = train_mdn("smoke", tmp_path, seconds=1e-9)
+def test_time_that_is_up_ends_the_run(trained: Path, tmp_path: Path) -> None:
+    cut = train_mdn("smoke", with_answers(trained, tmp_path), seconds=1e-9)
     assert cut.training["mdn"]["steps_done"] == 1
 
 
 def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    trained: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = train_mdn("smoke", tmp_path / "undisturbed")
-    shutil.copytree(tmp_path / "undisturbed" / "answers", tmp_path / "died" / "answers")
+    expected, died = read_checkpoint(trained), with_answers(trained, tmp_path / "died")
     saves = 0
 
     def dying(folder: Path, weights: TrainedWeights) -> TrainedWeights:
@@ -100,8 +112,8 @@ def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
     monkeypatch.setattr(loop, "SAVE_EVERY_S", 0.0)
     monkeypatch.setattr(mdn_training, "write_checkpoint", dying)
     with pytest.raises(KeyboardInterrupt):
-        train_mdn("smoke", tmp_path / "died", resume=True)
-    found = train_mdn("smoke", tmp_path / "died", resume=True)
+        train_mdn("smoke", died, resume=True)
+    found = train_mdn("smoke", died, resume=True)
     assert 12 < saves < 12 + 30  # it did not begin anew
     for name, value in expected.network.items():
         np.testing.assert_allclose(found.network[name], value, atol=1e-6)
