@@ -133,7 +133,6 @@ class AzimuthCommand(Command, frozen=True, rename={"angle": "angle_rad", "force"
 
     @property
     def words(self) -> str:
-        """See `Command`."""
         return force_words(self.force, f" at {math.degrees(self.angle):.1f} deg", self.input)
 
 

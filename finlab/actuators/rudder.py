@@ -254,7 +254,6 @@ class RudderCommand(Command, frozen=True, rename={"deflection": "deflection_rad"
 
     @property
     def words(self) -> str:
-        """See `Command`."""
         return f"{math.degrees(self.deflection):.1f} deg"
 
 

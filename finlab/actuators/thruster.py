@@ -83,7 +83,6 @@ class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
 
     @property
     def words(self) -> str:
-        """See `Command`."""
         return force_words(self.force, "", self.input)
 
 

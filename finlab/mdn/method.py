@@ -78,7 +78,6 @@ class Mdn(Method):
         self._one_thread = single_threaded_products()
 
     def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:
-        """See `Method`."""
         target, previous, seed = targets / self.sigma, wanted.get("previous"), wanted.get("seed", 0)
         if len(target) == 1:
             with self._one_thread():
@@ -98,7 +97,6 @@ class Mdn(Method):
         return Solution(command)
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
-        """See `Method`."""
         wanted = target[None] / self.sigma
         with self._one_thread():
             proposal = self.proposals(wanted, seed)

@@ -1,12 +1,16 @@
-"""The tour and the lessons: each stop is a prepared state with words; a lesson has a task and its check."""
+"""The tour and the lessons of `lessons.yaml`: prepared states with words; a lesson has a task and its check."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from finlab.allocation.allocation import Allocation
+from finlab.files.plain_values import parse_yaml
+from finlab.files.schema import checked
 from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
@@ -17,8 +21,7 @@ ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
 
 
-@dataclass(frozen=True)
-class Stop:
+class Stop(Struct, frozen=True, forbid_unknown_fields=True):
     """A prepared state, what there is to see in it, and perhaps something to do."""
 
     name: str
@@ -34,8 +37,6 @@ class Stop:
     """What lies uppermost in the drawer; its task is open."""
     exercise: str = ""
     praise: str = ""
-    done: Callable[[Core, Allocation], bool] = lambda session, answer: False
-    """Whether the exercise is, by a session and what is on its robot."""
 
     @property
     def state(self) -> State:
@@ -50,148 +51,31 @@ def _aligned(answer: Allocation) -> bool:
     return size > 0.0 and float(delivered @ target) / size > ALIGNED
 
 
-TOUR = (
-    Stop(
-        "wrench",
-        "A wrench becomes flapping",
-        "The blue arrow and ring above the hull are what is asked: forward, and a turn to the left. Each fin "
-        "answers with amplitude, frequency and direction; its arrow is its mean force. Green is the sum.",
+DONE: dict[str, Callable[[Core, Allocation], bool]] = {
+    "two-ways": lambda session, answer: session.mode > 0 and answer.reachable,
+    "refinement": lambda session, _: session.step is not None and session.step > 0,
+    "temperature": lambda session, _: (session.state.temperature or 0.0) > 1.9,
+    "watts-or-effort": lambda session, answer: least_of(session.state.method) == "watts" and answer.reachable,
+    "lost-fin": lambda session, answer: bool(session.state.failed) and answer.reachable,
+    "no-yaw": lambda session, answer: (
+        session.state.layout.fins != shipped()["no_yaw"].fins and answer.reachable
     ),
-    Stop(
-        "many-ways",
-        "One wrench has many answers",
-        "Four fins have twelve numbers, the wrench only six. Here a network proposes ways, each is made "
-        "exact, and this is the second best. In the plot below each numbered ring is one. Press some: the "
-        "fins change, the green sum stays.",
-        mode=1,
-        method="mdn",
+    "out-of-reach": lambda session, answer: (
+        session.state.policy == "direction" and not answer.reachable and _aligned(answer)
     ),
-    Stop(
-        "swim",
-        "It swims",
-        "Ten times a second the controller asks for a wrench and the fins answer. The blue ball is where "
-        "the robot should be. Break a fin by its number, and watch the others take over.",
-        swims=True,
-        drawer="Swim over time",
-    ),
-    Stop(
-        "thrusters",
-        "Not fins alone",
-        "Two thrusters lift this robot beside its four fins. Fins take little power at light load, thrusters "
-        "take what is heavy: ask for more heave, and see who carries it. Finish brings your work back.",
-        "turtle_hybrid",
-        (1.2, 0.0, 4.0, 0.0, 0.0, 0.25),
-    ),
-)
+    "learned-physics": lambda session, answer: session.state.method == answer.method == "paper",
+}
+"""Whether the exercise of a lesson is done, by a session and what is on its robot."""
 
 
-LESSONS = (
-    Stop(
-        "two-ways",
-        "One wrench, several ways",
-        "Four fins have twelve numbers, a wrench has six: many commands do the same. In the plot below, "
-        "small dots are what a network proposes, and thin lines lead from each to the numbered ring where it "
-        "ends. The filled ring is on the robot: the answer, number 1.",
-        exercise="Press a row with the badge network, or its ring. Which fins change, and what stays?",
-        praise="The fins changed, the green arrows did not: the robot feels the same force and torque.",
-        done=lambda session, answer: session.mode > 0 and answer.reachable,
-    ),
-    Stop(
-        "refinement",
-        "From a sample to an answer",
-        "A sample is nearly right: its error is some hundredths of what the robot can push. It is followed "
-        "to the least effort near it, first by descent in forces; then its commands are made exact by the "
-        "fins' own laws. The plot's error goes up in powers of ten.",
-        mode=1,
-        exercise="Press Play below the plot. Watch the dots, the fins, and the error below the robot.",
-        praise="Now drag Step: at each place stands what the robot would do there. With Loop it begins anew.",
-        done=lambda session, _: session.step is not None and session.step > 0,
-    ),
-    Stop(
-        "temperature",
-        "Mixture and temperature",
-        "The network gives a mixture: components, each with a mean and a spread, for different ways to share "
-        "the wrench. First come the means; the other samples are drawn about them, with variances times the "
-        "temperature.",
-        exercise="Set Temperature to 0, beside the plot, then to 2. What becomes of dots and rings?",
-        praise=(
-            "At 0 dots lie on the means, at 2 they stray far; the rings stay. The minima belong to the "
-            "robot: the network only says where to begin."
-        ),
-        done=lambda session, _: (session.state.temperature or 0.0) > 1.9,
-    ),
-    Stop(
-        "watts-or-effort",
-        "Watts are not effort",
-        "Effort, the paper's measure, adds up how far and how fast fins flap. Its cheapest answer lets some "
-        "fins rest. Watts grow faster than force, so they are least where all fins share the work.",
-        "hexa",
-        (1.5, 0.0, 0.0, 0.0, 0.0, 0.1),
-        exercise="At Least, in the bar above, choose watts. What do the resting fins do now?",
-        praise=(
-            "More fins work, each a little, and the robot needs fewer watts. The answer has the badge "
-            "optimum: its watts are proved least. What the network proposes stands beside it."
-        ),
-        done=lambda session, answer: least_of(session.state.method) == "watts" and answer.reachable,
-        method="mdn",
-    ),
-    Stop(
-        "lost-fin",
-        "A fin is lost",
-        "Nothing has to be built or trained for it: the fin is left out, and the wrench is divided among the "
-        "others, as long as they can give it.",
-        exercise="At Fail, on the left, press the number of a fin, so that nothing is left undone.",
-        praise="Three fins are enough for this turn. Fail a second one: which axis is missing then?",
-        done=lambda session, answer: bool(session.state.failed) and answer.reachable,
-    ),
-    Stop(
-        "no-yaw",
-        "What a layout cannot do",
-        "Each fin of this robot pushes along a line through its middle, or up and down, so no command turns "
-        "it left or right. No method can change that: the placement of the fins decides.",
-        "no_yaw",
-        (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
-        exercise="Press a fin in the list, and move Shaft on the right, until below the robot stands Exact.",
-        praise="One turned shaft gave the robot an axis. Reach, below, has before and now side by side.",
-        done=lambda session, answer: (
-            session.state.layout.fins != shipped()["no_yaw"].fins and answer.reachable
-        ),
-        drawer="Reach",
-    ),
-    Stop(
-        "out-of-reach",
-        "Out of reach",
-        "This wrench is more than the fins can give. By the policy closest the error is as small as can be, "
-        "and what is delivered may point elsewhere than what was asked.",
-        "ucat",
-        (30.0, 6.0, 0.0, 0.0, 0.0, 4.0),
-        exercise="At Out of reach, on the right, choose direction. What happens to the arrows?",
-        praise=(
-            "Less is delivered, in the asked proportions: a robot that is asked for too much still goes "
-            "where it should."
-        ),
-        done=lambda session, answer: (
-            session.state.policy == "direction" and not answer.reachable and _aligned(answer)
-        ),
-    ),
-    Stop(
-        "learned-physics",
-        "What a network believes",
-        "The paper's method learns the physics of the fins from samples, and draws its answers from a "
-        "mixture. Below the robot every answer is judged by the fins' own law, whatever the method believes.",
-        "A",
-        (1.0, 0.0, 0.5, 0.0, 0.0, 0.1),
-        exercise="At Method, in the bar above, choose paper, and see the error below the robot.",
-        praise=(
-            "What is left is what the network has not learnt. Press Compare the methods below: each of them "
-            "on this wrench, with its error, costs and time."
-        ),
-        drawer="Comparison",
-        done=lambda session, answer: session.state.method == answer.method == "paper",
-    ),
-)
+class _Course(Struct, forbid_unknown_fields=True):
+    tour: tuple[Stop, ...]
+    lessons: tuple[Stop, ...]
 
 
+_FILE = Path(__file__).with_name("lessons.yaml")
+_course = checked(parse_yaml(_FILE.read_text("utf-8"), _FILE.name), _Course)
+TOUR, LESSONS = _course.tour, _course.lessons
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
 KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
 """What of a session comes back at the end."""
@@ -255,4 +139,5 @@ class Guide:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""
         session = self._session
         if self.stop is not None and answer.layout == session.state.able:
-            self.solved = self.solved or self.stop.done(session, answer)
+            done = DONE.get(self.stop.name)
+            self.solved = self.solved or (done is not None and done(session, answer))

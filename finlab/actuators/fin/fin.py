@@ -120,7 +120,6 @@ class FinCommand(
 
     @property
     def words(self) -> str:
-        """See `Command`."""
         direction = math.degrees(self.zero_direction)
         return f"{self.amplitude:.3f} rad, {self.frequency:.3f} Hz, {direction:.1f} deg"
 

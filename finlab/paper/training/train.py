@@ -44,7 +44,6 @@ class Options:
     resume: bool = False
     """Whether to go on from the state in `output`."""
     device: str | None = None
-    """See `workplace`."""
 
 
 class Bench:
