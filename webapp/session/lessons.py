@@ -1,4 +1,4 @@
-"""The tour and the lessons of `lessons.yaml`: prepared states with words; a lesson has a task and its check."""
+"""Tour and lessons of `lessons.yaml`: prepared states with words; a lesson has a task and its check."""
 
 from collections.abc import Callable
 from dataclasses import replace
