@@ -43,7 +43,7 @@ from finlab.axes import (
     wrapped,
 )
 from finlab.errors import LayoutError
-from finlab.files.checked import Name
+from finlab.files.schema import Name
 from finlab.precision import NEARLY
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]

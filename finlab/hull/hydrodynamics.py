@@ -15,7 +15,7 @@ from scipy.special import elliprd
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.hull.surface import Surface, hull_of
+from finlab.hull.surface import Surface, Three, hull_of
 from finlab.layout import Body, Layout
 from finlab.vehicle.fossen import GRAVITY
 
@@ -28,7 +28,6 @@ DESIGN_SPEED = 0.2
 BLUNT, DISC = 0.44, 1.17
 """Drag coefficient of a sphere's pressure, and of a disc across the flow, which nothing exceeds."""
 
-Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 

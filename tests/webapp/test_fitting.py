@@ -15,7 +15,7 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.files.archive import packed
+from finlab.files.guarded import packed
 from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from tests.fit.cell import columns_of, commands, measured, soft, write

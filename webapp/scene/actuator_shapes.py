@@ -9,7 +9,8 @@ from trimesh.convex import convex_hull
 from trimesh.util import append_faces
 
 from finlab.arrays import Array
-from finlab.hull.shapes import Mesh, grid_faces, revolved, triangles
+from finlab.hull.mesh_file import Mesh
+from finlab.hull.surface import grid_faces, revolved, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""
@@ -26,7 +27,7 @@ NOTHING = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], dtype=np.int32))
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
     vertices, faces = append_faces(*zip(*meshes, strict=True))
-    return Mesh(vertices, faces.astype(np.int32))
+    return Mesh(np.asarray(vertices, float), faces.astype(np.int32))
 
 
 def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:

@@ -8,7 +8,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh
 from webapp.board import Board
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube

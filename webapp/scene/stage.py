@@ -10,7 +10,8 @@ import viser
 
 from finlab.arrays import Array
 from finlab.hull import Surface, hull_of
-from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
+from finlab.hull.mesh_file import Mesh
+from finlab.hull.surface import STATIONS, shape_mesh
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING
