@@ -16,7 +16,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.control.measurement import Measurement, Setpoint
+from finlab.control.contract import Measurement, Setpoint
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of

@@ -15,8 +15,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.control.completion import axes_of
-from finlab.control.measurement import Measurement, Setpoint
+from finlab.control.contract import Measurement, Setpoint, axes_of
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
 from finlab.vehicle.actuator_motion import following_delay

@@ -21,7 +21,7 @@ from finlab.layout import Layout, Thruster, load_layout
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
 from tests.webapp.stand_in import page_of, until
-from webapp.markup.fit_card import fit_card
+from webapp.markup.outcomes import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
 from webapp.tasks import fitting
