@@ -114,8 +114,7 @@ def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:
         robots, n = sets.radius.shape
         rows = sets.repeat(n)
         rows.lose(np.arange(robots * n), np.tile(np.arange(n), robots))
-        least: Array = of_rest(rows).reshape(robots, n).min(axis=1)
-        return least
+        return np.asarray(of_rest(rows).reshape(robots, n).min(axis=1))
 
     return goal
 

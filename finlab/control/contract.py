@@ -150,8 +150,7 @@ class Completion:
 
     def __call__(self, wrench: Array) -> Array:
         """Wrenches (..., 6) whose wanted axes are asked for, whole."""
-        completed: Array = wrench @ self.matrix.T
-        return completed
+        return np.asarray(wrench @ self.matrix.T)
 
 
 def axes_of(layout: Layout) -> tuple[str, ...]:

@@ -147,8 +147,7 @@ class MotionObserver:
         back = np.minimum(np.array(ages) / self._dt, len(past))
         row, each = np.minimum(back.astype(int), len(past) - 1), np.arange(len(now))
         after, before = known[row, each], known[row + 1, each]
-        then: Array = after + (back - row) * (before - after)
-        return then
+        return np.asarray(after + (back - row) * (before - after))
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through

@@ -162,8 +162,7 @@ class TrackingController:
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot hardly moves
         # through the water, and there the estimated current decides it.
         along = self._observer.wrenches_along(setpoints, current, 2.0 * self.gains.slow)
-        expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound)
-        return expected
+        return np.asarray((self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound))
 
     def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
         """Velocity over ground (3,) to go with [m/s]."""

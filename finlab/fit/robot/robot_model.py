@@ -141,14 +141,12 @@ def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
     those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
     thrusts = np.array([len(part.AXES) == 1 for part in layout.actuators])
     angles = np.stack([mounting, np.where(thrusts, 0.0, lean), np.where(thrusts, lean, 0.0)], axis=-1)
-    turned: Array = Rotation.from_euler("ZXY", angles).as_matrix().swapaxes(1, 2) @ layout.frames
-    return turned
+    return np.asarray(Rotation.from_euler("ZXY", angles).as_matrix().swapaxes(1, 2) @ layout.frames)
 
 
 def shape_factor(terms: Array, shape: Array) -> Array:
     """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
-    result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
-    return result
+    return np.asarray(np.exp(np.clip(terms @ shape, -2.0, 2.0)))
 
 
 def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
