@@ -20,5 +20,4 @@ from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
 from finlab.control.hypotheses import MonitorSettings as MonitorSettings
 from finlab.control.observer import MotionObserver as MotionObserver
 from finlab.control.tracking_controller import TrackingController as TrackingController
-from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for
