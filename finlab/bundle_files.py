@@ -13,8 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from finlab.errors import DataError
-from finlab.files.archive import unpacked
-from finlab.files.guarded import is_regular, read_file
+from finlab.files.guarded import is_regular, read_file, unpacked
 from finlab.files.plain_values import parse_json
 
 FORMAT = "finlab-bundle"

@@ -8,7 +8,7 @@ from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop
-from finlab.sim.actuator_force import ActuatorForce
+from finlab.sim.devices import ActuatorForce
 from finlab.vehicle.fin_motion import FinMotion
 
 

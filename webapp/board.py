@@ -10,7 +10,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from webapp.markup.swim_card import pace_words
+from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
 from webapp.tasks.jobs import Jobs

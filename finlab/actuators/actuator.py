@@ -36,7 +36,7 @@ from finlab.axes import (
     vector_words,
 )
 from finlab.errors import FinlabError
-from finlab.files.checked import Checked, Name
+from finlab.files.schema import Checked, Name
 
 Places = NDArray[np.intp]
 """Places of actuators among others."""

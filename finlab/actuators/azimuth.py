@@ -32,7 +32,7 @@ from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
 from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, is_full_turn, wrapped
 from finlab.errors import LayoutError
-from finlab.files.checked import Name
+from finlab.files.schema import Name
 from finlab.precision import NEARLY
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]

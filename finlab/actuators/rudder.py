@@ -34,7 +34,7 @@ from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, R
 from finlab.arrays import Array, Values
 from finlab.axes import Direction3, Vector, arc_words
 from finlab.errors import LayoutError
-from finlab.files.checked import Name
+from finlab.files.schema import Name
 from finlab.precision import NOTHING
 
 SHARPNESS = 50.0

@@ -9,8 +9,8 @@ from msgspec import Meta
 
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
-from finlab.files.checked import Checked
 from finlab.files.csv_table import read_table
+from finlab.files.schema import Checked
 
 MAX_FORCE = 1e6
 """Largest force of one actuator [N]."""

@@ -18,7 +18,7 @@ from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
 from finlab.axes import Direction3, unit_vector
 from finlab.errors import LayoutError
-from finlab.files.checked import Name
+from finlab.files.schema import Name
 
 
 class ThrusterLaw(PropellerLaw):

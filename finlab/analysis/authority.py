@@ -123,11 +123,11 @@ def _authorities(
     return [
         Authority(
             **vars(held[k]),
-            singular_values=_floats(values[k]),
-            largest=_floats(size[k, :6] * SCALE),
-            most_negative=_floats(size[k, 6:] * SCALE),
+            singular_values=tuple(values[k].tolist()),
+            largest=tuple((size[k, :6] * SCALE).tolist()),
+            most_negative=tuple((size[k, 6:] * SCALE).tolist()),
             weakest=float(least.size[k]),
-            weakest_direction=_floats(direction[k]),
+            weakest_direction=tuple((direction[k] + 0.0).tolist()),
         )
         for k in range(len(failures))
     ]
@@ -182,7 +182,3 @@ def _loss(before: Authority, name: str, after: Authority) -> Loss:
         share_left=tuple(None if np.isinf(value) else float(min(value, 1.0)) for value in share),
         weakest=after.weakest,
     )
-
-
-def _floats(values: Array) -> tuple[float, ...]:
-    return tuple(float(value) for value in values + 0.0)

@@ -69,6 +69,20 @@ def make_goal(
             sets = sets.along(places)
         return weakest(sets, **search).size
 
+    def after_worst_failure(sets: ForceSets, _: object = None) -> Array:
+        robots, n = sets.radius.shape
+        rows = sets.repeat(n)
+        rows.lose(np.arange(robots * n), np.tile(np.arange(n), robots))
+        return np.asarray(of_weakest(rows).reshape(robots, n).min(axis=1))
+
+    def mission_power(sets: ForceSets, layout_of: Callable[[int], Layout]) -> Array:
+        """Of wrenches out of reach by what is missing."""
+        robots = (Allocator(layout_of(row)) for row in range(len(sets.radius)))
+        answers = [robot.allocate_batch(mission, flow=flow) for robot in robots]
+        power, missing = (np.stack([getattr(a, key) for a in answers]) for key in ("power", "err_norm"))
+        cost = np.where(missing <= REACHED, power, UNREACHED * (1.0 + missing))
+        return np.asarray(-cost.mean(axis=1))
+
     if name == "weakest_direction":
         return of_weakest
     if name == "worst_single_failure":
@@ -78,9 +92,9 @@ def make_goal(
                 f"the goal {name} needs {len(places)} directions after a loss, and layout {layout.name} has "
                 f"{layout.counted}, which push in {count.sum()}; none can fail without losing an axis"
             )
-        return _after_worst_failure(of_weakest)
+        return after_worst_failure
     if name == "mission_power":
-        return _mission_power(mission, flow)
+        return mission_power
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
@@ -107,27 +121,3 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
             "flow where actuators need one"
         )
     return held
-
-
-def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:
-    def goal(sets: ForceSets, _: object = None) -> Array:
-        robots, n = sets.radius.shape
-        rows = sets.repeat(n)
-        rows.lose(np.arange(robots * n), np.tile(np.arange(n), robots))
-        least: Array = of_rest(rows).reshape(robots, n).min(axis=1)
-        return least
-
-    return goal
-
-
-def _mission_power(mission: ArrayLike, flow: Array | None) -> Goal:
-    """Mean least power; a wrench out of reach costs by what is missing."""
-
-    def goal(sets: ForceSets, layout_of: Callable[[int], Layout]) -> Array:
-        robots = (Allocator(layout_of(row)) for row in range(len(sets.radius)))
-        answers = [robot.allocate_batch(mission, flow=flow) for robot in robots]
-        power, missing = (np.stack([getattr(a, name) for a in answers]) for name in ("power", "err_norm"))
-        cost = np.where(missing <= REACHED, power, UNREACHED * (1.0 + missing))
-        return np.asarray(-cost.mean(axis=1))
-
-    return goal

@@ -18,7 +18,7 @@ from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
-CLEARANCE = 0.10  # least distance between two actuators [m], or what there is now if that is less
+CLEARANCE = 0.10  # least distance between two actuators [m]; those that are closer already need not part
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 PENALTY = 1e3  # cost of actuators that are too close or break another rule, per metre; far beyond any goal
 
@@ -64,7 +64,6 @@ def optimize_layout(
     mission: ArrayLike = MISSION,
     rounds: int = 40,
     seed: int = 0,
-    clearance: float = CLEARANCE,
     rule: Rule | None = None,
     grid: tuple[float, float] = (0.0, 0.0),
     axes: Sequence[str] | None = None,
@@ -88,7 +87,6 @@ def optimize_layout(
         mission: wrenches (N, 6) [N, N m] for the goal `mission_power`.
         rounds: most rounds of the search.
         seed: of its random numbers.
-        clearance: least distance between actuators [m]; those that are closer already need not part.
         rule: another one that they have to keep, such as to stand outside of a hull.
         grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the others; all
@@ -117,7 +115,7 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    best_vector, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
+    best_vector, stopped = _search(moves, quick, before, broken, rounds, seed, progress, cancelled)
     best = moves.moved(best_vector)
     after = measured(best)
     best = replace(best, axes=start.axes)
@@ -143,7 +141,6 @@ def _search(
     moves: Moves,
     measure: Goal,
     before: float,
-    clearance: float,
     rule: Rule,
     rounds: int,
     seed: int,
@@ -151,7 +148,7 @@ def _search(
     cancelled: Callable[[], bool] | None,
 ) -> tuple[Array, bool]:
     """The best vector (D,), and whether the search was stopped."""
-    needed = np.minimum(_gaps(moves.start_position[None])[0], clearance)
+    needed = np.minimum(_gaps(moves.start_position[None])[0], CLEARANCE)
     best, least, best_vector, done, stopped = before, np.inf, moves.start, 0, False
 
     def chunk_cost(effectiveness: Array) -> tuple[Array, float]:

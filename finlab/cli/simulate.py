@@ -17,7 +17,7 @@ from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
-    from finlab.fit.robot.online import OnlineFit
+    from finlab.fit.robot.fitted_robot import OnlineFit
     from finlab.sim import ClosedLoop, RunLog
 
 
@@ -98,7 +98,7 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
         loop.log.save(options.output / "log.npz")
         lines.append(f"\n{options.output}: written log.npz.")
     if options.plot is not None:
-        from finlab.sim.plot import swim_picture
+        from finlab.evaluation.plots import swim_picture
 
         write_picture(lambda _: swim_picture(loop.log), (), options.plot)
         lines.append(f"\n{options.plot}: written.")
@@ -206,8 +206,7 @@ def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
     import numpy as np
 
-    from finlab.fit.robot.fitted_robot import leaned
-    from finlab.fit.robot.online import OnlineFit
+    from finlab.fit.robot.fitted_robot import OnlineFit, leaned
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout
     allocator.on(leaned(layout, np.full(layout.n, 0.01)))

@@ -14,8 +14,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.control.completion import Completion, axes_of
-from finlab.control.measurement import Controller, Measurement, Setpoint
+from finlab.control.contract import Completion, Controller, Measurement, Setpoint, axes_of
 from finlab.control.observer import MotionObserver
 from finlab.control.tracking_controller import TrackingController, most_of, pace_of
 from finlab.errors import FinlabError

@@ -8,8 +8,8 @@ import numpy as np
 from finlab.allocation.dual.policies import Rates
 from finlab.arrays import Array
 from finlab.axes import TURN
+from finlab.control.contract import Measurement
 from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
-from finlab.control.measurement import Measurement
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Layout

@@ -274,8 +274,7 @@ class Hypotheses:
     @property
     def strength_std(self) -> Array:
         """Their standard deviations (n,)."""
-        std: Array = np.sqrt(self.covariance.ravel()[:: len(self.state) + 1][STRENGTH])
-        return std
+        return np.asarray(np.sqrt(self.covariance.ravel()[:: len(self.state) + 1][STRENGTH]))
 
     def adopt(self, fin: int, kind: int) -> None:
         """One hypothesis is now taken for true, and all are initialized again."""

@@ -152,5 +152,4 @@ class MotionModel:
         most = 2.0 * np.linalg.norm(self._thrust[self.unsure], axis=-1)
         effectiveness = self._plant.effectiveness[self.unsure, 1:]
         gained = (most[:, None, None] * effectiveness * self._gain).reshape(-1, 6)
-        noise: Array = gained.T @ gained
-        return noise
+        return np.asarray(gained.T @ gained)

@@ -16,7 +16,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.control.measurement import Measurement, Setpoint
+from finlab.control.contract import Measurement, Setpoint
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
@@ -147,8 +147,7 @@ class MotionObserver:
         back = np.minimum(np.array(ages) / self._dt, len(past))
         row, each = np.minimum(back.astype(int), len(past) - 1), np.arange(len(now))
         after, before = known[row, each], known[row + 1, each]
-        then: Array = after + (back - row) * (before - after)
-        return then
+        return np.asarray(after + (back - row) * (before - after))
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through

@@ -15,8 +15,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.control.completion import axes_of
-from finlab.control.measurement import Measurement, Setpoint
+from finlab.control.contract import Measurement, Setpoint, axes_of
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
 from finlab.vehicle.actuator_motion import following_delay
@@ -32,6 +31,10 @@ WAY = 0.5
 heading."""
 SMOOTH_S = 0.3
 """Time over which the distance to the path is averaged [s]: markers jump."""
+FASTEST_TURN, SLOW = 0.6, 0.08
+"""Largest yaw rate that is asked for [rad/s], and velocity through the water [m/s] below which the robot
+turns less and less to where it should go, which changes all the time where it keeps a place, and more and
+more to where the path goes on."""
 FASTEST = 3.0
 """Fastest that a robot is asked to go [m/s]."""
 STEEPEST, RISE_S = 0.5, 1.0
@@ -57,11 +60,6 @@ class TrackingGains:
     """Largest wrench that is asked for (6,) [N, N m]."""
     max_speed: float = 0.5
     """Largest velocity over ground that is asked for [m/s]; what the robot can hold, if that is more."""
-    max_yaw_rate: float = 0.6
-    """Largest yaw rate that is asked for [rad/s]."""
-    slow: float = 0.08
-    """Velocity through the water [m/s] below which the robot turns less and less to where it should go, which
-    changes all the time where it keeps a place, and more and more to where the path goes on."""
 
 
 def pace_of(layout: Layout) -> float:
@@ -102,10 +100,9 @@ class TrackingController:
     name = "tracking"
     period_s = 0.1
 
-    def __init__(self, layout: Layout, gains: TrackingGains | None = None) -> None:
-        """Takes the robot as its designer knows it, and gains; by default those of `gains_for`."""
-        self.layout = layout
-        self.gains = gains_for(layout) if gains is None else gains
+    def __init__(self, layout: Layout) -> None:
+        """Takes the robot as its designer knows it."""
+        self.layout, self.gains = layout, gains_for(layout)
         self.axes = axes_of(layout)
         self._sways = "Fy" in self.axes
         self._dives = "Ty" in self.axes
@@ -162,9 +159,8 @@ class TrackingController:
         current = np.zeros(2) if self.estimate is None else self.estimate.current
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot hardly moves
         # through the water, and there the estimated current decides it.
-        along = self._observer.wrenches_along(setpoints, current, 2.0 * self.gains.slow)
-        expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound)
-        return expected
+        along = self._observer.wrenches_along(setpoints, current, 2.0 * SLOW)
+        return np.asarray((self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound))
 
     def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
         """Velocity over ground (3,) to go with [m/s]."""
@@ -177,12 +173,12 @@ class TrackingController:
     def _pitch_rate(self, now: Estimate, wanted: Array) -> float:
         """How much faster [rad/s] to turn in pitch, nose down, for a vertical speed with the slip that there
         is, which is taken from the last `RISE_S`."""
-        g, speed = self.gains, max(float(now.velocity[0]), self.gains.slow)
+        speed = max(float(now.velocity[0]), SLOW)
         share = self.period_s / RISE_S
         self._rising += share * (math.atan(float(now.velocity[2]) / speed) - self._rising)
         climb = math.asin(min(max(float(wanted[2]) / speed, -STEEPEST), STEEPEST))
-        rate = g.heading * (self._rising - climb - now.pitch)
-        return min(max(rate, -g.max_yaw_rate), g.max_yaw_rate) - now.pitch_rate
+        rate = self.gains.heading * (self._rising - climb - now.pitch)
+        return min(max(rate, -FASTEST_TURN), FASTEST_TURN) - now.pitch_rate
 
     def _surge_and_turn(self, now: Estimate, wanted: Array, setpoint: Setpoint) -> tuple[float, float]:
         """Surge speed over ground [m/s] and yaw rate [rad/s] that bring the robot to a velocity (3,)."""
@@ -193,22 +189,22 @@ class TrackingController:
         speed = math.hypot(x, y)
         vx, vy = float(setpoint.velocity[0]) - c, float(setpoint.velocity[1]) - d
         ax, ay, _ = setpoint.acceleration.tolist()
-        turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, g.slow**2)
+        turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, SLOW**2)
         forward = float(now.velocity[0]) - (cosine * c + sine * d)
         sideways = float(now.velocity[1]) - (cosine * d - sine * c)
         # Slip that comes from turning otherwise than the path does: to head against it would ring.
         self._passing = self._observer.swayed(self._passing, forward, now.yaw_rate - turning)
-        slip = math.asin(min(max((sideways - self._passing) / max(speed, g.slow), -0.7), 0.7))
+        slip = math.asin(min(max((sideways - self._passing) / max(speed, SLOW), -0.7), 0.7))
         slip = 0.0 if self._sways else slip
         surge = cosine * float(wanted[0]) + sine * float(wanted[1])
         if self._dives:  # rudders need way
             surge = max(surge, WAY * math.hypot(float(wanted[0]), float(wanted[1])))
-        elif speed >= g.slow:
+        elif speed >= SLOW:
             surge = max(surge, cosine * c + sine * d)
         # At rest it turns to where the path goes on, or stays as it is; a bit off its place it rather backs
         # than turns about.
         onward = now.yaw if math.isnan(setpoint.onward) else setpoint.onward
-        rest = max(g.slow - speed, 0.0)
+        rest = max(SLOW - speed, 0.0)
         heading = math.atan2(y + rest * math.sin(onward), x + rest * math.cos(onward)) - slip
         rate = turning + g.heading * float(wrapped(heading - now.yaw))
-        return surge, min(max(rate, -g.max_yaw_rate), g.max_yaw_rate)
+        return surge, min(max(rate, -FASTEST_TURN), FASTEST_TURN)

@@ -39,7 +39,7 @@ from finlab.bundle_files import (
 )
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
-from finlab.files.archive import packed
+from finlab.files.guarded import packed
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.file import FORMAT as LAYOUT_FORMAT
 from finlab.layout.file import layout_to_dict

@@ -15,8 +15,7 @@ from typing import NamedTuple
 from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
 from finlab.errors import DataError, LayoutError
 from finlab.exchange import Exchange, read_robot
-from finlab.files.archive import unpacked
-from finlab.files.guarded import decoded, read_file
+from finlab.files.guarded import decoded, read_file, unpacked
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from finlab.axes import Vector
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.simulator_plugins import DERIVATIVES
+from finlab.exchange.gazebo import DERIVATIVES
 from finlab.layout import Actuator, Body, Layout
 
 ROOT = "base_link"

@@ -7,8 +7,7 @@ time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a da
 import json
 import math
 import re
-from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 from finlab.errors import DataError, FinlabError
 
@@ -21,7 +20,6 @@ MAX_DIGITS = 100
 
 _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
 _WORDS = {"": None, "null": None, "true": True, "false": False}
-_WORD = re.compile(r"(?:null|true|false)?\Z")
 _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
@@ -89,7 +87,9 @@ def _document(content: str) -> Any:
     """The value of the document; what it is made of is looked through before anything is built."""
     import yaml
 
-    loader, depth, n_documents = _loader(), 0, 0
+    # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
+    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    depth = n_documents = 0
     for count, event in enumerate(yaml.parse(content, Loader=loader)):
         line = event.start_mark.line + 1 if event.start_mark else 0
         if count > MAX_EVENTS:
@@ -104,37 +104,27 @@ def _document(content: str) -> Any:
         n_documents += isinstance(event, yaml.DocumentStartEvent)
         if n_documents > 1:
             raise ValueError(f"is not valid YAML: line {line}: a second document begins, expected one")
-    return yaml.load(content, Loader=loader)  # noqa: S506  # a safe loader
+    node = yaml.compose(content, loader)
+    return None if node is None else _value(node)
 
 
-@cache
-def _loader() -> Any:
-    """PyYAML's safe loader with the numbers and words of JSON alone, each key of a mapping once."""
-    import yaml
-
-    # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
-    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-        yaml_implicit_resolvers: ClassVar[dict[str, Any]] = {}
-
-        def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
-            values: dict[str, Any] = {}
-            for key, value in node.value:
-                line = key.start_mark.line + 1
-                if not isinstance(key, yaml.ScalarNode):
-                    raise ValueError(f"line {line}: a key must be plain text")
-                if key.value in values:
-                    raise ValueError(f"line {line}: key {key.value!r:.60} is given twice")
-                values[key.value] = self.construct_object(value, deep=True)
-            return values
-
-        def construct_number(self, node: Any) -> int | float:
-            try:
-                return _number(node.value)
-            except ValueError as problem:
-                raise ValueError(f"line {node.start_mark.line + 1}: {problem}") from None
-
-    Loader.add_implicit_resolver("!number", _NUMBER, None)
-    Loader.add_constructor("!number", Loader.construct_number)
-    Loader.add_implicit_resolver("!word", _WORD, None)
-    Loader.add_constructor("!word", lambda _, node: _WORDS[node.value])
-    return Loader
+def _value(node: Any) -> Any:
+    """The value of a YAML node: plain scalars are numbers and words of JSON or text, a key stands once."""
+    if node.id == "sequence":
+        return [_value(each) for each in node.value]
+    if node.id == "mapping":
+        values: dict[str, Any] = {}
+        for key, value in node.value:
+            line = key.start_mark.line + 1
+            if key.id != "scalar":
+                raise ValueError(f"line {line}: a key must be plain text")
+            if key.value in values:
+                raise ValueError(f"line {line}: key {key.value!r:.60} is given twice")
+            values[key.value] = _value(value)
+        return values
+    if node.style or not (node.value in _WORDS or _NUMBER.match(node.value)):
+        return node.value
+    try:
+        return _WORDS[node.value] if node.value in _WORDS else _number(node.value)
+    except ValueError as problem:
+        raise ValueError(f"line {node.start_mark.line + 1}: {problem}") from None

@@ -14,9 +14,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.files.archive import unpacked
 from finlab.files.csv_table import UNITS, CsvTable, read_table
-from finlab.files.guarded import read_file
+from finlab.files.guarded import read_file, unpacked
 
 MOST_PACKED, MOST_UNPACKED = 10_000_000, 20_000_000
 """Largest workbook, and what is in it without its pictures [bytes]."""

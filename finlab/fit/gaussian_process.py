@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from finlab.arrays import Array
@@ -182,9 +181,7 @@ def _factor(covariance: Array, variance: Array) -> Array:
 
 
 def _inverse(lower: Array) -> Array:
-    half, _ = dpotri(lower, lower=True)
-    half = np.tril(half)
-    return np.asarray(half + half.T - np.diag(np.diag(half)))
+    return np.asarray(cho_solve((lower, True), np.eye(len(lower)), check_finite=False))
 
 
 def _noise_of(error: Array, size: Array, wild: bool) -> tuple[float, float]:

@@ -133,12 +133,9 @@ def attainable_set(
     return replace(result, gap=max(float(beyond.max()), 0.0))
 
 
-Support = Callable[[Array], tuple[Array, Array]]
-"""Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,)."""
-
-
-def _support(sets: ForceSets, kind: Kind) -> Support:
-    """Farthest points: by the solver, in each convex part; those near the origin are the origin."""
+def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Array]]:
+    """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,): by the
+    solver, in each convex part; those near the origin are the origin."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
     parts, speck = convex_parts(sets), SPECK * float(sets.radius.sum())
     n_parts = len(parts.radius)

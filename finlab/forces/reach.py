@@ -94,16 +94,7 @@ def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array,
 
 def orthogonal_complement(direction: Array) -> Array:
     """Returns an orthonormal basis (R, m, m - 1) of what is at right angles to unit `direction` (R, m)."""
-    # Householder's reflection takes an axis to the direction, and the other axes along.
-    rows, k = direction.shape
-    axis = np.argmax(np.abs(direction), axis=-1)
-    sign = np.sign(direction[np.arange(rows), axis])
-    mirror = direction.copy()
-    mirror[np.arange(rows), axis] += sign
-    mirror /= np.linalg.norm(mirror, axis=-1, keepdims=True)
-    reflection = np.eye(k) - 2.0 * mirror[..., :, None] * mirror[..., None, :]
-    keep = np.arange(k) != axis[:, None]
-    return np.swapaxes(np.swapaxes(reflection, -1, -2)[keep].reshape(rows, k - 1, k), -1, -2)
+    return np.asarray(np.linalg.qr(direction[..., None], mode="complete").Q[..., 1:])
 
 
 TOLERANCE = 1e-6

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprd
+from trimesh.triangles import area, mass_properties
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
@@ -28,75 +29,65 @@ DESIGN_SPEED = 0.2
 BLUNT, DISC = 0.44, 1.17
 """Drag coefficient of a sphere's pressure, and of a disc across the flow, which nothing exceeds."""
 
-Three = tuple[float, float, float]
-Six = tuple[float, float, float, float, float, float]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HullSolid:
     """The body that a closed surface encloses, in the frame of its corners."""
 
     volume: float
     """[m^3]."""
-    center: Three
-    """Centre of the volume, where buoyancy acts [m]."""
-    moments: Three
-    """Mean squares of x, y and z about that centre [m^2]."""
+    center: Array
+    """Centre of the volume (3,), where buoyancy acts [m]."""
+    moments: Array
+    """Mean squares of x, y and z (3,) about that centre [m^2]."""
     area: float
     """Wetted surface [m^2]."""
-    surface_moments: Three
-    """Mean squares of x, y and z over that surface about the centre [m^2]."""
+    surface_moments: Array
+    """Mean squares of x, y and z (3,) over that surface about the centre [m^2]."""
 
     @staticmethod
     def of(corners: ArrayLike) -> "HullSolid":
-        """The solid in a closed surface of triangles (F, 3, 3) [m], by the divergence theorem: each triangle
-        spans a tetrahedron with the origin, and those that lie outside count negative. Raises FinlabError:
-        the surface encloses nothing."""
+        """The solid in a closed surface of triangles (F, 3, 3) [m]. Raises FinlabError: it encloses
+        nothing."""
         points = np.asarray(corners, dtype=float)
-        normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-        parts = np.einsum("fk,fk->f", points[:, 0], normal) / 6.0
-        volume = float(parts.sum())
+        solid = mass_properties(points)
+        volume, inertia = float(solid.volume), np.diag(np.asarray(solid.inertia))
         if not volume > 1e-9:
             raise FinlabError(f"the hull encloses {volume:.3g} m^3; expected a closed surface, outside out")
-        total = points.sum(axis=1)
-        center = (parts @ total) / (4.0 * volume)
-        squares = (points**2).sum(axis=1) + total**2
-        moments = (parts @ squares) / (20.0 * volume) - center**2
-        sizes = np.linalg.norm(normal, axis=1) / 2.0
-        local = points - center
+        sizes, local = area(points), points - solid.center_mass
         spread = ((local**2).sum(axis=1) + local.sum(axis=1) ** 2) / 12.0
-        surface = (sizes @ spread) / sizes.sum()
-        return HullSolid(volume, _three(center), _three(moments), float(sizes.sum()), _three(surface))
+        moments, wetted = (0.5 * inertia.sum() - inertia) / volume, float(sizes.sum())
+        return HullSolid(volume, solid.center_mass, moments, wetted, sizes @ spread / wetted)
 
-    def inertia(self, mass: float) -> Three:
+    def inertia(self, mass: float) -> Array:
         """Moments of inertia (3,) [kg m^2] about the centre of the volume of a solid of this mass [kg] and of
         one density: m (y^2 + z^2) and so on, in the mean over the volume."""
-        x, y, z = self.moments
-        return mass * (y + z), mass * (z + x), mass * (x + y)
+        return np.asarray(mass * (self.moments.sum() - self.moments))
 
-    def ellipsoid(self) -> Three:
+    def ellipsoid(self) -> Array:
         """Half axes (3,) [m] of the ellipsoid that stands for the hull: of its volume, its axes to each other
         as the hull spreads along x, y and z. For an ellipsoid it is the hull itself."""
         spread = np.sqrt(self.moments)
         size = (self.volume / (4.0 / 3.0 * math.pi * spread.prod())) ** (1.0 / 3.0)
-        return _three(size * spread)
+        return np.asarray(size * spread)
 
 
-def ellipsoid_added_mass(half: Three, density: float = WATER) -> Six:
-    """Added mass [kg], three times, and added inertia [kg m^2] of an ellipsoid in unbounded ideal fluid.
+def ellipsoid_added_mass(half: ArrayLike, density: float = WATER) -> Array:
+    """Added mass [kg] and added inertia [kg m^2] (6,) of an ellipsoid in unbounded ideal fluid.
 
     H. Lamb, Hydrodynamics, 6th ed. (1932), art. 114 and 115; the integrals alpha_0, beta_0, gamma_0 are
     Carlson's R_D. A sphere has half of its displaced mass, and none that turns with it.
 
     Args:
-        half: half axes along x, y and z [m].
+        half: half axes (3,) along x, y and z [m].
         density: of the water [kg/m^3].
     """
     squares = np.square(half)
-    volume = 4.0 / 3.0 * math.pi * math.prod(half)
+    product = math.sqrt(squares.prod())
+    volume = 4.0 / 3.0 * math.pi * product
     thirds = [float(elliprd(squares[k - 2], squares[k - 1], squares[k])) for k in range(3)]
-    shares = 2.0 / 3.0 * math.prod(half) * np.array(thirds)
-    along = density * volume * shares / (2.0 - shares)
+    shares = 2.0 / 3.0 * product * np.array(thirds)
+    along = shares / (2.0 - shares)
     about = []
     for axis in range(3):
         second, third = np.delete(np.arange(3), axis)
@@ -105,14 +96,12 @@ def ellipsoid_added_mass(half: Three, density: float = WATER) -> Six:
         # Round about the axis, nothing is pushed aside; the quotient would be zero over zero.
         below = 2.0 * gap - both * twist
         about.append(0.0 if abs(gap) < 1e-9 * both else gap**2 * twist / below / 5.0)
-    u, v, w = along.tolist()
-    k, m, n = (float(density * volume * value) for value in about)
-    return u, v, w, k, m, n
+    return density * volume * np.append(along, about)
 
 
-def pressure_damping(half: Three, density: float = WATER) -> Six:
-    """Quadratic damping, 3 in [N s^2/m^2] then 3 in [N m s^2], of an ellipsoid: the pressure that is lost
-    where the flow leaves a blunt stern.
+def pressure_damping(half: Array, density: float = WATER) -> Array:
+    """Quadratic damping (6,) [N s^2/m^2], then [N m s^2], of an ellipsoid of half axes (3,) [m]: the pressure
+    that is lost where the flow leaves a blunt stern.
 
     Along an axis 1/2 rho C A with C = 0.44 d / l, S. F. Hoerner, Fluid-Dynamic Drag (1965), chapter 3 (bodies
     below the critical Reynolds number; 0.44 is the sphere), at most that of a disc across the flow, 1.17. l
@@ -120,21 +109,19 @@ def pressure_damping(half: Three, density: float = WATER) -> Six:
     flow (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 6.4): 1/2
     rho C int |x|^3 2 h(x) dx. The round core, which turns without pushing water aside, is left out, so that a
     sphere has none."""
-    areas = [math.prod(np.delete(half, axis)) for axis in range(3)]
-    along = [min(DISC, BLUNT * math.sqrt(areas[axis]) / half[axis]) for axis in range(3)]
+    areas = np.array([np.delete(half, axis).prod() for axis in range(3)])
+    along = np.minimum(DISC, BLUNT * np.sqrt(areas) / half)
     about = []
     for axis in range(3):
         far, near = sorted({0, 1, 2} - {axis}, key=lambda k: -half[k])
         # int over the strip of |x|^3 2 h sqrt(1 - x^2 / a^2) dx = 8/15 h a^4
         strips = 8.0 / 15.0 * half[axis] * (half[far] ** 4 - half[near] ** 4)
-        about.append(0.5 * density * along[near] * strips)
-    u, v, w = (0.5 * density * c * (math.pi * area) for c, area in zip(along, areas, strict=True))
-    k, m, n = about
-    return u, v, w, k, m, n
+        about.append(along[near] * strips)
+    return 0.5 * density * np.append(math.pi * along * areas, about)
 
 
-def friction_damping(solid: HullSolid, speed: float = DESIGN_SPEED, density: float = WATER) -> Six:
-    """Linear damping, 3 in [N s/m] then 3 in [N m s], by the water's friction on the hull at a speed [m/s].
+def friction_damping(solid: HullSolid, speed: float = DESIGN_SPEED, density: float = WATER) -> Array:
+    """Linear damping (6,) [N s/m], then [N m s], by the water's friction on the hull at a speed [m/s].
 
     1/2 rho C_f S U per speed with C_f = 1.328 / sqrt(Re) of a flat plate in laminar flow (H. Blasius, 1908),
     Re by the length of the ellipsoid; about an axis each bit of the surface counts with the square of its
@@ -142,13 +129,7 @@ def friction_damping(solid: HullSolid, speed: float = DESIGN_SPEED, density: flo
     length = 2.0 * max(solid.ellipsoid())
     coefficient = 1.328 / math.sqrt(speed * length / VISCOSITY)
     per_speed = 0.5 * density * coefficient * solid.area * speed
-    x, y, z = solid.surface_moments
-    return (per_speed,) * 3 + (per_speed * (y + z), per_speed * (z + x), per_speed * (x + y))
-
-
-def _three(values: Array) -> Three:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+    return per_speed * np.append(np.ones(3), solid.surface_moments.sum() - solid.surface_moments)
 
 
 DIGITS = 4
@@ -199,7 +180,7 @@ def estimated(layout: Layout) -> Layout:
         quadratic_damping=tuple(map(_rounded, pressure_damping(solid.ellipsoid(), density))),
         # Neutral where the mass is that of the water, whatever the last digit.
         buoyancy_n=None if body.mass_kg is None else _rounded(density * GRAVITY * solid.volume),
-        center_of_buoyancy_m=tuple(round(value, 4) + 0.0 for value in solid.center),
+        center_of_buoyancy_m=tuple(round(value, 4) + 0.0 for value in solid.center.tolist()),
     )
     return replace(layout, body=changed)
 

@@ -6,14 +6,14 @@ import struct
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.hull.shapes import Mesh
 from finlab.layout.body import MESH_SUFFIXES
 
 FREE_TRIANGLES = 100_000
@@ -22,6 +22,15 @@ BYTES_PER_TRIANGLE = 6
 """Of a larger one each takes at least so many: corners and indices take 18."""
 _PARTS = re.compile(rb"(?m)^[ \t]*(?:usemtl|mtllib|o|g|s)(?:[ \t].*)?$")
 """Materials and groups of an OBJ file, each of which would become a mesh of its own."""
+
+
+class Mesh(NamedTuple):
+    """Triangles with outward normals."""
+
+    vertices: Array
+    """Points (V, 3) [m]."""
+    faces: NDArray[np.int32]
+    """Corners of the triangles (F, 3), counter-clockwise from outside."""
 
 
 def check_glb(name: str, content: bytes) -> None:

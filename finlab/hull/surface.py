@@ -7,14 +7,82 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from trimesh.triangles import closest_point
+from trimesh.triangles import closest_point, normals
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.files.guarded import read_file
-from finlab.hull.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
-from finlab.hull.shapes import Mesh, Three, shape_mesh
+from finlab.hull.mesh_file import MAX_BYTES, Mesh, MeshReport, read_mesh, simplified
 from finlab.layout import Layout
+
+
+def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
+    """Triangles between neighbouring rings of points; the columns close on themselves."""
+    a = np.arange((rows - 1) * columns).reshape(-1, columns)
+    b = np.roll(a, -1, axis=1)
+    return triangles(a, b, a + columns, b, b + columns, a + columns)
+
+
+def triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Arrays of corners, three for each set of triangles, as triangles (F, 3)."""
+    return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int32)
+
+
+def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48) -> Mesh:
+    """A closed body along the x axis whose cross-section at `x` is a superellipse.
+
+    Args:
+        x: stations (P,), rising [m].
+        radius_y: half width (P,) at each station [m].
+        radius_z: half height (P,) at each station [m].
+        power: 2 is an ellipse, larger is boxier.
+        sides: corners of the cross-section.
+    """
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    cos, sin = np.cos(turn), np.sin(turn)
+    unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
+    unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
+    x, y, z = np.broadcast_arrays(x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z)
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), grid_faces(len(x), sides))
+
+
+STATIONS: Array = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
+"""Positions along a hull of half length 1, closer together towards the ends where it curves most."""
+ACROSS = {"box": 5.0, "ellipsoid": 2.0, "torpedo": 2.0, "ucat": 3.2}
+ALONG = {"box": 6.0, "ellipsoid": 2.0, "ucat": 3.0}
+"""Powers of the superellipses across and along each shape; a torpedo has a profile of its own."""
+
+Three = tuple[float, float, float]
+
+
+def shape_mesh(
+    shape: str, half: Three, center: Three, stations: Array = STATIONS, swell: float = 1.0
+) -> Mesh:
+    """The surface of a shape, or a part of it.
+
+    Args:
+        shape: one of `finlab.layout.body.HULL_SHAPES`.
+        half: half length, width and height [m].
+        center: where its middle lies in the body frame [m].
+        stations: where along it, from -1 to 1, rising.
+        swell: how many times as large it is drawn.
+    """
+    x, y, z = (swell * value for value in half)
+    share = _profile(shape, stations)
+    mesh = revolved(stations * x, share * y, share * z, ACROSS[shape])
+    return Mesh(mesh.vertices + np.array(center), mesh.faces)
+
+
+def _profile(shape: str, s: Array) -> Array:
+    """Share of the full width at s in [-1, 1] along a shape."""
+    if shape == "torpedo":
+        nose = np.sqrt(np.clip(1 - (np.clip(s - 0.6, 0, None) / 0.4) ** 2, 0, 1))
+        tail = 1 - 0.62 * (np.clip(-s - 0.35, 0, None) / 0.65) ** 2
+        end = np.sqrt(np.clip(1 - (np.clip(-s - 0.94, 0, None) / 0.06) ** 2, 0, 1))
+        return nose * tail * end
+    power = ALONG[shape]
+    return np.clip(1 - np.abs(s) ** power, 0, 1) ** (1 / power)
+
 
 COARSE_FACES = 400
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "inch": 0.0254}
@@ -62,21 +130,19 @@ class Surface:
     def _triangles(self) -> tuple[Array, Array]:
         """Corners (F, 3, 3) [m] and outward normals (F, 3) of the triangles that have an area."""
         corners = np.asarray(self.mesh.vertices, dtype=float)[self.mesh.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        size = np.linalg.norm(normal, axis=1)
-        good = size > 1e-14
-        return corners[good], normal[good] / size[good, None]
+        normal, good = normals(corners)
+        return corners[good], normal
 
     def nearest(self, point: Array) -> tuple[Array, Array]:
         """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
-        corners, normals = self._triangles
+        corners, outward = self._triangles
         nearest = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
         gap = np.linalg.norm(nearest - point, axis=1)
         best = int(np.argmin(gap))
         # On an edge several triangles are as near; their mean is what a hand would call the normal there.
-        normal = normals[gap < gap[best] + 1e-6].sum(axis=0)
+        normal = outward[gap < gap[best] + 1e-6].sum(axis=0)
         size = float(np.linalg.norm(normal))
-        return np.asarray(nearest[best]), normals[best] if size < 1e-9 else normal / size
+        return np.asarray(nearest[best]), outward[best] if size < 1e-9 else normal / size
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points (..., 3) lie inside.
@@ -86,8 +152,8 @@ class Surface:
         """
         points = np.asarray(points, dtype=float)
         if self.shape != "mesh":
-            corners, normals = self._triangles
-            ahead = points @ normals.T - (corners[:, 0] * normals).sum(axis=1)
+            corners, outward = self._triangles
+            ahead = points @ outward.T - (corners[:, 0] * outward).sum(axis=1)
             return np.asarray((ahead < 0.0).all(axis=-1))
         inside = [self._solid_angle(point) > 2.0 * np.pi for point in points.reshape(-1, 3)]
         return np.array(inside).reshape(points.shape[:-1])

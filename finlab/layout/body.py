@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from msgspec import Meta
 
 from finlab.errors import LayoutError
-from finlab.files.checked import Checked
+from finlab.files.schema import Checked
 
 HULL_SHAPES = ("box", "ellipsoid", "torpedo", "ucat")
 """Parametric hulls that can be drawn without a mesh file."""

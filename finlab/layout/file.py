@@ -21,9 +21,8 @@ from finlab.actuators.actuator import Actuator
 from finlab.actuators.kinds import KINDS
 from finlab.axes import AXES
 from finlab.errors import LayoutError
-from finlab.files.checked import form
 from finlab.files.plain_values import yaml_text
-from finlab.files.schema import checked, shown
+from finlab.files.schema import checked, form, shown
 from finlab.layout.file_form import BODY, HORIZONTAL_FIN, Reader, actuator_form, plain, under
 from finlab.layout.layout import MAX_ACTUATORS, Layout
 from finlab.whole_file import write_whole

@@ -20,7 +20,7 @@ from finlab.actuators.fin.fin import Fin, Servo
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits, Model
 from finlab.actuators.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row, ThrustModel
 from finlab.errors import LayoutError
-from finlab.files.checked import Checked, form
+from finlab.files.schema import Checked, form
 from finlab.layout.body import Body, Hull
 
 

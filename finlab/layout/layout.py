@@ -15,7 +15,7 @@ from finlab.actuators.fin.fin import Fin
 from finlab.arrays import Array
 from finlab.axes import AXES, CommandedAxes, mask_of
 from finlab.errors import LayoutError
-from finlab.files.checked import Checked, Name
+from finlab.files.schema import Checked, Name
 from finlab.layout.body import Body
 
 MAX_ACTUATORS = 64

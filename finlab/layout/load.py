@@ -10,10 +10,9 @@ from msgspec import Meta, Struct, to_builtins
 from finlab.assets import shipped_layouts
 from finlab.bundle_files import ROBOT, TABLES, Files, is_bundle, read_bundle_files
 from finlab.errors import LayoutError
-from finlab.files.checked import Name
 from finlab.files.guarded import decoded, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
-from finlab.files.schema import checked
+from finlab.files.schema import Name, checked
 from finlab.layout.file import layout_to_dict, parse_layout
 from finlab.layout.file_form import under
 from finlab.layout.layout import MAX_ACTUATORS, Layout

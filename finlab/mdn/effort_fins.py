@@ -138,8 +138,7 @@ class EffortFins:
     def _around(self, values: Array, direction: Array) -> Array:
         """Of values (n, POINTS), those nearest to directions (..., n)."""
         cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
-        taken: Array = values.ravel().take(cell + np.arange(len(values)) * POINTS)
-        return taken
+        return np.asarray(values.ravel().take(cell + np.arange(len(values)) * POINTS))
 
     def lookup(self, size: Array) -> Array:
         """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest directions."""

@@ -87,7 +87,7 @@ class Mdn(Method):
             return Solution(
                 self.robot.commands.feasible(reached.answers.command[:, 0]),
                 candidates=lambda: self._candidates(reached.answers, names_of(reached.proposal)),
-                samples=lambda: self._samples(target, reached),
+                samples=lambda: self._judged(target, *self._cheapest(reached.proposal)),
             )
         command = np.empty((len(target), self.layout.n, 3))
         with self._one_thread():
@@ -176,13 +176,11 @@ class Mdn(Method):
             command, wrench * self.sigma, USUAL_SHARE * error, *costs(self.layout, command), source
         )
 
-    def _samples(self, target: Array, reached: Found) -> Candidates:
-        """The proposals for a single target as the cheapest commands with their forces."""
-        robot = self.robot
-        command, _ = realize(
-            robot.forces, robot.forces.fins.project(reached.proposal.force[0].astype(complex))
-        )
-        return self._judged(target, command, names_of(reached.proposal))
+    def _cheapest(self, proposal: Proposal) -> tuple[Array, tuple[str, ...]]:
+        """The cheapest commands (K, n, 3) with the forces proposed for a single target, and their names."""
+        forces = self.robot.forces
+        command, _ = realize(forces, forces.fins.project(proposal.force[0].astype(complex)))
+        return command, names_of(proposal)
 
     def _judged(self, target: Array, command: Array, names: tuple[str, ...]) -> Candidates:
         """Commands (K, n, 3) for a normalized target (1, 6), by the fins' own laws."""

@@ -7,12 +7,12 @@ World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
+from finlab.sim.devices import NO_NOISE as NO_NOISE
+from finlab.sim.devices import NOISE_ALONE as NOISE_ALONE
+from finlab.sim.devices import SensorSettings as SensorSettings
 from finlab.sim.log import RunLog as RunLog
 from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log
-from finlab.sim.sensors import NO_NOISE as NO_NOISE
-from finlab.sim.sensors import NOISE_ALONE as NOISE_ALONE
-from finlab.sim.sensors import SensorSettings as SensorSettings
 from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory

@@ -22,14 +22,13 @@ from finlab.control import (
     Setpoint,
     TrackingController,
 )
-from finlab.control.measurement import NO_WRENCH
+from finlab.control.contract import NO_WRENCH
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
-from finlab.sim.actuator_force import ActuatorForce
+from finlab.sim.devices import ActuatorForce, Sensors, SensorSettings
 from finlab.sim.log import RunLog, Tick, log_of_ticks
-from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
 from finlab.sim.truth import Fault, checked_truth, damage_of
 from finlab.vehicle.actuator_motion import ActuatorMotion

@@ -27,7 +27,7 @@ from finlab.layout.effectiveness import layout_effectiveness
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
-from finlab.sim.sensors import SensorSettings
+from finlab.sim.devices import SensorSettings
 from finlab.sim.task import station
 from finlab.vehicle.fossen import complete_body, dynamics_of
 

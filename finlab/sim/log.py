@@ -11,7 +11,7 @@ from msgspec import defstruct
 
 from finlab.arrays import AnyArray
 from finlab.errors import DataError
-from finlab.files.archive import check_shapes, json_of, read_arrays
+from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.files.schema import checked
 from finlab.whole_file import write_whole
 

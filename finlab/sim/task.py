@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.axes import TURN
 from finlab.control import Setpoint
 from finlab.errors import DataError
 from finlab.files.csv_table import read_table
@@ -24,6 +25,7 @@ SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
 MAX_SCALE = 1000.0
+Place = tuple[Array | float, Array | float, Array | float]
 COLUMNS = ("t", "x", "y", "z")
 """Columns of a trajectory file: time [s], position in the world [m]."""
 
@@ -90,31 +92,31 @@ class Trajectory:
         return self.samples[0].copy(), math.atan2(dy, dx)
 
 
-def _eased(duration_s: float) -> tuple[Array, Array]:
-    """Times, and the share of the path done by then: from rest to a steady speed within `RAMP_S`."""
+def _eased(name: str, duration_s: float, at: Callable[[Array], Place]) -> Trajectory:
+    """The path through places by the shares that are done of it: from rest to a steady speed within
+    `RAMP_S`."""
     time = np.arange(0.0, duration_s + STEP_S / 2, STEP_S)
     ramp = np.clip(time / RAMP_S, 0.0, 1.0)
     # Integral of a smoothstep from 0 to 1, then straight on.
     done = np.where(time < RAMP_S, RAMP_S * (ramp**3 - 0.5 * ramp**4), time - 0.5 * RAMP_S)
-    return time, done / done[-1]
+    return Trajectory(name, time, np.stack(np.broadcast_arrays(*at(done / done[-1])), axis=-1))
 
 
 def circle(duration_s: float = 60.0) -> Trajectory:
     """One round of 1.2 m radius at 1 m depth, 0.13 m/s."""
-    time, share = _eased(duration_s)
-    angle = 2 * math.pi * share
-    path = np.stack([1.2 * np.sin(angle), 1.2 * (1.0 - np.cos(angle)), np.full_like(angle, -1.0)], axis=-1)
-    return Trajectory("circle", time, path)
+    return _eased(
+        "circle", duration_s, lambda at: (1.2 * np.sin(TURN * at), 1.2 * (1.0 - np.cos(TURN * at)), -1.0)
+    )
 
 
 def lissajous(duration_s: float = 90.0) -> Trajectory:
     """An eight of 3 m by 1.5 m whose depth swings by 0.25 m about 1 m twice in a round."""
-    time, share = _eased(duration_s)
-    angle = 2 * math.pi * share
-    path = np.stack(
-        [1.5 * np.sin(angle), 0.75 * np.sin(2 * angle), -1.0 + 0.25 * (np.cos(2 * angle) - 1.0) / 2], axis=-1
-    )
-    return Trajectory("lissajous", time, path)
+
+    def eight(share: Array) -> Place:
+        twice = 2.0 * TURN * share
+        return 1.5 * np.sin(TURN * share), 0.75 * np.sin(twice), -1.0 + 0.125 * (np.cos(twice) - 1.0)
+
+    return _eased("lissajous", duration_s, eight)
 
 
 def square(duration_s: float = 90.0) -> Trajectory:
@@ -135,17 +137,13 @@ def square(duration_s: float = 90.0) -> Trajectory:
 
 def dive(duration_s: float = 60.0) -> Trajectory:
     """Straight ahead for 6 m, down from 1 m to 2 m and up again, at slopes of up to 28 degrees."""
-    time, share = _eased(duration_s)
-    depth = 1.0 + 0.5 * (1.0 - np.cos(2 * math.pi * share))
-    return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
+    return _eased("dive", duration_s, lambda at: (6.0 * at, 0.0, -1.0 - 0.5 * (1.0 - np.cos(TURN * at))))
 
 
 def straight(duration_s: float = 60.0, speed: float = 0.15) -> Trajectory:
     """Straight ahead at 1 m depth, from rest to a speed [m/s]."""
-    time, share = _eased(duration_s)
     far = speed * (duration_s - 0.5 * RAMP_S)
-    path = np.stack([far * share, np.zeros_like(share), np.full_like(share, -1.0)], axis=-1)
-    return Trajectory(f"straight at {speed:g} m/s", time, path)
+    return _eased(f"straight at {speed:g} m/s", duration_s, lambda at: (far * at, 0.0, -1.0))
 
 
 def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station") -> Trajectory:
@@ -160,18 +158,14 @@ SHIPPED: dict[str, Callable[..., Trajectory]] = {
 
 
 def make_trajectory(source: str | Path, duration_s: float | None = None, scale: float = 1.0) -> Trajectory:
-    """A shipped trajectory by name, or one from a file. Raises DataError: unknown name, unreadable file, or a
-    duration that does not fit.
+    """A shipped trajectory by name, or one from a file. Raises DataError: unknown name, a duration that does
+    not fit, or a file that cannot be read, lacks a column, or holds something that is no number.
 
     Args:
         source: circle, lissajous, square, dive, straight, station, or a CSV file with the columns t [s] and
             x, y, z [m], in any order.
         duration_s: time for a shipped one [s]; a file brings its own.
         scale: how many times larger the path is to be, about its start, in the same time.
-
-    Raises:
-        DataError: unknown name, a duration that does not fit, or a file that cannot be read, lacks a column,
-            or holds something that is no number.
     """
     if scale != 1.0:
         if not 0.0 < scale <= MAX_SCALE:

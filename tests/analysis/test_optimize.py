@@ -76,12 +76,11 @@ def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
     assert found.layout is layout
 
 
-def test_fins_keep_their_distance(shipped: Layouts) -> None:
+def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.analysis.optimize.CLEARANCE", 0.2)
     layout = shipped("A")
     box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
-    found = optimize_layout(
-        layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1, clearance=0.2
-    )
+    found = optimize_layout(layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1)
     places = found.layout.position
     assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
 

@@ -16,7 +16,7 @@ from finlab.control import (
     steerable_loss,
 )
 from finlab.control.body_frame import Pid
-from finlab.control.measurement import NO_WRENCH
+from finlab.control.contract import NO_WRENCH
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight

@@ -6,7 +6,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
-from finlab.sim.actuator_force import ActuatorForce
+from finlab.sim.devices import ActuatorForce
 from finlab.vehicle.fin_motion import FinMotion
 from tests.ripple import RippleForce
 

@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from finlab.control import Measurement
 from finlab.errors import FinlabError
 from finlab.sim import NO_NOISE, NOISE_ALONE, SensorSettings
-from finlab.sim.sensors import Sensor, Sensors
+from finlab.sim.devices import Sensor, Sensors
 from finlab.vehicle.attitude import euler
 
 STATE = np.zeros(13)

@@ -15,13 +15,13 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.files.archive import packed
+from finlab.files.guarded import packed
 from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
 from tests.webapp.stand_in import page_of, until
-from webapp.markup.fit_card import fit_card
+from webapp.markup.outcomes import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
 from webapp.tasks import fitting

@@ -10,7 +10,7 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
 from webapp.panels.wrench_tab import reach_marks
 from webapp.scene import actuator_shapes as shapes

@@ -16,7 +16,7 @@ from finlab.layout import Damage, Layout, load_layout
 from finlab.sim import Fault, make_trajectory
 from tests.webapp.stand_in import page_of, until
 from tests.webapp.test_swimming import SHORT, now
-from webapp.markup.swim_card import pace_words, swim_card
+from webapp.markup.outcomes import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.state import State
 from webapp.session.swim_plan import SCENARIOS, Plan, SwimSettings

@@ -12,7 +12,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import Trajectory, make_trajectory
 from tests.webapp.stand_in import load_stand_in, until
-from webapp.markup.swim_card import findings_words, pace_words, swim_card
+from webapp.markup.outcomes import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings

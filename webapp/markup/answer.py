@@ -38,7 +38,9 @@ def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
         max(nice_limit(np.abs(values[:, part]).max()), least)
         for part, least in ((slice(0, 3), 2), (slice(3, 6), 0.5))
     ]
-    rows = [_header(scales)]
+    rows = [html("<span class='dim scale'>±{:g} N, ±{:g} N m</span>", *scales)]
+    words = (("asked", "asked"), ("given", "delivered"), ("missing", "missing"))
+    rows += [html("<b class='right {}'>{}</b>", *word) for word in words]
     for k in range(6):
         scale = scales[k // 3]
         rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
@@ -51,15 +53,6 @@ def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
         cells = (("asked", wish), ("given", delivered), (kind, rest or "–"))
         rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
     return html("<div class='fl'><div class='bars'>{}</div></div>", rows)
-
-
-def _header(scales: list[float]) -> str:
-    scale = f"±{scales[0]:g} N, ±{scales[1]:g} N m"
-    words = "".join(
-        f"<b class='right {kind}'>{word}</b>"
-        for kind, word in (("asked", "asked"), ("given", "delivered"), ("missing", "missing"))
-    )
-    return html("<span class='dim scale'>{}</span>{}", scale, Markup(words))
 
 
 def _value(value: float, axis: int) -> str:

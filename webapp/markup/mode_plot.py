@@ -49,9 +49,13 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     plot = Plot(cost_axis("effort", points[:, 0]), error_axis(points[:, 1]), height, LEFT)
     ends = [end for end, kept in zip(modes.ends or [-1] * len(near), near.tolist(), strict=True) if kept]
     places = np.stack(plot.place(drawn[..., 0], drawn[..., 1]), axis=-1)
-    parts = [_legend(), _trails(places, ends), _sample_dots(places[0], ends, step is not None)]
+    parts = [
+        _legend(),
+        _trails(places, ends),
+        _dots("samples", places[0], ends, 0.7 if step is None else 0.25),
+    ]
     if step is not None:
-        parts.append(_moving_dots(places[max(step - 1, 0)], places[step], ends))
+        parts.append(_dots("moving", places[step], ends, 1.0, places[max(step - 1, 0)]))
     if beyond := int((~near).sum()):
         parts.append(html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond))
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
@@ -83,22 +87,16 @@ def _color(end: int, alpha: float) -> str:
     return css(DEAD if end < 0 else MODE_COLORS[end], alpha)
 
 
-def _sample_dots(places: Array, ends: list[int], faint: bool) -> str:
+def _dots(kind: str, now: Array, ends: list[int], alpha: float, before: Array | None = None) -> str:
+    """Samples (K, 2) [px]; a style lets them come from where they were before."""
+    way = [""] * len(ends)
+    if before is not None:
+        way = [f" style='--x:{x:.1f}px;--y:{y:.1f}px'" for x, y in (before - now).tolist()]
     dots = [
-        f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, 0.25 if faint else 0.7)}'/>"
-        for (x, y), end in zip(places.tolist(), ends, strict=True)
+        f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, alpha)}'{style}/>"
+        for (x, y), end, style in zip(now.tolist(), ends, way, strict=True)
     ]
-    return Markup(f"<g class='samples'>{''.join(dots)}</g>")
-
-
-def _moving_dots(before: Array, now: Array, ends: list[int]) -> str:
-    """Samples (K, 2) [px] as they have been refined so far; a style lets them come from where they were."""
-    dots = [
-        f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, 1.0)}' "
-        f"style='--x:{u - x:.1f}px;--y:{v - y:.1f}px'/>"
-        for (u, v), (x, y), end in zip(before.tolist(), now.tolist(), ends, strict=True)
-    ]
-    return Markup(f"<g class='moving'>{''.join(dots)}</g>")
+    return Markup(f"<g class='{kind}'>{''.join(dots)}</g>")
 
 
 def _trails(places: Array, ends: list[int]) -> str:

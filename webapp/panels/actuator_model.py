@@ -111,7 +111,7 @@ def _written(fitted: Fitted | None, fitting: str | None, fitted_error: str | Non
         return html("<div class='fl'><div class='said missing'>{}</div></div>", fitted_error)
     if fitted is None:
         return ""
-    from webapp.markup.fit_card import fit_card  # scipy comes with it
+    from webapp.markup.outcomes import fit_card  # scipy comes with it
 
     return fit_card(fitted)
 

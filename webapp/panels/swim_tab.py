@@ -13,8 +13,8 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, put
+from webapp.markup.outcomes import swim_card
 from webapp.markup.plot import Axis, Plot, cost_axis, exact_axis, positive
-from webapp.markup.swim_card import swim_card
 from webapp.markup.words import html, marker, righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons

@@ -13,7 +13,7 @@ from viser.transforms import SO3
 
 from finlab.arrays import Array
 from finlab.hull import Surface
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh
 from finlab.layout import Actuator
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes

@@ -6,9 +6,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 from trimesh.convex import convex_hull
+from trimesh.util import append_faces
 
 from finlab.arrays import Array
-from finlab.hull.shapes import Mesh, grid_faces, revolved, triangles
+from finlab.hull.mesh_file import Mesh
+from finlab.hull.surface import grid_faces, revolved, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""
@@ -24,9 +26,8 @@ NOTHING = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], dtype=np.int32))
 
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
-    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=False)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.int32))
+    vertices, faces = append_faces(*zip(*meshes, strict=True))
+    return Mesh(np.asarray(vertices, float), faces.astype(np.int32))
 
 
 def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:
@@ -177,9 +178,7 @@ def duct(along: int) -> Mesh:
     radius = 1.0 - 0.07 * np.sin(section) + 0.06 * x  # a little wider where water comes in
     turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     rim = [np.broadcast_to(x[:, None], (17, 40)), *(radius[:, None] * f(turn) for f in (np.cos, np.sin))]
-    k, n = np.meshgrid(np.arange(16), np.arange(40), indexing="ij")
-    a, b = (40 * k + n).ravel(), (40 * k + (n + 1) % 40).ravel()
-    ring = Mesh(np.stack(rim, axis=-1).reshape(-1, 3), triangles(a, b, a + 40, b, b + 40, a + 40))
+    ring = Mesh(np.stack(rim, axis=-1).reshape(-1, 3), grid_faces(17, 40))
     s = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 13))
     round_ = 0.25 * np.sqrt(1.0 - s**2) + 1e-4
     hub = revolved(0.62 * s - 0.12, round_, round_, sides=20)

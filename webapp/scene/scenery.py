@@ -8,7 +8,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh
 from webapp.board import Board
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
@@ -159,7 +159,9 @@ class SwimScene:
         self._behind, self._ahead = self._ahead or moment, moment
         self._clock = self._behind.time
         put(self._reference, position=moment.reference)
-        self._draw_water(swimmer)
+        path, flow = swimmer.path, swimmer.shown.flow
+        place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
+        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
         places = moment.record[:, PLACE : PLACE + 3]
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         points = (
@@ -176,11 +178,6 @@ class SwimScene:
         self._pose(start)
         self._look(swimmer.path, start[:3], view_size(swimmer.layout))
         run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")
-
-    def _draw_water(self, swimmer: Swimmer) -> None:
-        path, flow = swimmer.path, swimmer.shown.flow
-        place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
-        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
     def _look(self, path: Array, start: Array, size: float) -> None:
         """Show the robot, of a size, and much of the path (N, 3); `frames.js` lets the camera go along."""

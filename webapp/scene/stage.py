@@ -10,11 +10,12 @@ import viser
 
 from finlab.arrays import Array
 from finlab.hull import Surface, hull_of
-from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
+from finlab.hull.mesh_file import Mesh
+from finlab.hull.surface import STATIONS, shape_mesh
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING
-from webapp.theme import LIGHT, Look, Rgb, look
+from webapp.theme import LIGHT, Rgb, look
 
 BELOW = 0.22
 """How far the floor is below the keel [m]."""
@@ -87,15 +88,11 @@ class Stage:
         if self._look != (dark, shadows):
             self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)
-            self._paint(look(dark))
             paint_floor(self.floor, dark)
-
-    def _paint(self, colors: Look) -> None:
-        fade = np.linspace(0, 1, 64)[:, None, None]
-        water = (1 - fade) * np.array(colors.water_top) + fade * np.array(colors.water_bottom)
-        self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
-        put(self._body.node, color=colors.hull)
-        put(self._bow.node, color=colors.glass)
+            water = np.linspace(look(dark).water_top, look(dark).water_bottom, 64)[:, None]
+            self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
+            put(self._body.node, color=look(dark).hull)
+            put(self._bow.node, color=look(dark).glass)
 
 
 class Shape:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube

@@ -26,10 +26,9 @@ from finlab.deploy.design_files import (
     with_hull_inside,
 )
 from finlab.errors import FinlabError, LayoutError
-from finlab.files.archive import packed as pack
+from finlab.files.guarded import packed as pack
 from finlab.files.plain_values import yaml_text
-from finlab.hull.mesh_file import SizeError, stl_of
-from finlab.hull.shapes import Mesh
+from finlab.hull.mesh_file import Mesh, SizeError, stl_of
 from finlab.hull.surface import UNITS, Surface
 from finlab.layout import Layout, layout_to_dict, load_layout
 from finlab.layout.body import Hull

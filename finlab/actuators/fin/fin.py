@@ -44,7 +44,7 @@ from finlab.axes import (
     wrapped,
 )
 from finlab.errors import LayoutError
-from finlab.files.checked import Checked, Name
+from finlab.files.schema import Checked, Name
 
 Coordinate = Annotated[float, Meta(ge=-10.0, le=10.0)]
 MountingAngle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]

@@ -9,8 +9,7 @@ from msgspec import Meta, Struct, defstruct
 
 from finlab.axes import FULL_TURN_TOLERANCE, TURN
 from finlab.errors import LayoutError
-from finlab.files.checked import Checked, given
-from finlab.files.schema import checked
+from finlab.files.schema import Checked, checked, given
 
 MAX_AMPLITUDE = math.pi / 2
 """Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the hull."""

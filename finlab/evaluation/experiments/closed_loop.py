@@ -75,8 +75,7 @@ def depth_error(position: Array, reference: Array) -> float:
 
 def speed_error(log: RunLog) -> Array:
     """Size of the error of the speed ahead at each tick (N,) [m/s]."""
-    error: Array = np.abs(log.motion[:, 0] - log.reference_surge)
-    return error
+    return np.asarray(np.abs(log.motion[:, 0] - log.reference_surge))
 
 
 def follow_row(log: RunLog) -> Row:

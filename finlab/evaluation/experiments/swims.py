@@ -8,7 +8,7 @@ from itertools import islice, product
 import numpy as np
 
 from finlab.axes import command_change
-from finlab.control.completion import LEVER_M
+from finlab.control.contract import LEVER_M
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row

@@ -21,9 +21,9 @@ from finlab.evaluation.experiments.closed_loop import (
     with_losses,
 )
 from finlab.evaluation.method_specs import load_method_specs
+from finlab.evaluation.plots import paths_picture
 from finlab.files.worker import in_worker
 from finlab.sim import RunLog, make_trajectory
-from finlab.sim.plot import paths_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.fit.robot.swim import SMOOTHED, STEP_S, Swim
@@ -138,20 +139,14 @@ def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
     """Returns own axes (n, 3, 3), rows in the body frame, of actuators not as drawn: turned by angles
     (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft about z, and then by
     those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
-    first, second, third = np.moveaxis(layout.frames, 1, 0)
-    cos, sin = np.cos(mounting)[:, None], np.sin(mounting)[:, None]
-    first, second = cos * first + sin * second, cos * second - sin * first
-    cos, sin = np.cos(lean)[:, None], np.sin(lean)[:, None]
-    about_shaft = np.stack([first, cos * second + sin * third, cos * third - sin * second], axis=1)
-    across = np.stack([cos * first - sin * third, second, cos * third + sin * first], axis=1)
     thrusts = np.array([len(part.AXES) == 1 for part in layout.actuators])
-    return np.where(thrusts[:, None, None], across, about_shaft)
+    angles = np.stack([mounting, np.where(thrusts, 0.0, lean), np.where(thrusts, lean, 0.0)], axis=-1)
+    return np.asarray(Rotation.from_euler("ZXY", angles).as_matrix().swapaxes(1, 2) @ layout.frames)
 
 
 def shape_factor(terms: Array, shape: Array) -> Array:
     """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
-    result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
-    return result
+    return np.asarray(np.exp(np.clip(terms @ shape, -2.0, 2.0)))
 
 
 def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:

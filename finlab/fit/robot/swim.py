@@ -19,8 +19,8 @@ from scipy.stats import binned_statistic
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.files.archive import check_shapes, json_of, read_arrays
 from finlab.files.csv_table import TURNS
+from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.fit.columns import MAX_BYTES, read_columns
 from finlab.layout import Actuator, Fin, Layout
 from finlab.vehicle.actuator_motion import ActuatorMotion

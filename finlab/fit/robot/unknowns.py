@@ -97,8 +97,7 @@ class Unknowns:
     def of(self, name: str, vector: Array) -> Array:
         """`part` of a block that every fit looks for."""
         where = self._where[name]
-        own: Array = vector[..., where] * self.scale[where]
-        return own
+        return np.asarray(vector[..., where] * self.scale[where])
 
     def place(self, name: str) -> slice:
         """Where a block stands."""

@@ -13,7 +13,6 @@ from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.mdn.answers import LAST, EffortRobot, distinct, effort_robot
 from finlab.mdn.descent import EffortProblem, descend, realize, wrench
-from finlab.mdn.effort_fins import Projected
 from finlab.mdn.features import VECTORS, features
 from finlab.mdn.training.random_robots import FIN_COUNTS, random_kinds, random_robot, random_targets
 from finlab.physics.objective import yardstick
@@ -66,22 +65,17 @@ def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Ar
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
-    *_, reached = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
-    force, cost = _delivered(problem, target, reached)
+    each = np.repeat(target, STARTS, axis=0)
+    *_, reached = descend(problem, each, start, STEPS)
+    _, cost = realize(problem, reached)
+    strength = np.linalg.norm(np.repeat(maximum, 2)[:, None] * problem.effectiveness)
+    allowed = EXACT * np.minimum(np.linalg.norm(each, axis=1) + 1e-2 * strength, strength)
+    missed = np.linalg.norm(each - wrench(problem, reached.force), axis=1)
+    cost = np.where(missed <= allowed, cost, np.inf).reshape(rows, STARTS)
+    force = reached.force.reshape(rows, STARTS, n)
     cost = np.where(cost > DEAREST * cost.min(1, keepdims=True), np.inf, cost)
     chosen, rank = distinct(cost, root_share(force, maximum), MODES, APART)
     return Ways(force[np.arange(rows)[:, None], chosen], np.where(rank < LAST, rank, np.inf))
-
-
-def _delivered(problem: EffortProblem, target: Array, reached: Projected) -> tuple[AnyArray, Array]:
-    """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
-    count = len(reached.size) // len(target)
-    _, cost = realize(problem, reached)
-    missed = np.linalg.norm(np.repeat(target, count, axis=0) - wrench(problem, reached.force), axis=1)
-    strength = np.linalg.norm(np.repeat(problem.fins.maximum, 2)[:, None] * problem.effectiveness)
-    allowed = EXACT * np.minimum(np.linalg.norm(target, axis=1) + 1e-2 * strength, strength)
-    cost = np.where(missed <= np.repeat(allowed, count), cost, np.inf)
-    return reached.force.reshape(len(target), count, -1), cost.reshape(len(target), count)
 
 
 def root_share(force: AnyArray, largest: Array) -> AnyArray:

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray
 from finlab.errors import DataError
 from finlab.executor import cores, map_parts
 from finlab.files.guarded import decoded, read_file
@@ -81,7 +81,8 @@ def generate(folder: Path, settings: DataSettings) -> None:
     drawn = map_parts(partial(drawn_part, settings), missing, "data", jobs=cores())
     for number, content in zip(missing, drawn, strict=True):
         write_whole(part_file(folder, number), content, DataError)
-    sums = [_sums(read_part(part_file(folder, number))["wrench"]) for number in range(count)]
+    rows = (read_part(part_file(folder, k))["wrench"].reshape(-1, 6).astype(np.float64) for k in range(count))
+    sums = [(wrench.sum(0), (wrench**2).sum(0)) for wrench in rows]
     total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
     deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
     _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
@@ -96,12 +97,6 @@ def drawn_part(settings: DataSettings, number: int) -> bytes:
     arrays = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
     np.savez(content, allow_pickle=False, **arrays)
     return content.getvalue()
-
-
-def _sums(wrench: AnyArray) -> Array:
-    """Sums of wrenches and of their squares (2, 6)."""
-    rows = wrench.reshape(-1, 6).astype(np.float64)
-    return np.stack([rows.sum(0), (rows**2).sum(0)])
 
 
 def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:

@@ -94,7 +94,10 @@ def train_surrogate(options: Options) -> TrainedWeights:
             surrogate=state,
             fin_model=samples.settings["fin_model"],
         )
-        return replace(trained, metrics={"surrogate": {"wrench_error_norm": surrogate_error(trained)}})
+        batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(trained.fin_model)))
+        std = torch.tensor(trained.normalization.std, dtype=torch.float32)
+        error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
+        return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
 
     module = Surrogate, made.surrogate
     return _train("surrogate", options, made.surrogate_training, module, terms_of, checkpoint)
@@ -178,10 +181,3 @@ def surrogate_of(weights: TrainedWeights) -> Surrogate:
     module = Surrogate(SurrogateConfig.of(weights))
     module.load_state_dict({name: torch.tensor(value) for name, value in weights.surrogate.items()})
     return module.requires_grad_(False)
-
-
-def surrogate_error(weights: TrainedWeights) -> float:
-    """Mean normalized error of a surrogate's wrench by its fin model, on fresh samples."""
-    batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(weights.fin_model)))
-    std = torch.tensor(weights.normalization.std, dtype=torch.float32)
-    return float(modules.physics(surrogate_of(weights), batch, std).sqrt().mean())

@@ -9,8 +9,7 @@ from finlab import Allocator, load_layout
 from finlab.cli import main
 from finlab.control import FaultMonitor
 from finlab.errors import FinlabError
-from finlab.fit.robot.fitted_robot import leaned
-from finlab.fit.robot.online import OnlineFit
+from finlab.fit.robot.fitted_robot import OnlineFit, leaned
 from finlab.layout import FinModelSpec
 from finlab.physics import plant_of
 from finlab.sim import ClosedLoop, Fault, make_trajectory

@@ -8,7 +8,7 @@ import pytest
 from finlab import Allocator, load_layout
 from finlab.cli import main
 from finlab.control import FaultMonitor
-from finlab.fit.robot.online import OnlineFit
+from finlab.fit.robot.fitted_robot import OnlineFit
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.robot_model import opposed_in
 from finlab.fit.robot.swim import read_swim

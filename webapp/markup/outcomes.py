@@ -1,9 +1,10 @@
-"""How a swim goes, in a few words and figures."""
+"""Outcomes in a few words and figures: how a swim goes, and what a fit is worth, the verdict first."""
 
 from markupsafe import Markup
 
-from webapp.markup.words import fins_words, html, row, unlearned_sentence
-from webapp.tasks.moment import Figures, Moment
+from webapp.markup.words import fins_words, html, row, three_digits, unlearned_sentence
+from webapp.tasks.fitting import Fitted
+from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 
@@ -52,19 +53,18 @@ def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> st
         return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:
         return Markup("<div class='fl dim'>making ready …</div>")
-    rows = (row(*line) for line in _figures(moment.figures))
-    return html("<div class='fl swim'><table>{}</table>{}</div>", rows, _warnings(swimmer, moment))
-
-
-def _figures(figures: Figures | None) -> tuple[tuple[str, str], ...]:
-    if figures is None:
-        return ()
-    return (
-        ("off the path, root mean square", f"{figures.track_m:.3f} m"),
-        ("off in depth", f"{figures.depth_m:.3f} m"),
-        ("mean power", f"{figures.mean_w:.2f} W"),
-        ("energy so far", f"{figures.energy_wh * 1000:.1f} mWh"),
+    figures = moment.figures
+    rows = (
+        []
+        if figures is None
+        else [
+            row("off the path, root mean square", f"{figures.track_m:.3f} m"),
+            row("off in depth", f"{figures.depth_m:.3f} m"),
+            row("mean power", f"{figures.mean_w:.2f} W"),
+            row("energy so far", f"{figures.energy_wh * 1000:.1f} mWh"),
+        ]
     )
+    return html("<div class='fl swim'><table>{}</table>{}</div>", rows, _warnings(swimmer, moment))
 
 
 def _warnings(swimmer: Swimmer, shown: Moment) -> str:
@@ -81,3 +81,43 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
             fins,
         )
     return warning + Markup().join(html("<div>{}</div>", sentence) for sentence in findings_words(shown))
+
+
+MOST_NAMED = 8
+
+
+def fit_card(result: Fitted) -> str:
+    """What came of a file that was dropped on an actuator."""
+    from finlab.fit.thruster_fit import ThrusterFit, summary  # scipy comes with it
+
+    name, fit = result.upload.name, result.fit
+    if fit is None:
+        said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, result.upload.part.name)
+        return html("<div class='fl said'>{}</div>", said)
+    if isinstance(fit, ThrusterFit):
+        return html(
+            "<div class='fl'>{}</div>",
+            [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)],
+        )
+    if fit.doubts:
+        verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
+    else:
+        verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
+    rows = (
+        row("cross-validated error, of the largest force", f"{100.0 * fit.error():.1f} %"),
+        row("noise of a sample, of the largest force", f"{100.0 * fit.noise():.1f} %"),
+        row("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
+        row(f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
+    )
+    parts = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
+    left, count = "No sample was left out.", len(fit.outliers)
+    if count:
+        named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if count > MOST_NAMED else "")
+        left = f"{count} {'sample contradicts' if count == 1 else 'samples contradict'} the others: {named}."
+    parts.append(html("<div class='said'>{}</div>", left))
+    parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]
+    return html("<div class='fl'>{}</div>", parts)
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper() + note[1:]}."
