@@ -19,22 +19,9 @@ import numpy as np
 from msgspec import Meta, Struct
 from numpy.typing import ArrayLike, NDArray
 
+from finlab import axes
 from finlab.actuators.law import ActuatorLaw
 from finlab.arrays import Array
-from finlab.axes import (
-    AHEAD,
-    DIGITS,
-    MIRROR,
-    SHORT,
-    Vector,
-    across,
-    arc_words,
-    axes_across,
-    cross,
-    held_at,
-    least_turn,
-    vector_words,
-)
 from finlab.errors import FinlabError
 from finlab.files.schema import Checked, Name
 
@@ -86,7 +73,7 @@ class Faults(NamedTuple):
     """Share of its force that it gives at every command, as one with a torn blade does."""
     stuck: float | None = None
     """Angle [rad] at which it no longer turns; it still pushes."""
-    running: Vector | None = None
+    running: axes.Vector | None = None
     """Command that it keeps whatever is asked."""
 
 
@@ -166,7 +153,7 @@ class Actuator(Checked, ABC):
         super().__post_init__()
         if len(self.AXES) == 2:
             first, second = ((name, getattr(self, name)) for name in self.AXES)
-            for (name, _), axis in zip((first, second), axes_across(first, second), strict=True):
+            for (name, _), axis in zip((first, second), axes.axes_across(first, second), strict=True):
                 object.__setattr__(self, name, axis)
 
     @classmethod
@@ -181,34 +168,34 @@ class Actuator(Checked, ABC):
         """Returns one as the app adds it, at the origin, named after its kind."""
 
     @property
-    def lower(self) -> Vector:
+    def lower(self) -> axes.Vector:
         """Least command (3,), in radians and newtons; what the actuator does not have is 0."""
         return _three([getattr(self, name)[0] for name in self.LIMITS], 0.0)
 
     @property
-    def upper(self) -> Vector:
+    def upper(self) -> axes.Vector:
         """Greatest command, as `lower`."""
         return _three([getattr(self, name)[1] for name in self.LIMITS], 0.0)
 
     @property
-    def rates(self) -> Vector:
+    def rates(self) -> axes.Vector:
         """Fastest changes of the command [rad/s, N/s]; infinite where nothing limits them."""
         return _three([getattr(self, name) or math.inf for name in self.RATES], math.inf)
 
     @property
-    def frame(self) -> tuple[Vector, Vector, Vector]:
+    def frame(self) -> tuple[axes.Vector, axes.Vector, axes.Vector]:
         """Own axes in the body frame: those of `AXES`, and what stands across them."""
         first, *others = (getattr(self, name) for name in self.AXES)
         if not others:
             some = [0.0, 0.0, 0.0]
             some[min(range(3), key=lambda i: abs(first[i]))] = 1.0
-            x, y, z = cross(first, (some[0], some[1], some[2]))
+            x, y, z = axes.cross(first, (some[0], some[1], some[2]))
             size = math.hypot(x, y, z)
             others = [(x / size, y / size, z / size)]
-        return first, others[0], cross(first, others[0])
+        return first, others[0], axes.cross(first, others[0])
 
     @property
-    def direction(self) -> Vector:
+    def direction(self) -> axes.Vector:
         """What of it is pointed: its axis, its shaft, or zero."""
         return self.frame[self.POINTED]
 
@@ -287,7 +274,7 @@ class Actuator(Checked, ABC):
         """Its limits and its law in a few words, in a table."""
         ends = zip(self.NUMBERS, self.lower, self.upper, strict=False)
         parts = (
-            arc_words(low, high) if unit == "rad" else f"{low:g}..{high:g} {unit}"
+            axes.arc_words(low, high) if unit == "rad" else f"{low:g}..{high:g} {unit}"
             for (_, unit), low, high in ends
         )
         return ", ".join((*parts, self.model_type))
@@ -296,10 +283,10 @@ class Actuator(Checked, ABC):
     def direction_words(self) -> str:
         """Where it points: the axes that its file gives, in the body frame."""
         words = zip(self.AXES, self.frame, strict=False)
-        return ", ".join(f"{name.replace('_', ' ')} {vector_words(axis)}" for name, axis in words)
+        return ", ".join(f"{name.replace('_', ' ')} {axes.vector_words(axis)}" for name, axis in words)
 
     @property
-    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
+    def joints(self) -> Iterator[tuple[str, axes.Vector, tuple[float, float] | None]]:
         """Joints of a robot description, from the hull on: suffix of the link's name, axis, and limits of
         the angle [rad]."""
         yield "", self.frame[0], None
@@ -315,7 +302,7 @@ class Actuator(Checked, ABC):
     def image(self) -> Self:
         """Returns it on the other side of the plane y = 0, under the same name. What turns one way about a
         shaft turns the other way about its image: arcs and the reaction torque change sign."""
-        mirrored = self.turned(np.array(self.frame) * MIRROR, np.array(self.position) * MIRROR)
+        mirrored = self.turned(np.array(self.frame) * axes.MIRROR, np.array(self.position) * axes.MIRROR)
         changes: dict[str, Any] = {}
         if self.ARC:
             changes[self.ARC] = tuple(-end + 0.0 for end in reversed(getattr(self, self.ARC)))
@@ -323,16 +310,16 @@ class Actuator(Checked, ABC):
             changes["torque_per_newton"] = -self.torque_per_newton + 0.0
         return replace(mirrored, **changes)
 
-    def facing(self, towards: Vector) -> Self:
+    def facing(self, towards: axes.Vector) -> Self:
         """Returns it with its `direction` along a vector of any length; the other axis turns along as little
         as can be, or as its kind has it. Raises FinlabError: the vector has no length."""
         length = math.hypot(*towards)
-        if not SHORT < length < math.inf:
+        if not axes.SHORT < length < math.inf:
             raise FinlabError(f"direction of {self.name}: expected a vector with a length, got {towards}")
         wanted, frame, k = np.array(towards) / length, np.array(self.frame), self.POINTED
-        if np.abs(wanted - frame[k]).max() < SHORT:
+        if np.abs(wanted - frame[k]).max() < axes.SHORT:
             return self
-        frame = frame @ least_turn(frame[k], wanted, frame[2 if k == 0 else 0]).T
+        frame = frame @ axes.least_turn(frame[k], wanted, frame[2 if k == 0 else 0]).T
         frame[k] = wanted
         return self.turned(self.settled(frame))
 
@@ -340,15 +327,15 @@ class Actuator(Checked, ABC):
         """Returns own axes (3, 3) after it was pointed, the first where it is wanted."""
         return frame
 
-    def turned_about(self, towards: Vector) -> Self:
+    def turned_about(self, towards: axes.Vector) -> Self:
         """Returns it turned about its `direction`, with its other axis as near to a vector of any length as
         stands across it. Raises FinlabError: the vector points along the direction."""
         if len(self.AXES) == 1:
             return self
         frame, wanted, k = np.array(self.frame), np.array(towards, dtype=np.float64), self.POINTED
-        if not SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
+        if not axes.SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
             raise FinlabError(f"{self.name}: expected a direction across its {self.AXES[k]}, got {towards}")
-        frame[1 - k] = across(frame[k], wanted)
+        frame[1 - k] = axes.across(frame[k], wanted)
         return self.turned(frame)
 
 
@@ -360,14 +347,14 @@ def key_words(key: str) -> str:
 
 def ahead(frame: Array) -> Array:
     """Returns own axes (3, 3) whose second one lies ahead, as near as the first allows."""
-    if math.hypot(*frame[0, 1:]) > SHORT:
-        frame[1] = across(frame[0], AHEAD)
+    if math.hypot(*frame[0, 1:]) > axes.SHORT:
+        frame[1] = axes.across(frame[0], axes.AHEAD)
     return frame
 
 
 def held_limits(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:
     """Returns an angle [rad] as both limits, within them where it can be; themselves where it is None."""
-    return limits if angle is None else (held_at(angle, limits),) * 2
+    return limits if angle is None else (axes.held_at(angle, limits),) * 2
 
 
 def weakened(interval: tuple[float, float], share: float | None) -> tuple[float, float]:
@@ -377,9 +364,9 @@ def weakened(interval: tuple[float, float], share: float | None) -> tuple[float,
 
 
 def _plain(values: ArrayLike) -> Any:
-    return (np.round(np.asarray(values, dtype=np.float64), DIGITS) + 0.0).tolist()
+    return (np.round(np.asarray(values, dtype=np.float64), axes.DIGITS) + 0.0).tolist()
 
 
-def _three(values: list[Any], rest: float) -> Vector:
+def _three(values: list[Any], rest: float) -> axes.Vector:
     first, second, third = (*values, rest, rest, rest)[:3]
     return first, second, third

@@ -12,19 +12,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from msgspec import Meta
 
-from finlab.actuators.actuator import (
-    Box,
-    Command,
-    Faults,
-    Metres,
-    Place,
-    Seconds,
-    TurnRate,
-    TurnRateDegrees,
-    Uncertainty,
-    held_limits,
-    weakened,
-)
+from finlab.actuators import actuator
 from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
@@ -121,7 +109,7 @@ def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
     return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))
 
 
-class AzimuthCommand(Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
+class AzimuthCommand(actuator.Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
     """What a thruster that turns is told."""
 
     angle: float
@@ -142,7 +130,7 @@ class Azimuth(Propeller):
 
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
         "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
-        "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
+        "turn_rate": ("turn_rate_deg_s", actuator.TurnRateDegrees),
     }
     LAW, GROUP = AzimuthLaw, AzimuthGroup
     NUMBERS, COMMAND = (("angle", "rad"), ("force", "N")), AzimuthCommand
@@ -151,18 +139,18 @@ class Azimuth(Propeller):
     FAULTS, LOOKS, OTHER = ("weak", "stuck"), "pod", "Turns about"
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
     BOXES = (
-        Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
-        Box(
+        actuator.Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
+        actuator.Box(
             "Arc [°]", "arc", "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True, pair=True
         ),
-        Box("Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True),
+        actuator.Box("Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True),
         *Propeller.BOXES,
     )
     type: ClassVar[str] = "azimuth"
 
     name: Name
     """Unique within its layout."""
-    position: Place
+    position: actuator.Place
     """Where the force acts, body frame [m]."""
     turn_axis: Direction3
     """Unit vector about which the thruster turns, body frame."""
@@ -177,15 +165,15 @@ class Azimuth(Propeller):
     """Least and greatest angle [rad]; a full turn means any angle."""
     dead_band: Threshold = 0.0
     """Forces smaller than this, other than 0, cannot be held [N]."""
-    torque_per_newton: Metres = 0.0
+    torque_per_newton: actuator.Metres = 0.0
     """Reaction torque about the direction of the force, per force, signed [m]."""
-    turn_rate: TurnRate | None = None
+    turn_rate: actuator.TurnRate | None = None
     """How fast it turns at most [rad/s]; None where nothing limits it."""
-    time_constant: Seconds = 0.1
+    time_constant: actuator.Seconds = 0.1
     """Time in which the force comes to 63 % of a new one [s]."""
     rate: ForceRate | None = None
     """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
-    uncertainty: Uncertainty | None = None
+    uncertainty: actuator.Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
@@ -223,10 +211,10 @@ class Azimuth(Propeller):
             row[0] = now[0]
         return row
 
-    def damaged(self, faults: Faults) -> Self:
+    def damaged(self, faults: actuator.Faults) -> Self:
         left, (low, high) = faults.weak, self.force
-        force = self.force if left is None else weakened((max(low, left * low), high), left)
-        return replace(self, force=force, arc=held_limits(faults.stuck, self.arc))
+        force = self.force if left is None else actuator.weakened((max(low, left * low), high), left)
+        return replace(self, force=force, arc=actuator.held_limits(faults.stuck, self.arc))
 
     @property
     def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:

@@ -17,18 +17,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from msgspec import Meta
 
-from finlab.actuators.actuator import (
-    Actuator,
-    Box,
-    Command,
-    Faults,
-    Place,
-    Seconds,
-    TurnRate,
-    TurnRateDegrees,
-    Uncertainty,
-    ahead,
-)
+from finlab.actuators import actuator
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
@@ -246,7 +235,7 @@ class RudderGroup(Group):
         return np.pad(self._lift(np.stack([lower[:, 0], upper[:, 0]], axis=-1)), ((0, 0), (0, 2)))
 
 
-class RudderCommand(Command, frozen=True, rename={"deflection": "deflection_rad"}):
+class RudderCommand(actuator.Command, frozen=True, rename={"deflection": "deflection_rad"}):
     """What a rudder is told."""
 
     deflection: float
@@ -258,7 +247,7 @@ class RudderCommand(Command, frozen=True, rename={"deflection": "deflection_rad"
 
 
 @dataclass(frozen=True)
-class Rudder(Actuator):
+class Rudder(actuator.Actuator):
     """A foil on a shaft; its command is the deflection. Checked on construction.
 
     Its force is that of the flow: with the speed U across the shaft and the angle a between chord and flow,
@@ -277,29 +266,29 @@ class Rudder(Actuator):
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
         "deflection": ("deflection_deg", tuple[DeflectionDegrees, DeflectionDegrees]),
         "stall": ("stall_deg", StallDegrees),
-        "rate": ("rate_deg_s", TurnRateDegrees),
+        "rate": ("rate_deg_s", actuator.TurnRateDegrees),
     }
     LAW, GROUP = RudderLaw, RudderGroup
     NUMBERS, COMMAND = (("deflection", "rad"),), RudderCommand
     LIMITS, RATES, AXES, PUSHES = ("deflection",), ("rate",), ("shaft", "zero"), (2,)
     ARC, BY_FLOW, FAULTS, LOOKS, OTHER = "deflection", True, ("torn",), "foil", "Leading edge"
     BOXES = (
-        Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
-        Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
-        Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
+        actuator.Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
+        actuator.Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
+        actuator.Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
     )
     LAW_BOXES = (
-        Box("Area [m²]", "area", "Of the foil.", 0.001),
-        Box("Aspect ratio", "aspect_ratio", "2 span²/area for a foil on a hull."),
-        Box("Lift slope [1/rad]", "lift_slope", "0: by the aspect ratio.", free=True),
-        Box("Drag", "drag", "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
-        Box("Stall [°]", "stall", "Angle to the flow at which it separates.", 1.0, True),
+        actuator.Box("Area [m²]", "area", "Of the foil.", 0.001),
+        actuator.Box("Aspect ratio", "aspect_ratio", "2 span²/area for a foil on a hull."),
+        actuator.Box("Lift slope [1/rad]", "lift_slope", "0: by the aspect ratio.", free=True),
+        actuator.Box("Drag", "drag", "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
+        actuator.Box("Stall [°]", "stall", "Angle to the flow at which it separates.", 1.0, True),
     )
     type: ClassVar[str] = "rudder"
 
     name: Name
     """Unique within its layout."""
-    position: Place
+    position: actuator.Place
     """Where the force acts, the centre of pressure, body frame [m]."""
     shaft: Direction3
     """Unit vector of the shaft, body frame."""
@@ -320,11 +309,11 @@ class Rudder(Actuator):
     """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a plate."""
     density: Annotated[float, Meta(ge=500.0, le=2000.0)] = 1000.0
     """Density of the water [kg/m^3]."""
-    time_constant: Seconds = 0.1
+    time_constant: actuator.Seconds = 0.1
     """Time in which the deflection comes to 63 % of a new one [s]."""
-    rate: TurnRate | None = None
+    rate: actuator.TurnRate | None = None
     """How fast the deflection changes at most [rad/s]; None where nothing limits it."""
-    uncertainty: Uncertainty | None = None
+    uncertainty: actuator.Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
@@ -357,7 +346,7 @@ class Rudder(Actuator):
         angle = min(self.stall, max(map(abs, self.deflection)))
         return 0.5 * self.density * self.area * speed**2 * self.slope * angle
 
-    def damaged(self, faults: Faults) -> Self:
+    def damaged(self, faults: actuator.Faults) -> Self:
         return self if faults.torn is None else self.scaled(faults.torn)
 
     def scaled(self, share: float) -> Self:
@@ -373,4 +362,4 @@ class Rudder(Actuator):
 
     def settled(self, frame: Array) -> Array:
         """See `Actuator`: the leading edge lies ahead."""
-        return ahead(frame)
+        return actuator.ahead(frame)

@@ -12,15 +12,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, Later, chunks_of, first_of
 from finlab.allocation.method import Method
-from finlab.allocation.methods import (
-    Checkpoint,
-    MethodChoice,
-    bundled_method,
-    checked_settings,
-    choose_method,
-)
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
@@ -95,7 +89,7 @@ class Allocator:
         layout: Layout,
         method: str | type[Method] = "dual",
         *,
-        checkpoint: Checkpoint = None,
+        checkpoint: methods.Checkpoint = None,
         **settings: Any,
     ) -> None:
         """Prepare a method for a robot.
@@ -114,10 +108,12 @@ class Allocator:
         """
         check_layout(layout)
         if isinstance(method, str):
-            self._made(layout, choose_method(method, checkpoint, **settings))
+            self._made(layout, methods.choose_method(method, checkpoint, **settings))
         elif isinstance(method, type) and issubclass(method, Method):
             known = checkpoint if isinstance(checkpoint, TrainedWeights) else None
-            self._made(layout, MethodChoice(method, checked_settings(method, settings), known))
+            self._made(
+                layout, methods.MethodChoice(method, methods.checked_settings(method, settings), known)
+            )
         else:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
 
@@ -132,17 +128,17 @@ class Allocator:
             DataError: the bundle cannot be read, or was changed.
             LayoutError: its layout cannot be read.
         """
-        choice = bundled_method(read_bundle_files(path), str(path))
+        choice = methods.bundled_method(read_bundle_files(path), str(path))
         return cls.of_choice(load_layout(path), choice)
 
     @classmethod
-    def of_choice(cls, layout: Layout, choice: MethodChoice) -> Allocator:
+    def of_choice(cls, layout: Layout, choice: methods.MethodChoice) -> Allocator:
         """The allocator of a robot by a method with its networks and settings."""
         made = cls.__new__(cls)
         made._made(layout, choice)
         return made
 
-    def _made(self, layout: Layout, choice: MethodChoice) -> None:
+    def _made(self, layout: Layout, choice: methods.MethodChoice) -> None:
         self._layout, self._choice = layout, choice
         self._scale = yardstick(layout)
         self._whole = self._make(WHOLE)

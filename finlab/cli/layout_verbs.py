@@ -10,19 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.shared_options import (
-    Cluster,
-    Count,
-    Flow,
-    JsonFile,
-    Lost,
-    Robot,
-    Wrench,
-    check_json_file,
-    check_positive,
-    open_robot,
-    put_json,
-)
+from finlab.cli import shared_options
 from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
@@ -46,7 +34,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
     n_bad = 0
     for text in layouts:
         try:
-            layout, _ = open_robot(text)
+            layout, _ = shared_options.open_robot(text)
         except FinlabError as error:
             print(f"finlab: error: {error}", file=sys.stderr)
             n_bad += 1
@@ -58,7 +46,12 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 
 
 @verbs.command
-def show(layout: Robot, lost: Lost = (), flow: Flow = None, json: JsonFile = None) -> None:
+def show(
+    layout: shared_options.Robot,
+    lost: shared_options.Lost = (),
+    flow: shared_options.Flow = None,
+    json: shared_options.JsonFile = None,
+) -> None:
     """Print the actuators of a layout and its score card: what it can do, what it can lose.
 
     Args:
@@ -67,10 +60,10 @@ def show(layout: Robot, lost: Lost = (), flow: Flow = None, json: JsonFile = Non
     from finlab.analysis import score_card
     from finlab.cli.layout_text import layout_text, score_card_text
 
-    check_json_file(json)
-    robot, gone = open_robot(layout, lost)
+    shared_options.check_json_file(json)
+    robot, gone = shared_options.open_robot(layout, lost)
     card = score_card(robot, gone, flow)
-    put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
+    shared_options.put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
 
 
 @verbs.command(name="convert")
@@ -118,7 +111,7 @@ def _converted(file: str, output: Path, to: str | None, exchange: Exchange) -> t
 
 @verbs.command
 def optimize(
-    layout: Robot,
+    layout: shared_options.Robot,
     actuators: Annotated[tuple[str, ...], arg(metavar="NAME...", aliases=["--fins"])],
     output: Annotated[Path, arg(metavar="FILE.yaml", aliases=["-o"])],
     goal: Annotated[str, arg(metavar="NAME")] = "weakest_direction",
@@ -126,11 +119,13 @@ def optimize(
     turn: Annotated[float, arg(metavar="DEG")] = 90.0,
     mirror: bool = True,
     axes: Annotated[tuple[str, ...], arg(metavar="AXIS...")] = (),
-    flow: Flow = None,
-    wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = (),
-    rounds: Count = 40,
-    seed: Count = 0,
-    cluster: Cluster = None,
+    flow: shared_options.Flow = None,
+    wrench: Annotated[
+        UseAppendAction[tuple[shared_options.Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")
+    ] = (),
+    rounds: shared_options.Count = 40,
+    seed: shared_options.Count = 0,
+    cluster: shared_options.Cluster = None,
 ) -> None:
     """Move actuators within bounds to raise a goal, and write the layout that results.
 
@@ -156,9 +151,9 @@ def optimize(
     from finlab.executor import on_cluster
     from finlab.layout import save_layout
 
-    check_json_file(output, "output")
-    check_positive(rounds=rounds)
-    robot = open_robot(layout)[0]
+    shared_options.check_json_file(output, "output")
+    shared_options.check_positive(rounds=rounds)
+    robot = shared_options.open_robot(layout)[0]
     if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
         raise FinlabError(
             f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"

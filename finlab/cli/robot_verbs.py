@@ -9,38 +9,28 @@ from typing import Annotated, Any, Literal
 
 from tyro.conf import UseAppendAction, arg
 
-from finlab.cli.shared_options import (
-    Count,
-    Flow,
-    JsonFile,
-    Lost,
-    Robot,
-    Wrench,
-    check_json_file,
-    open_robot,
-    put_json,
-)
+from finlab.cli import shared_options
 from finlab.errors import FinlabError
 
 
 def allocate(
-    layout: Robot,
-    wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
-    lost: Lost = (),
+    layout: shared_options.Robot,
+    wrench: Annotated[shared_options.Wrench, arg(metavar="FX FY FZ TX TY TZ")],
+    lost: shared_options.Lost = (),
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     robust: Annotated[float | None, arg(metavar="W")] = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
-    axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
+    axis_weights: Annotated[shared_options.Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
     weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE", aliases=["--health"])] = (),
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
-    flow: Flow = None,
+    flow: shared_options.Flow = None,
     bound: bool = False,
-    seed: Count = 0,
-    json: JsonFile = None,
+    seed: shared_options.Count = 0,
+    json: shared_options.JsonFile = None,
 ) -> None:
     """Find the command of each fin that gives a target wrench.
 
@@ -65,10 +55,10 @@ def allocate(
     from finlab.allocation.report import allocation_record
     from finlab.layout.damage import Damage
 
-    check_json_file(json)
+    shared_options.check_json_file(json)
     if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
         raise FinlabError("wrench: asks for nothing, since every axis is 0 or free; expected a value on one")
-    robot, gone = open_robot(layout, lost)
+    robot, gone = shared_options.open_robot(layout, lost)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
@@ -79,15 +69,15 @@ def allocate(
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
     if bound:
         lines.append(f"no exact answer takes less than {result.bound:.4g} W")
-    put_json(allocation_record(result), json, "\n".join(lines))
+    shared_options.put_json(allocation_record(result), json, "\n".join(lines))
 
 
 def export(
-    layout: Robot,
+    layout: shared_options.Robot,
     output: Annotated[Path | None, arg(metavar="DIR", aliases=["-o"])] = None,
     graph: Annotated[Path | None, arg(metavar="FILE")] = None,
     zip: bool = False,
-    lost: Lost = (),
+    lost: shared_options.Lost = (),
     method: Literal["dual", "mdn", "paper"] = "dual",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
@@ -106,7 +96,7 @@ def export(
         raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, or both")
     if output is not None and output.suffix == ".json":
         raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
-    robot, gone = open_robot(layout, lost)  # before a network is loaded
+    robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
     if graph is not None:
         from finlab.deploy.bundle import write_graph
 

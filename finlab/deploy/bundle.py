@@ -18,25 +18,12 @@ from shutil import rmtree
 from msgspec import to_builtins
 
 import finlab
+from finlab import bundle_files
 from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
 from finlab.assets import NAME, shipped_checkpoints
 from finlab.axes import AXES
-from finlab.bundle_files import (
-    ABOUT,
-    CHECKSUMS,
-    FORMAT,
-    LARGEST_BUNDLE,
-    LARGEST_TABLE,
-    NETWORKS,
-    README,
-    ROBOT,
-    VERSION,
-    checksums,
-    largest,
-    table_name,
-)
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.guarded import packed
@@ -67,7 +54,7 @@ class Bundle:
             path.mkdir(parents=True, exist_ok=True)
             present = [file for file in path.rglob("*") if not file.is_dir()]
             left = [file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)]
-            if strangers := sorted(name for name in left if largest(name) < 0):
+            if strangers := sorted(name for name in left if bundle_files.largest(name) < 0):
                 raise DataError(
                     f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
                 )
@@ -81,7 +68,7 @@ class Bundle:
         except OSError as error:
             raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
         finally:
-            if made and not (path / CHECKSUMS).exists():
+            if made and not (path / bundle_files.CHECKSUMS).exists():
                 rmtree(path, ignore_errors=True)
 
     def write_zip(self, file: str | os.PathLike[str]) -> None:
@@ -106,15 +93,17 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
     inside, tables = with_tables_inside(layout)
     sha256, networks = _networks(allocator.weights)
     files = {
-        ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
-        ABOUT: _about(allocator),
+        bundle_files.ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
+        bundle_files.ABOUT: _about(allocator),
         **tables,
         **networks,
-        README: _readme(allocator, failed).encode(),
+        bundle_files.README: _readme(allocator, failed).encode(),
     }
-    if sum(map(len, files.values())) > LARGEST_BUNDLE:
-        raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
-    return Bundle({**files, CHECKSUMS: checksums(files)})
+    if sum(map(len, files.values())) > bundle_files.LARGEST_BUNDLE:
+        raise DataError(
+            f"layout {layout.name!r}: its bundle would be larger than {bundle_files.LARGEST_BUNDLE:,} bytes"
+        )
+    return Bundle({**files, bundle_files.CHECKSUMS: bundle_files.checksums(files)})
 
 
 def _networks(weights: TrainedWeights | None) -> tuple[str | None, dict[str, bytes]]:
@@ -125,13 +114,15 @@ def _networks(weights: TrainedWeights | None) -> tuple[str | None, dict[str, byt
     if shipped is not None and read_checkpoint(shipped).sha256 == weights.sha256:
         return weights.sha256, {}
     files = checkpoint_files(weights)
-    return hashlib.sha256(files[WEIGHTS_FILE]).hexdigest(), {NETWORKS + name: files[name] for name in files}
+    return hashlib.sha256(files[WEIGHTS_FILE]).hexdigest(), {
+        bundle_files.NETWORKS + name: files[name] for name in files
+    }
 
 
 def _about(allocator: Allocator) -> bytes:
     document = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": bundle_files.FORMAT,
+        "version": bundle_files.VERSION,
         "finlab": finlab.__version__,
         "method": allocator.method,
         "checkpoint": allocator.checkpoint,
@@ -148,10 +139,12 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     for part in layout.actuators:
         if path := part.reads:
             content = table_bytes(path)
-            if len(content) > LARGEST_TABLE:
-                raise DataError(f"{path}: is larger than {LARGEST_TABLE:,} bytes, too large for a bundle")
-            tables[table_name(content)] = content
-            part = part.reading(table_name(content))
+            if len(content) > bundle_files.LARGEST_TABLE:
+                raise DataError(
+                    f"{path}: is larger than {bundle_files.LARGEST_TABLE:,} bytes, too large for a bundle"
+                )
+            tables[bundle_files.table_name(content)] = content
+            part = part.reading(bundle_files.table_name(content))
         parts.append(part)
     return replace(layout, actuators=tuple(parts)), tables
 

@@ -18,16 +18,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from finlab.allocation import methods
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.method import Method
-from finlab.allocation.methods import (
-    LEARNED,
-    METHODS,
-    MethodChoice,
-    checked_settings,
-    choose_method,
-    method_class,
-)
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError, DataError
@@ -47,7 +40,7 @@ TOLERANCE = 1e-6
 
 def installed_methods(layout: Layout) -> list[str]:
     """All methods of the library that can run here and take a robot."""
-    return [name for name in METHODS if can_run(name) and method_class(name).fits(layout)]
+    return [name for name in methods.METHODS if can_run(name) and methods.method_class(name).fits(layout)]
 
 
 def can_run(name: str) -> bool:
@@ -60,7 +53,7 @@ class MethodSpec:
     """A method, as the user has written it, with its settings and networks, for any robot."""
 
     name: str
-    choice: MethodChoice
+    choice: methods.MethodChoice
 
     def on(self, layout: Layout) -> Allocator:
         """Its allocator for a robot."""
@@ -70,7 +63,7 @@ class MethodSpec:
         """The same method with those of some settings changed that it knows."""
         kind = self.choice.kind
         known = {name: value for name, value in changes.items() if name in kind.option_names()}
-        settings = checked_settings(kind, {**vars(self.choice.settings), **known})
+        settings = methods.checked_settings(kind, {**vars(self.choice.settings), **known})
         return replace(self, choice=replace(self.choice, settings=settings))
 
 
@@ -98,8 +91,8 @@ def load_method_spec(
     unknown method; DataError: a function that is none."""
     if ":" in name:
         kind = own_method(name)
-        return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
-    spec = MethodSpec(name, choose_method(name, checkpoint if name in LEARNED else None))
+        return MethodSpec(kind.name, methods.MethodChoice(kind, kind.settings_class()))
+    spec = MethodSpec(name, methods.choose_method(name, checkpoint if name in methods.LEARNED else None))
     return spec if objective is None else spec.with_settings(objective=objective)
 
 

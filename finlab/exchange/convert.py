@@ -6,18 +6,11 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
+from finlab.exchange import motor_factors
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
 from finlab.exchange.matrix_table import plain_of, table_of
-from finlab.exchange.motor_factors import (
-    OF_ARDUPILOT,
-    called,
-    of_motors,
-    read_parameters_of_ardusub,
-    tabled,
-    write_ardusub,
-)
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
 from finlab.files.guarded import is_regular, read_text
@@ -33,7 +26,7 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "urdf": lambda layout, exchange, _: description_text(layout, exchange, URDF),
     "sdf": lambda layout, exchange, _: description_text(layout, exchange, SDF),
     "px4": write_px4,
-    "ardusub": write_ardusub,
+    "ardusub": motor_factors.write_ardusub,
     "matrix": write_matrix,
 }
 """Forms beside layout files that are written: the text for a layout and the suffix of the file."""
@@ -108,13 +101,13 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
     if "CA_ROTOR" in text:
         return read_px4(text, name, exchange)
     if "add_motor" in text:
-        return of_motors(name, called(text), exchange)
-    if OF_ARDUPILOT.search(text):
-        return read_parameters_of_ardusub(text, name, exchange)
+        return motor_factors.of_motors(name, motor_factors.called(text), exchange)
+    if motor_factors.OF_ARDUPILOT.search(text):
+        return motor_factors.read_parameters_of_ardusub(text, name, exchange)
     if suffix in TABLES:
         table = table_of(text)
         if table.of_factors:
-            return of_motors(name, tabled(table), exchange)
+            return motor_factors.of_motors(name, motor_factors.tabled(table), exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
     if suffix in PARAMETERS and (n := len(read_parameters(text, ""))):
         names = "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name thrusters"

@@ -54,7 +54,7 @@ def _form(cls: type[Checked], **others: Any) -> Any:
     return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
 
 
-HORIZONTAL_FIN = _form(
+HORIZONTAL_FIN: Any = _form(
     Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None
 )
 """A fin of version 1."""

@@ -15,15 +15,7 @@ from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
 from finlab.layout import Layout
 from finlab.layout.effectiveness import force_effectiveness
-from finlab.networks import layers
-from finlab.networks.trained import (
-    Shapes,
-    TrainedWeights,
-    check_sizes,
-    check_state,
-    linear_shapes,
-    to_normalized,
-)
+from finlab.networks import layers, trained
 from finlab.paper.network import RAW_SIZE, raw_features
 
 FORCE_UNIT = 4.0
@@ -40,21 +32,21 @@ class SurrogateConfig:
     hidden: tuple[int, ...] = (512, 128)
     """Widths of the hidden layers; the first is printed, the second is not."""
 
-    def shapes(self) -> Shapes:
+    def shapes(self) -> trained.Shapes:
         """Shape of each array; a `ValueError` where there is no surrogate of these sizes."""
-        check_sizes(*self.hidden)
-        shapes: Shapes = {}
+        trained.check_sizes(*self.hidden)
+        shapes: trained.Shapes = {}
         for name, (n_in, n_out) in zip(self.layers(), pairwise([RAW_SIZE + 3, *self.hidden, 3]), strict=True):
-            shapes |= linear_shapes(name, n_in, n_out)
-        shapes |= linear_shapes("descriptor.0", RAW_SIZE, DESCRIPTOR)
-        return shapes | linear_shapes("affine", DESCRIPTOR, 12)
+            shapes |= trained.linear_shapes(name, n_in, n_out)
+        shapes |= trained.linear_shapes("descriptor.0", RAW_SIZE, DESCRIPTOR)
+        return shapes | trained.linear_shapes("affine", DESCRIPTOR, 12)
 
     def layers(self) -> list[str]:
         """Names of the perceptron's layers, between which activations stand."""
         return [f"net.{2 * i}" for i in range(len(self.hidden) + 1)]
 
     @classmethod
-    def of(cls, weights: TrainedWeights) -> "SurrogateConfig":
+    def of(cls, weights: trained.TrainedWeights) -> "SurrogateConfig":
         """The sizes of the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
         sizes = weights.surrogate_sizes
         if sizes is None:
@@ -63,7 +55,7 @@ class SurrogateConfig:
             if set(sizes) != {"kind", "hidden"} or sizes["kind"] != "mlp":
                 raise ValueError("expected the kind 'mlp' and the widths of its hidden layers")
             config = cls(tuple(sizes["hidden"]))
-            check_state(weights.surrogate, config.shapes())
+            trained.check_state(weights.surrogate, config.shapes())
         except (TypeError, ValueError) as error:
             raise CheckpointError(f"checkpoint {weights.name!r}: damaged surrogate ({error})") from error
         return config
@@ -72,7 +64,7 @@ class SurrogateConfig:
 class LayoutSurrogate:
     """A surrogate (Eq. 4) on one layout of n fins, with the gradient of its forces; in single precision."""
 
-    def __init__(self, layout: Layout, weights: TrainedWeights) -> None:
+    def __init__(self, layout: Layout, weights: trained.TrainedWeights) -> None:
         """Take over the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
         self.config = SurrogateConfig.of(weights)
         self._w = layers.single_precision(weights.surrogate)
@@ -117,7 +109,7 @@ class LayoutSurrogate:
     def _forward(self, command: AnyArray, jacobian: list[AnyArray] | None = None) -> AnyArray:
         """Forces; `jacobian` takes the derivatives of the activations, layer by layer."""
         # Rounded first: where a range has no width, any remainder would be blown up.
-        x = to_normalized(command.astype(np.float32), self._lower, self._upper)
+        x = trained.to_normalized(command.astype(np.float32), self._lower, self._upper)
         z = (
             layers.linear({"command.weight": self._w["net.0.weight"][:, RAW_SIZE:]}, "command", x)
             + self._fins

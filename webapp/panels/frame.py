@@ -16,18 +16,7 @@ from finlab.layout import Layout
 from webapp.handles import add_html, press, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.panels.places import (
-    ALLOCATE,
-    CANDIDATES,
-    DRAWER,
-    LEFT,
-    PLACES,
-    REGIONS,
-    RIGHT,
-    SIMULATE,
-    Place,
-    add_keys,
-)
+from webapp.panels import places
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
@@ -54,7 +43,7 @@ class Section:
     """A panel in its place, built when it is met first; it gives way to a sentence when it cannot be shown:
     no old figure stands under a new name."""
 
-    def __init__(self, page: Page, place: Place, index: int) -> None:
+    def __init__(self, page: Page, place: places.Place, index: int) -> None:
         self.place, self.name, self._page = place, f"at-{index}", page
         self._met = False
         gui = page.gui
@@ -68,7 +57,7 @@ class Section:
     def arrange(self, desk: Desk, about: tuple[str, ...]) -> bool:
         """Whether it belongs to what is being done."""
         place = self.place
-        opened = place.region != DRAWER or (place.title == desk.opened[desk.task] and not desk.folded)
+        opened = place.region != places.DRAWER or (place.title == desk.opened[desk.task] and not desk.folded)
         self.group.there = there = desk.task in place.tasks and place.about in about and opened
         if there:
             self._met = True
@@ -103,15 +92,15 @@ class Frame:
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
-        for region in REGIONS:
+        for region in places.REGIONS:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
-                if region == DRAWER:
+                if region == places.DRAWER:
                     page.board.group(self._fail)
                     page.add_html(_strip)
                 self.sections += [
                     Section(page, place, index)
-                    for index, place in enumerate(PLACES)
+                    for index, place in enumerate(places.PLACES)
                     if place.region == region
                 ]
         for name in ("habits.js", "frames.js"):
@@ -129,21 +118,21 @@ class Frame:
         there = [section for section in self.sections if section.arrange(desk, about)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
-        gone += [FOLDER.format(region) for region in (LEFT, RIGHT) if region not in regions]
+        gone += [FOLDER.format(region) for region in (places.LEFT, places.RIGHT) if region not in regions]
         drawer = bool(DRAWERS[desk.task])
         if not drawer:
-            gone.append(FOLDER.format(DRAWER))
+            gone.append(FOLDER.format(places.DRAWER))
         counts = {
-            "left": LEFT in regions,
-            "right": RIGHT in regions,
+            "left": places.LEFT in regions,
+            "right": places.RIGHT in regions,
             "drawer": drawer,
             "open": drawer and not desk.folded,
             "guide": stop is not None,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        proposes = layout.is_of_fins or desk.opened.get(ALLOCATE) != CANDIDATES
-        height = "" if proposes or desk.task != ALLOCATE else LOW
-        if desk.task == SIMULATE:
+        proposes = layout.is_of_fins or desk.opened.get(places.ALLOCATE) != places.CANDIDATES
+        height = "" if proposes or desk.task != places.ALLOCATE else LOW
+        if desk.task == places.SIMULATE:
             height = LOW if swimmer is None else TALL
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
@@ -210,5 +199,5 @@ class View(Page):
     def _build(self) -> None:
         self.gui.main_panel.dock_right()
         self.gui.set_panel_label("finlab")
-        add_keys(self)
+        places.add_keys(self)
         self.frame = Frame(self)

@@ -16,15 +16,8 @@ from functools import cache
 from pathlib import Path
 
 from finlab.assets import shipped_layouts
+from finlab.deploy import design_files
 from finlab.deploy.bundle import with_tables_inside
-from finlab.deploy.design_files import (
-    TABLE_FOLDER,
-    Opened,
-    read_archive,
-    read_design,
-    stored_mesh,
-    with_hull_inside,
-)
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.guarded import packed as pack
 from finlab.files.plain_values import yaml_text
@@ -84,16 +77,16 @@ def graph_name(layout: Layout) -> str:
     return f"{file_stem(layout.name)}.graph.json"
 
 
-def read_layout(name: str, content: bytes) -> Opened:
+def read_layout(name: str, content: bytes) -> design_files.Opened:
     """The layout in an uploaded layout, bundle, archive or description. LayoutError, with file and key: too
     large, no text, no layout, or a force table is missing. DataError: a table cannot be read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
-        opened = read_archive(source, content, cache_folder())
+        opened = design_files.read_archive(source, content, cache_folder())
     elif len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     else:
-        opened = read_design(source, content, cache_folder())
+        opened = design_files.read_design(source, content, cache_folder())
     plant_of(opened.layout)  # reads the tables of its fins
     return opened
 
@@ -103,7 +96,7 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
     table or the hull's mesh cannot be read, or is too large to travel."""
     stem = file_stem(layout.name)
     inside, tables = with_tables_inside(layout)
-    inside, hull = with_hull_inside(inside)
+    inside, hull = design_files.with_hull_inside(inside)
     text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
     return design_name(layout), pack({f"{stem}.yaml": text, **parts}) if parts else text
 
@@ -115,7 +108,7 @@ def cache_folder() -> Path:
 
 def table_folder() -> Path:
     """Where the app keeps the force tables of fins."""
-    return cache_folder() / TABLE_FOLDER
+    return cache_folder() / design_files.TABLE_FOLDER
 
 
 def stored_hull(name: str, content: bytes) -> Hull:
@@ -124,8 +117,10 @@ def stored_hull(name: str, content: bytes) -> Hull:
     short = Path(str(name)).name[-80:] or "upload"
     for scale in UNITS.values():
         with contextlib.suppress(SizeError):
-            return Hull(mesh=stored_mesh(short, content, scale, cache_folder()), scale=scale)
-    return Hull(mesh=stored_mesh(short, content, 1.0, cache_folder()))  # which says what is wrong
+            return Hull(mesh=design_files.stored_mesh(short, content, scale, cache_folder()), scale=scale)
+    return Hull(
+        mesh=design_files.stored_mesh(short, content, 1.0, cache_folder())
+    )  # which says what is wrong
 
 
 def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
@@ -135,7 +130,7 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
         raise FinlabError("the hull is drawn from a shape; import a mesh first")
     drawn = Surface.of_file(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
     content = stl_of(change(drawn.mesh))
-    return replace(hull, mesh=stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
+    return replace(hull, mesh=design_files.stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
 
 
 def packed(layout: Layout, most: int = MAX_LINK) -> str:
@@ -154,7 +149,7 @@ def packed(layout: Layout, most: int = MAX_LINK) -> str:
     return text
 
 
-def unpacked(text: str) -> Opened:
+def unpacked(text: str) -> design_files.Opened:
     """The design in a link, checked like an upload; it may be anything. FinlabError: it holds no design, or a
     wrong one."""
     kind, coded = text[:1], text[1:]

@@ -12,6 +12,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
+from finlab import axes
 from finlab.actuators.actuator import (
     Actuator,
     Box,
@@ -28,26 +29,11 @@ from finlab.actuators.fin.fin_model import FIN_MODELS, MAX_FREQUENCY, FinModelSp
 from finlab.actuators.fin.fin_response import FinGroup, fin_table
 from finlab.actuators.law import ActuatorLaw, FinLaw
 from finlab.arrays import Array
-from finlab.axes import (
-    AHEAD,
-    MIRROR,
-    SHORT,
-    TURN,
-    UP,
-    Direction3,
-    Vector,
-    across,
-    arc_words,
-    axes_across,
-    cross,
-    is_full_turn,
-    wrapped,
-)
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Name
 
 Coordinate = Annotated[float, Meta(ge=-10.0, le=10.0)]
-MountingAngle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
+MountingAngle = Annotated[float, Meta(ge=-axes.TURN - 1e-9, le=axes.TURN + 1e-9)]
 SAME_AXIS = 1e-9
 """By how much two unit vectors that are the same may differ, from rounding."""
 FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
@@ -167,9 +153,9 @@ class Fin(Actuator):
     """Which law gives its force."""
     servo: Servo = Servo()
     """How fast it comes to what is commanded."""
-    shaft: Direction3 | None = None
+    shaft: axes.Direction3 | None = None
     """Unit vector out of the hull along the shaft, body frame; None where `mounting_angle` is given."""
-    zero: Direction3 | None = None
+    zero: axes.Direction3 | None = None
     """Unit vector across the shaft: the thrust's direction at zero direction 0; from there it turns towards
     shaft x zero. None where
     `mounting_angle` is given; zero is e_z x shaft then."""
@@ -184,7 +170,7 @@ class Fin(Actuator):
             return
         if self.mounting_angle is not None:
             raise LayoutError("give either mounting_angle_deg, or shaft and zero, not both", "shaft")
-        shaft, zero = axes_across(("shaft", self.shaft), ("zero", self.zero))
+        shaft, zero = axes.axes_across(("shaft", self.shaft), ("zero", self.zero))
         object.__setattr__(self, "shaft", shaft)
         object.__setattr__(self, "zero", zero)
         if math.dist(zero, (-shaft[1], shaft[0], 0.0)) < SAME_AXIS:
@@ -209,13 +195,13 @@ class Fin(Actuator):
         return self.servo.amplitude_rate, self.servo.frequency_rate, self.servo.direction_rate
 
     @property
-    def frame(self) -> tuple[Vector, Vector, Vector]:
+    def frame(self) -> tuple[axes.Vector, axes.Vector, axes.Vector]:
         """The fin's own axes in the body frame: shaft, zero, shaft x zero."""
         if self.shaft is None or self.zero is None:
             angle = self.mounting_angle or 0.0
             c, s = math.cos(angle), math.sin(angle)
             return (c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)
-        return self.shaft, self.zero, cross(self.shaft, self.zero)
+        return self.shaft, self.zero, axes.cross(self.shaft, self.zero)
 
     @classmethod
     def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
@@ -281,7 +267,7 @@ class Fin(Actuator):
     @property
     def limits_words(self) -> str:
         (a, b), (c, d) = self.limits.amplitude, self.limits.frequency
-        arc = arc_words(*self.limits.zero_direction)
+        arc = axes.arc_words(*self.limits.zero_direction)
         return f"A {a:g}..{b:g} rad, f {c:g}..{d:g} Hz, {arc}, {self.model.type}"
 
     @property
@@ -298,19 +284,22 @@ class Fin(Actuator):
         """See `Actuator`: a horizontal shaft keeps its mounting angle, whose zero is the other way round
         there."""
         level = self.mounting_angle is not None
-        frame = np.array(self.frame) * MIRROR * ([[1.0], [-1.0], [1.0]] if level else 1.0)
-        mirrored = self.turned(frame, np.array(self.position) * MIRROR)
+        frame = np.array(self.frame) * axes.MIRROR * ([[1.0], [-1.0], [1.0]] if level else 1.0)
+        mirrored = self.turned(frame, np.array(self.position) * axes.MIRROR)
         low, high = self.limits.zero_direction
-        if is_full_turn(high - low):
+        if axes.is_full_turn(high - low):
             return mirrored
-        middle, half = float(wrapped((math.pi if level else 0.0) - 0.5 * (low + high))), 0.5 * (high - low)
+        middle, half = (
+            float(axes.wrapped((math.pi if level else 0.0) - 0.5 * (low + high))),
+            0.5 * (high - low),
+        )
         limits = replace(mirrored.limits, zero_direction=(middle - half, middle + half))
         return replace(mirrored, limits=limits)
 
     def settled(self, frame: Array) -> Array:
         """See `Actuator`: a fin that turns all round has zero where a mounting angle has it, or ahead."""
         low, high = self.limits.zero_direction
-        if is_full_turn(high - low):
-            level = abs(frame[0, 2]) < SHORT
-            frame[1] = np.cross(UP, frame[0]) if level else across(frame[0], AHEAD)
+        if axes.is_full_turn(high - low):
+            level = abs(frame[0, 2]) < axes.SHORT
+            frame[1] = np.cross(axes.UP, frame[0]) if level else axes.across(frame[0], axes.AHEAD)
         return frame

@@ -7,16 +7,7 @@ from finlab.control import CONTROLLERS
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names, paper_figures
-from finlab.evaluation.experiments.closed_loop import (
-    POWER,
-    Swim,
-    depth_error,
-    mean_rows,
-    power_row,
-    speed_error,
-    swum,
-    with_losses,
-)
+from finlab.evaluation.experiments import closed_loop
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.sim import RunLog, straight
 
@@ -56,21 +47,21 @@ def run(
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
     check_names("controllers", controllers, CONTROLLERS)
     specs = load_method_specs(methods, checkpoint)
-    cases = with_losses(layouts, lost)
+    cases = closed_loop.with_losses(layouts, lost)
     able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
     parts = list(product(able, SPEEDS, controllers, specs, range(seed, seed + runs)))
     swims = [
-        Swim(robot, straight(duration, speed), name, law, k, fins)
+        closed_loop.Swim(robot, straight(duration, speed), name, law, k, fins)
         for (robot, _, fins), speed, law, name, k in parts
     ]
     done: dict[tuple[str, int, float | None, str, str], list[Row]] = {}
     for ((robot, count, _), speed, law, name, _), row in zip(
-        parts, swum(specs, swims, "velocity", _row), strict=True
+        parts, closed_loop.swum(specs, swims, "velocity", _row), strict=True
     ):
         for shown in (speed, None):
             done.setdefault((robot.name, count, shown, law, name), []).append(row)
     order = sorted(done, key=lambda case: (case[:2], case[2] is None))
-    rows = mean_rows(KEYS, {case: done[case] for case in order})
+    rows = closed_loop.mean_rows(KEYS, {case: done[case] for case in order})
     base = {case[:4]: row["inertial_w"] for case, row in zip(order, rows, strict=True) if case[4] == BASELINE}
     for case, row in zip(order, rows, strict=True) if base else ():
         row["over_baseline"] = row["inertial_w"] / base[case[:4]]
@@ -79,12 +70,12 @@ def run(
 
 def _row(log: RunLog) -> Row:
     """Errors of one run [m/s, m] and power [W]."""
-    error = speed_error(log)
+    error = closed_loop.speed_error(log)
     return {
         "mae": float(error.mean()),
         "mae_settled": float(error[log.time >= SETTLED_S].mean()),
-        "depth_rmse": depth_error(log.position, log.reference),
-        **power_row(log),
+        "depth_rmse": closed_loop.depth_error(log.position, log.reference),
+        **closed_loop.power_row(log),
     }
 
 
@@ -113,7 +104,7 @@ experiment = Experiment(
         Column("mae_std", "spread", "error", unit="m/s"),
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),
         Column("depth_rmse", "depth RMSE", "metres", unit="m"),
-        *POWER,
+        *closed_loop.POWER,
         Column("over_baseline", "inertial power over fixed_frequency", "ratio"),
     ),
     run=run,
