@@ -33,9 +33,9 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     (folder / "water_jet.py").write_text(next(block for block in blocks if "class WaterJet" in block))
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        patch.setitem(KINDS, "water_jet", importlib.import_module("water_jet").WaterJet)
+        importlib.import_module("water_jet")
         yield folder
-    del sys.modules["water_jet"]
+    del sys.modules["water_jet"], KINDS["water_jet"]
 
 
 @pytest.fixture(scope="module")
