@@ -269,6 +269,8 @@ class Allocator:
         """
         ready = self._ready_for(result)
         ways = ready.method.refinement(np.nan_to_num(result.target), flow=result.flow, seed=result.seed)
+        if ready.robot.alive.all():
+            return ways
         return tuple(replace(way, command=ready.robot.among_all(way.command)) for way in ways)
 
     def allocate_batch(

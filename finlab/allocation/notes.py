@@ -5,12 +5,13 @@ from functools import lru_cache
 import numpy as np
 
 from finlab.actuators.fin.force_table_file import DOUBT
-from finlab.actuators.kinds import KINDS, file_stamps
+from finlab.actuators.kinds import KINDS
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.axes import axes_in, wrapped
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, TableLaw, make_law
+from finlab.physics.plant import stamps_of
 from finlab.physics.table_error import grid_uncertainty
 from finlab.precision import NEARLY
 
@@ -61,7 +62,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 
     None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    notes = _made(layout, file_stamps(layout.actuators))
+    notes = _made(layout, stamps_of(layout))
     foils = [part for part in layout.actuators if part.BY_FLOW]
     if flow is None and not foils:
         return notes

@@ -64,7 +64,12 @@ class Candidates(PlainData):
     def rows(self, places: Sequence[int]) -> "Candidates":
         """Some of them, by their places."""
         arrays = {name: getattr(self, name)[list(places)] for name in ARRAYS}
-        return Candidates(**arrays, source=tuple(self.source[k] for k in places))
+        return Candidates(**arrays, source=tuple([self.source[k] for k in places]))
+
+    def part(self, rows: slice) -> "Candidates":
+        """Those in a row."""
+        parts = [getattr(self, name)[rows] for name in ARRAYS]
+        return Candidates(*parts, self.source[rows])
 
     def exact(self, within: float) -> "Candidates":
         """Those whose error is at most that, the ones of least effort first."""

@@ -19,11 +19,10 @@ import numpy as np
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.fin.fin_laws import TableLaw, make_law
-from finlab.actuators.kinds import file_stamps
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
-from finlab.physics.plant import Plant
+from finlab.physics.plant import Plant, stamps_of
 from finlab.physics.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
 OF_ONE_TABLE = 0.5
@@ -56,7 +55,7 @@ class Known:
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
     """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
-    return _known(layout, file_stamps(layout.actuators))
+    return _known(layout, stamps_of(layout))
 
 
 @lru_cache(maxsize=256)

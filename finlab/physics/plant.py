@@ -225,7 +225,18 @@ def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ..
 def plant_of(layout: Layout) -> Plant:
     """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a fin's
     force table cannot be read."""
-    return _made(layout, file_stamps(layout.actuators))
+    return _made(layout, stamps_of(layout))
+
+
+def stamps_of(layout: Layout) -> tuple[tuple[int, int] | None, ...]:
+    """Returns `file_stamps` of a layout's actuators, at once where none of them reads a file."""
+    return _lasting(layout) or file_stamps(layout.actuators)
+
+
+@lru_cache(maxsize=256)
+def _lasting(layout: Layout) -> tuple[None, ...]:
+    """The stamps of a robot that reads no file; nothing of one that does."""
+    return () if any(part.reads for part in layout.actuators) else (None,) * layout.n
 
 
 @lru_cache(maxsize=256)

@@ -68,7 +68,9 @@ def tab(count: Count) -> Iterator[Tab]:
 @pytest.mark.parametrize(("drawer", "most"), [("Candidates", 4000), ("Comparison", 800), ("folded", 800)])
 def test_a_step_makes_few_calls_in_few_files(tab: Tab, count: Count, drawer: str, most: int) -> None:
     session = tab.view.session
-    tab.on_loop(lambda: tab.view.do(lambda: session.show_drawer("Candidates" if drawer == "folded" else drawer)))
+    tab.on_loop(
+        lambda: tab.view.do(lambda: session.show_drawer("Candidates" if drawer == "folded" else drawer))
+    )
     if session.desk.folded != (drawer == "folded"):
         tab.on_loop(lambda: tab.view.do(session.fold_drawer))
     tab.settle()

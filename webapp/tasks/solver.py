@@ -67,13 +67,12 @@ def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple
     a network proposed for it, and its refinement."""
     layout = answer.layout
     modes = find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
-    shown, last = named_modes(modes, badge), ways[-1]
-    signatures = map(mode_signature, last.command, force_sizes(layout, last.command))
-    ends = tuple(
-        next((k for k, named in enumerate(shown) if same_signature(named.mode.signature, end)), -1)
-        for end in signatures
-    )
-    return Modes(shown, len(modes), ways, ends)
+    shown, last = named_modes(modes, badge), ways[-1].command
+    signatures = mode_signature(last, force_sizes(layout, last))
+    ends = np.full(len(last), -1)
+    for k, named in reversed(list(enumerate(shown))):
+        ends[same_signature(named.mode.signature, signatures)] = k
+    return Modes(shown, len(modes), ways, tuple(ends.tolist()))
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
