@@ -19,6 +19,7 @@ from webapp.board import Board, Facts, facts_of
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
+from webapp.tasks.answering import Seen
 from webapp.tasks.background import EventLoop, Workers
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
@@ -74,7 +75,7 @@ class Page:
     @property
     def shown(self) -> Allocation | None:
         """What is on the robot."""
-        return self.jobs.answering.shown
+        return self.jobs.answering.seen().shown
 
     @property
     def busy(self) -> bool:
@@ -126,7 +127,7 @@ class Page:
 
         def meant(typed: Any) -> None:
             if isinstance(typed, (tuple, list)):
-                exact = self.board.value_of(value, self._facts())
+                exact = self.board.value_of(value, self._facts(self.jobs.answering.seen()))
                 both = zip(typed, exact, strict=True)
                 typed = tuple(old if new == round(old, digits) else new for new, old in both)
             act(typed)
@@ -188,9 +189,9 @@ class Page:
 
     # From the session to the page.
 
-    def _facts(self) -> Facts:
-        scale = self.scenery.fit(self.session.state.target, self.shown)
-        return facts_of(self.session, self.jobs, self.scenery.robot.dragged, scale, self.board.facts)
+    def _facts(self, seen: Seen) -> Facts:
+        scale = self.scenery.fit(self.session.state.target, seen.shown)
+        return facts_of(self.session, self.jobs, seen, self.scenery.robot.dragged, scale, self.board.facts)
 
     def _refresh(self) -> None:
         if self._soon is not None:
@@ -198,10 +199,11 @@ class Page:
             self._soon = None
         with self.client.atomic():
             try:
-                if self.shown is not None and not self.busy:
-                    self.session.guide.take(self.shown)
+                guide, seen = self.session.guide, self.jobs.answering.seen()
+                if guide.stop is not None and seen.shown is not None and not seen.busy:
+                    guide.take(seen.shown)
                 self.scenery.follow_guide()
-                facts = self._facts()
+                facts = self._facts(seen)
             except Exception as error:
                 self.board.fail(error)
             else:

@@ -68,8 +68,8 @@ class Candidates(PlainData):
 
     def part(self, rows: slice) -> "Candidates":
         """Those in a row."""
-        parts = [getattr(self, name)[rows] for name in ARRAYS]
-        return Candidates(*parts, self.source[rows])
+        arrays = {name: getattr(self, name)[rows] for name in ARRAYS}
+        return Candidates(**arrays, source=self.source[rows])
 
     def exact(self, within: float) -> "Candidates":
         """Those whose error is at most that, the ones of least effort first."""

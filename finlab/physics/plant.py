@@ -103,6 +103,8 @@ class Plant:
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be finite."""
+        if not self.feels_flow and len(self._laws) == 1:
+            return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:

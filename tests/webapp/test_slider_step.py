@@ -1,6 +1,5 @@
 """Work that one step of a slider makes: own Python calls in all threads, and files that they lie in."""
 
-import sys
 import threading
 import time
 from collections import Counter

@@ -1,6 +1,7 @@
 """The modes of an answer as numbered rings that can be picked, and what led to them: effort against error."""
 
 import math
+from functools import cache
 
 import numpy as np
 from markupsafe import Markup
@@ -79,6 +80,7 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
+@cache
 def _color(end: int, alpha: float) -> str:
     return css(DEAD if end < 0 else MODE_COLORS[end], alpha)
 
@@ -104,10 +106,11 @@ def _moving_dots(before: Array, now: Array, ends: list[int]) -> str:
 def _trails(places: Array, ends: list[int]) -> str:
     if len(places) == 1:
         return Markup()
-    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1).tolist()
+    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1)
+    way = "L".join(["%g %g"] * kept.shape[1])
     lines = [
-        f"<path d='M{'L'.join(f'{x:g} {y:g}' for x, y in way)}' stroke='{_color(end, 0.3)}'/>"
-        for way, end in zip(kept, ends, strict=True)
+        f"<path d='M{way % tuple(row)}' stroke='{_color(end, 0.3)}'/>"
+        for row, end in zip(kept.reshape(len(kept), -1).tolist(), ends, strict=True)
     ]
     return Markup(f"<g class='trails'>{''.join(lines)}</g>")
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -25,14 +26,16 @@ def html(template: str, *values: object) -> str:
     """Markup, a text that is marked as such, with values in the place of `{}`, which may have formats, as
     `str.format` has them. Of several things in one, all stand one after the other."""
     # Much faster than the format of `Markup`, which looks at each value through a formatter of its own.
-    safe = [v if type(v) in SAFE else v.translate(ESCAPES) if type(v) is str else _joined(v) for v in values]
+    safe: list[Any] = []
+    for value in values:
+        if type(value) in SAFE:
+            safe.append(value)
+        elif isinstance(value, str) or not isinstance(value, Iterable):
+            safe.append(str(value).translate(ESCAPES))
+        else:
+            parts = value if isinstance(value, (list, tuple)) else tuple(value)
+            safe.append(html("{}" * len(parts), *parts))
     return str.__new__(Markup, template.format(*safe))
-
-
-def _joined(value: object) -> str:
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        return "".join([v if type(v) is Markup else html("{}", v) for v in value])
-    return str(value).translate(ESCAPES)
 
 
 def row(*cells: object) -> str:

@@ -47,7 +47,19 @@ def add_target(page: Page) -> None:
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
-    sliders = [_add_slider(page, k) for k in range(6)]
+    sliders, ends = [_add_slider(page, k) for k in range(6)], [1.0] * 6
+
+    def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+        ends[:] = [slider_end(float(size)) for size in axis_reach(able, failed, flow)]
+
+    def ask(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> None:
+        """Show the target; first the ends: a value beyond them would not be shown."""
+        for value, slider, most in zip(target, sliders, ends, strict=True):
+            end = max(most, abs(value))
+            put(slider, max=end, min=-end, value=round(value, 4) + 0.0)
+
+    board.act(reach)
+    board.act(ask, *sliders)
 
     def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show what is within reach on the sliders."""
@@ -79,13 +91,9 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
-
-    def end(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> float:
-        return max(slider_end(float(axis_reach(able, failed, flow)[axis])), abs(target[axis]))
-
-    # First the ends: a value beyond them would not be shown.
-    page.board.show(slider, max=end, min=lambda able, failed, flow, target: -end(able, failed, flow, target))
-    return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
+    slider.precision = 4
+    page.on_change(slider, partial(session.set_target, axis))
+    return slider
 
 
 def _switch(axis: int, counts: bool) -> str:
@@ -129,7 +137,7 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
 
 
 def _short(value: float, width: float) -> str:
-    fine = next((k for k, size in ((1, 2.0), (2, 0.2)) if width >= size), 3)
+    fine = 1 if width >= 2.0 else 2 if width >= 0.2 else 3
     digits = 0 if abs(value) >= 9.95 else fine
     rounded = round(value, digits)
     return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"

@@ -27,11 +27,14 @@ STEPS = (5, 5, 73)
 """Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg apart."""
 
 
+@lru_cache(maxsize=64)
 def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the others
     free, in a flow (6,) [m/s, rad/s]."""
     works = np.array([name not in failed for name in layout.names])
-    return np.asarray(_extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0))
+    reach: Array = _extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0)
+    reach.setflags(write=False)
+    return reach
 
 
 def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
@@ -62,4 +65,5 @@ def nice_limit(value: float) -> float:
     if value < 1e-6:
         return 1.0
     power = 10.0 ** math.floor(math.log10(1.2 * value))
-    return next((factor * power for factor in (1.0, 2.0, 5.0) if factor * power >= 1.2 * value), 10.0 * power)
+    share = 1.2 * value / power
+    return power * (1.0 if share <= 1.0 else 2.0 if share <= 2.0 else 5.0 if share <= 5.0 else 10.0)
