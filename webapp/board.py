@@ -28,7 +28,6 @@ def facts_of(
     ones."""
     state, improver, fitting = session.state, jobs.improver, jobs.fitting
     swimming, swimmer = jobs.swimming, jobs.swimming.swimmer
-    active = swimming.active
     same = before is not None and before["layout"] is state.layout and before["health"] == state.health
     return {
         "state": state,
@@ -59,12 +58,12 @@ def facts_of(
         "fitted": fitting.findings,
         "fitting": fitting.progress,
         "fitted_error": fitting.error,
-        "swims": active,
+        "swims": swimming.active,
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.shown,
         "drawn": state.layout if swimmer is None else swimmer.layout,  # the robot in the view
-        "paused": active and not swimming.running and not swimming.done,
-        "pace": pace_words(swimming) if active else "",
+        "paused": swimming.active and not swimming.running and not swimming.done,
+        "pace": pace_words(swimming) if swimming.active else "",
         "dragged": dragged,
         "scale": scale,
     }

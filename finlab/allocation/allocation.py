@@ -238,7 +238,7 @@ class Allocation(Answer[float]):
     @cached_property
     def measure_next(self) -> str:
         """The sentence about what adds most to `expected_error`; empty where that is at most 0.001."""
-        return next_measurement(self, self._plant)
+        return "" if self.expected_error <= REACHED else next_measurement(self, self._plant)
 
     @property
     def reachable(self) -> bool:

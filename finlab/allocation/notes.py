@@ -38,7 +38,8 @@ def answer_notes(
     notes = fin_notes(layout, flow) + own
     wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
     named = axes_in(wanted)
-    if left := [axis for axis in named if axis in method.undriven]:
+    undriven = method.undriven
+    if left := [axis for axis in named if axis in undriven]:
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
     if left := [axis for axis in named if axis not in layout.axes]:
         its = f"layout {layout.name} does not command {' or '.join(left)} (axes)"

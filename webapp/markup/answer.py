@@ -14,7 +14,6 @@ from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import Health
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
-from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
 
 HEADER = Markup(
@@ -51,6 +50,15 @@ def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
         rows.append(_bar_row(k, wish, None if got is None else float(got[k]), scales[k // 3]))
     header = BARS_HEADER.format(f"±{scales[0]:g} N, ±{scales[1]:g} N m")
     return html("<div class='fl'><div class='bars'>{}{}</div></div>", header, Markup("".join(rows)))
+
+
+def nice_limit(value: float) -> float:
+    """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
+    if value < 1e-6:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(1.2 * value))
+    share = 1.2 * value / power
+    return power * (1.0 if share <= 1.0 else 2.0 if share <= 2.0 else 5.0 if share <= 5.0 else 10.0)
 
 
 def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> str:
@@ -127,12 +135,11 @@ def _cells(
             f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
         )
         return html("{}{}<td>{}</td>", words, cell, meter)
-    first, second = ("full" if one else "" for one in limits.tolist())
+    first, second = np.where(limits, "full", "").tolist()
     angles = (
         f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td class='{second}'>{frequency:.2f}</td>"
     )
-    turned = f"{round(math.degrees(direction)):+d}".replace("-", "−")
-    return Markup(f"{angles}<td>{turned}</td><td>{force:.2f}</td><td>{meter}</td>")
+    return Markup(f"{angles}<td>{_degrees(direction)}</td><td>{force:.2f}</td><td>{meter}</td>")
 
 
 def _degrees(angle: float) -> str:

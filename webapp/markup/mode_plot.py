@@ -110,7 +110,7 @@ def _trails(places: Array, ends: list[int]) -> str:
     way = "L".join(["%g %g"] * kept.shape[1])
     lines = [
         f"<path d='M{way % tuple(row)}' stroke='{_color(end, 0.3)}'/>"
-        for row, end in zip(kept.reshape(len(kept), -1).tolist(), ends, strict=True)
+        for row, end in zip(kept.reshape(-1, 2 * kept.shape[1]).tolist(), ends, strict=True)
     ]
     return Markup(f"<g class='trails'>{''.join(lines)}</g>")
 

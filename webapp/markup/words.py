@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -174,11 +175,16 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
     """Which of the first two numbers of commands (n, 2) are at their limits, but for free angles."""
     layout, command = allocation.layout, allocation.command[:, :2]
-    turns = free_angles(layout.actuators)[:, :2]
+    turns = _turning(layout)[:, :2]
     with np.errstate(invalid="ignore"):
         high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
         low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
     return np.asarray((high | low) & ~turns)
+
+
+@lru_cache(maxsize=8)
+def _turning(layout: Layout) -> NDArray[np.bool_]:
+    return free_angles(layout.actuators)
 
 
 def parts_word(layout: Layout) -> str:

@@ -5,16 +5,18 @@ from functools import partial
 import numpy as np
 import viser
 
+from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.handles import add_html, placed, press, put
-from webapp.markup.answer import fin_table
+from webapp.markup.answer import fin_table, wrench_bars
+from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
 
@@ -47,10 +49,15 @@ def add_target(page: Page) -> None:
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
-    sliders, ends = [_add_slider(page, k) for k in range(6)], [1.0] * 6
+    sliders, ends, alone = [_add_slider(page, k) for k in range(6)], [1.0] * 6, [""] * 6
 
     def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
-        ends[:] = [slider_end(float(size)) for size in axis_reach(able, failed, flow)]
+        most = axis_reach(able, failed, flow).tolist()
+        ends[:] = [slider_end(size) for size in most]
+        alone[:] = [
+            f"±{three_digits(size)} {unit} if nothing else is asked to stay"
+            for size, unit in zip(most, AXIS_UNITS, strict=True)
+        ]
 
     def ask(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
@@ -63,13 +70,12 @@ def add_target(page: Page) -> None:
 
     def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show what is within reach on the sliders."""
-        most = axis_reach(able, failed, flow)  # with the others free
         for k, slider in enumerate(sliders):
             marks: tuple[tuple[float, str], ...] = ()
             hint = AXIS_WORDS[k].capitalize()
             if ranges is not None and able.commanded[k]:
                 low, high = float(ranges.low[k]), float(ranges.high[k])
-                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, most[k])
+                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, alone[k])
             put_marks(slider, marks)
             put(slider, hint=hint)
 
@@ -128,7 +134,12 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
     if not np.isfinite(low):
         return ()
-    first, last = _short(low, width), _short(high, width)
+    fine, ends = 1 if width >= 2.0 else 2 if width >= 0.2 else 3, []
+    for value in (low, high):
+        digits = 0 if abs(value) >= 9.95 else fine
+        rounded = round(value, digits)
+        ends.append(f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0")
+    first, last = ends
     if high - low <= 1e-3:
         return ((round(low, 3), first),)
     if high - low < CLOSE * width:
@@ -136,17 +147,26 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     return (round(low, 3), first), (round(high, 3), last)
 
 
-def _short(value: float, width: float) -> str:
-    fine = 1 if width >= 2.0 else 2 if width >= 0.2 else 3
-    digits = 0 if abs(value) >= 9.95 else fine
-    rounded = round(value, digits)
-    return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
-
-
-def _hint(axis: int, low: float, high: float, reach: float) -> str:
+def _hint(axis: int, low: float, high: float, at_most: str) -> str:
     word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
-    at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
     ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
     return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."
+
+
+def add_answer(page: Page) -> None:
+    """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
+    stands beside what was asked then."""
+    page.add_html(_bars)
+    page.add_html(_said)
+
+
+def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
+    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, None if shown is None else shown.wrench)
+
+
+def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
+    said = answer_sentence(state, shown, busy, proving or step is not None)
+    return html("<div class='fl'><div class='said'>{}</div></div>", said)

@@ -151,6 +151,13 @@ def view_size(layout: Layout) -> float:
 
 
 @lru_cache(maxsize=8)
+def hull_top(layout: Layout) -> float:
+    """Height [m] of the highest point of the hull."""
+    hull = hull_of(layout)
+    return hull.center[2] + hull.half[2]
+
+
+@lru_cache(maxsize=8)
 def arrow_size(layout: Layout) -> float:
     """How much larger arrows and rings are than for a U-CAT: one of `STEPS`."""
     return float(STEPS[np.argmin(np.abs(np.log(STEPS / view_size(layout))))])

@@ -72,7 +72,8 @@ class State:
     def asking(self, other: "State") -> "State":
         """The same robot with the question of another state: what is asked for, of whom, and how."""
         robot = {key: getattr(self, key) for key in ("layout", "failed", "health", "links")}
-        return replace(other, **robot, method=method_for(self.layout, other.method))
+        fits = self.layout is other.layout
+        return replace(other, **robot, method=other.method if fits else method_for(self.layout, other.method))
 
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""

@@ -1,6 +1,5 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
-import math
 from functools import lru_cache
 
 import numpy as np
@@ -58,12 +57,3 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
 def slider_end(reach: float) -> float:
     """Where a slider ends: a quarter beyond the reach, to two digits; 1 where there is no reach at all."""
     return float(f"{1.25 * reach:.1e}") if reach > 1e-6 else 1.0
-
-
-def nice_limit(value: float) -> float:
-    """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
-    if value < 1e-6:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(1.2 * value))
-    share = 1.2 * value / power
-    return power * (1.0 if share <= 1.0 else 2.0 if share <= 2.0 else 5.0 if share <= 5.0 else 10.0)

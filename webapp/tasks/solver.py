@@ -187,7 +187,9 @@ class Solver:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
         milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
         answer, state = reply.answer, reply.state
-        _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
+        _ = answer.bound  # to prove what is least takes longer than to find it
+        if answer.unknown_fins or not answer.reachable:
+            _ = answer.notes  # the page shows them
         if not seen:
             return NO_MODES
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
