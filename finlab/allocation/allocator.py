@@ -22,7 +22,7 @@ from finlab.allocation.methods import (
     choose_method,
 )
 from finlab.allocation.notes import answer_notes
-from finlab.allocation.policy import CLOSEST, Policy, as_policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import (
     Axes,
     Usable,
@@ -320,7 +320,7 @@ class Allocator:
         seed: int,
         axes: Axes | None = None,
     ) -> Question:
-        policy = as_policy(policy)
+        policy = policy if isinstance(policy, Policy) else Policy(policy)
         check_seed(seed)
         water = check_flow(flow)
         ready = self._ready(failed, health, axes)

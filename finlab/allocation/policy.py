@@ -66,15 +66,13 @@ class Policy:
         return [mask_of(group) for group in groups if group]
 
 
-PLAIN = {kind: Policy(kind) for kind in KINDS}
-"""Policies without settings of their own, by name."""
-CLOSEST = PLAIN["closest"]
+CLOSEST = Policy()
 """The default."""
 
 
 def as_policy(policy: Policy | str) -> Policy:
     """A policy from its name."""
-    return policy if isinstance(policy, Policy) else PLAIN.get(str(policy)) or Policy(policy)
+    return policy if isinstance(policy, Policy) else Policy(policy)
 
 
 def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:

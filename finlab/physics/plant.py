@@ -136,6 +136,8 @@ class Plant:
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's."""
+        if not self.feels_flow and len(self._laws) == 1:
+            return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:

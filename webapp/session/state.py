@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -58,13 +59,13 @@ class State:
     speed: float = 0.0
     """Speed ahead through the water [m/s]."""
 
-    @property
+    @cached_property
     def flow(self) -> Flow | None:
         """Velocity (6,) relative to the water where an actuator feels it and it is not at rest; else None."""
         felt = self.speed != 0.0 and plant_of(self.layout).feels_flow
         return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
-    @property
+    @cached_property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
         return self.layout if self.health is None else self.health.applied_to(self.layout)

@@ -36,6 +36,7 @@ def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None =
     return reach
 
 
+@lru_cache(maxsize=64)
 def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
     """Largest force (n,) of each actuator [N]."""
     return _extents(layout, flow)[0]

@@ -12,6 +12,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
+from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -103,6 +104,7 @@ KEPT = 24
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
+POLICIES = {kind: Policy(kind) for kind in KINDS}
 RUNS = "runs"
 """Folder in the one where the app was started, whose folders are looked at."""
 
@@ -212,7 +214,7 @@ class Solver:
         return self.allocator(state).allocate(
             state.target,
             failed=state.failed,
-            policy=state.policy,
+            policy=POLICIES[state.policy],
             health=state.health,
             flow=state.flow,
             seed=0,
