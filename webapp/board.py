@@ -75,17 +75,13 @@ UNKNOWN = object()
 """In place of what was made last, where that is not known."""
 
 
-def _named(make: Callable[..., Any]) -> list[str]:
-    return [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
-
-
 class Rule:
     """One property of a handle, or whatever else is done when facts change."""
 
     def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
         """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
         self.group, self.make, self.handle, self.key = group, make, handle, key
-        self.names = _named(make)
+        self.names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
         self.is_due, self.last = True, UNKNOWN
 
     def write(self, facts: Facts) -> None:
@@ -165,11 +161,6 @@ class Board:
         for name in rule.names:
             self._of_fact[name].append(rule)
         return rule
-
-    @staticmethod
-    def value_of(make: Callable[..., Any], facts: Facts) -> Any:
-        """What a function makes of facts."""
-        return make(*map(facts.__getitem__, _named(make)))
 
     def doubt(self, handle: Any) -> None:
         """A user has changed a handle, and the session may have refused it."""

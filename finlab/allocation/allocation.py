@@ -156,7 +156,7 @@ class Answer(PlainData, Generic[Number]):
 
     def _by_parts(self, judge: Callable[[Plant, Array], Array]) -> Array:
         """Figures of commands, a few at a time."""
-        plant = self._plant if self.later is None else self.later.plant
+        plant = self._plant
         if self.command.ndim == 2:
             return np.asarray(judge(plant, self.command[None])[0])
         if len(self.command) <= CHUNK:

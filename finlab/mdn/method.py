@@ -105,7 +105,7 @@ class Mdn(Method):
             ways = traced(self.robot, wanted[0], proposal.force[0].astype(complex), WHOLE)
         names, count = names_of(proposal), len(ways[0])
         every = self._judged(wanted, np.concatenate(ways), names * len(ways))
-        return tuple([every.part(slice(k, k + count)) for k in range(0, len(every.command), count)])
+        return tuple([every.rows(slice(k, k + count)) for k in range(0, len(every.command), count)])
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""

@@ -3,8 +3,7 @@
 from markupsafe import Markup
 
 from webapp.markup.words import fins_words, html, row, unlearned_sentence
-from webapp.tasks.moment import Figures, Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Figures, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 
 

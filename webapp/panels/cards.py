@@ -1,6 +1,7 @@
 """The bar above all, cards beside and over the view, and what else is nothing but markup."""
 
 from collections.abc import Callable
+from functools import partial
 
 import viser
 from markupsafe import Markup
@@ -98,7 +99,8 @@ def _button(label: str, word: str, primary: bool = False) -> str:
 def add_switches(page: Page) -> None:
     """All of them."""
     for key, (label, hint) in SWITCHES.items():
-        page.bind_display(page.gui.add_checkbox(label, False, hint=hint), key)
+        box = page.gui.add_checkbox(label, False, hint=hint)
+        page.bind(box, partial(page.session.set_display, key), lambda display, key=key: getattr(display, key))
 
 
 DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))

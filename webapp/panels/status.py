@@ -17,9 +17,8 @@ from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.jobs import Findings
-from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.solver import Modes
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import ERROR, Moment, Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
 
 LONG = 24

@@ -49,17 +49,12 @@ def add_target(page: Page) -> None:
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
-    sliders, ends, alone = [_add_slider(page, k) for k in range(6)], [1.0] * 6, [""] * 6
+    sliders, ends = [_add_slider(page, k) for k in range(6)], [1.0] * 6
 
     def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
-        most = axis_reach(able, failed, flow).tolist()
-        ends[:] = [slider_end(size) for size in most]
-        alone[:] = [
-            f"±{three_digits(size)} {unit} if nothing else is asked to stay"
-            for size, unit in zip(most, AXIS_UNITS, strict=True)
-        ]
+        ends[:] = [slider_end(size) for size in axis_reach(able, failed, flow).tolist()]
 
-    def ask(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> None:
+    def ask(target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for value, slider, most in zip(target, sliders, ends, strict=True):
             end = max(most, abs(value))
@@ -70,12 +65,13 @@ def add_target(page: Page) -> None:
 
     def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show what is within reach on the sliders."""
+        most = axis_reach(able, failed, flow)  # with the others free
         for k, slider in enumerate(sliders):
             marks: tuple[tuple[float, str], ...] = ()
             hint = AXIS_WORDS[k].capitalize()
             if ranges is not None and able.commanded[k]:
                 low, high = float(ranges.low[k]), float(ranges.high[k])
-                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, alone[k])
+                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, most[k])
             put_marks(slider, marks)
             put(slider, hint=hint)
 
@@ -147,8 +143,9 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     return (round(low, 3), first), (round(high, 3), last)
 
 
-def _hint(axis: int, low: float, high: float, at_most: str) -> str:
+def _hint(axis: int, low: float, high: float, reach: float) -> str:
     word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
+    at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
     ends = f"{three_digits(low)} to {three_digits(high)} {unit}"

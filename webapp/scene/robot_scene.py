@@ -24,8 +24,7 @@ from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.context import Context
 from webapp.tasks.jobs import Findings
-from webapp.tasks.moment import Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color
 from webapp.viser_internals import run_script
 

@@ -32,12 +32,10 @@ class Seen(NamedTuple):
     has become so far of the proposal that leads to it."""
     in_reach: bool
     busy: bool
-    """True while the answer is older than the state."""
     error: str | None
     """Why the present state has no answer."""
     modes: Modes
     searching: bool
-    """True until all modes of the answer are known."""
     proving: bool
     """True until what is proved of the answer is known."""
     mode: int
@@ -60,11 +58,6 @@ class Answering:
         self._search = Newest(loop, worker, self._modes, self._take_modes, SEARCH_REST_S)
 
     @property
-    def reply(self) -> Reply | None:
-        """The newest answer with all that belongs to it; it may be older than the state."""
-        return self._answer.findings
-
-    @property
     def modes(self) -> Modes:
         """The ways to do what an answer does, known after a moment of rest; until then those of the answer
         before, of which none can be chosen."""
@@ -82,13 +75,12 @@ class Answering:
 
     def seen(self) -> Seen:
         """What is seen of the newest answer now."""
-        session, search, reply = self._session, self._search, self.reply
-        busy, modes, steps = self.busy, search.findings or NO_MODES, 0
+        session, search, reply = self._session, self._search, self._answer.findings
+        busy, modes, mode = self.busy, search.findings or NO_MODES, session.mode
         searching = busy or search.busy
         best = shown = None if reply is None else reply.answer
-        mode, step = session.mode, None
-        if not searching and (steps := modes.steps):
-            step = session.step
+        steps = 0 if searching else modes.steps
+        step = session.step if steps else None
         if best is not None and not searching:
             proposal = modes.proposal_of(mode) if step is not None and step < steps else None
             if step is not None and proposal is not None:
@@ -116,7 +108,7 @@ class Answering:
 
     def _look(self, at_once: bool) -> None:
         """Prove the newest answer, and search for its modes once these can be seen."""
-        reply, session = self.reply, self._session
+        reply, session = self._answer.findings, self._session
         if reply is not None and self._search.question != (reply, True):
             seen = session.drawer == "Candidates" or session.mode > 0
             self._search.ask((reply, seen), at_once)
@@ -132,7 +124,7 @@ class Answering:
 
     def _take(self) -> None:
         error = self._answer.error
-        if self.reply is not None:
+        if self._answer.findings is not None:
             self._look(at_once=False)
         else:
             self._search.forget()

@@ -12,8 +12,7 @@ from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
-from webapp.tasks.moment import Moment
-from webapp.tasks.swimmer import Swimmer, closed_loop
+from webapp.tasks.swimmer import Moment, Swimmer, closed_loop
 
 LAG_S = 0.25
 """What the swim may be behind the clock [s]; what is more is dropped, so that nothing piles up."""
