@@ -28,7 +28,8 @@ class Compiled:
         self._alike: list[tuple[Group, Group]] = []
         for places, group in self.groups:
             tables = [(r.table, r.reverse) for r in group.responses if isinstance(r, Plane)]
-            if len(tables) > 1 and all(a is b for t in tables for a, b in zip(t, tables[0], strict=True)):
+            same = all(a is b for pair in tables for a, b in zip(pair, tables[0], strict=True))
+            if same and len(tables) == len(group.responses) > 1:
                 first = slice(places[0], places[0] + 1)
                 self._alike += [(group, groups_of(layout.actuators[first], plant.effectiveness[first])[0][1])]
         self._prepare()
@@ -71,11 +72,9 @@ class Compiled:
     def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
         """See `Group.radial_worth`, at prices (m, N): where all actuators are alike, one answers for all."""
         for alike, one in self._alike:
-            if (
-                alike is group
-                and (worth := one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))) is not None
-            ):
-                return worth.reshape(ahead.shape).T
+            if alike is group:
+                worth = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))
+                return None if worth is None else worth.reshape(ahead.shape).T
         return group.radial_worth(ahead.T, back.T)
 
     def within(self, lower: Array, upper: Array) -> Sets:
