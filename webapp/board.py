@@ -13,33 +13,38 @@ from markupsafe import Markup, escape
 from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
+from webapp.tasks.answering import Seen
 from webapp.tasks.jobs import Jobs
 
 Facts = dict[str, Any]
 """Whoever shows a part names the facts that it is made of, each with its type."""
 
 
-def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, before: Facts | None) -> Facts:
-    """The facts of a session and of what has been worked out for it, and of the view: the place of the
-    actuator that is `dragged`, and the scale of arrows. `before` are the last ones."""
-    state, answering, improver, fitting = session.state, jobs.answering, jobs.improver, jobs.fitting
-    swimming, swimmer, modes = jobs.swimming, jobs.swimming.swimmer, answering.modes
+def facts_of(
+    session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale, before: Facts | None
+) -> Facts:
+    """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
+    newest answer, the place of the actuator that is `dragged`, and the scale of arrows. `before` are the last
+    ones."""
+    state, improver, fitting = session.state, jobs.improver, jobs.fitting
+    swimming, swimmer = jobs.swimming, jobs.swimming.swimmer
     same = before is not None and before["layout"] is state.layout and before["damage"] == state.damage
     return {
         "state": state,
-        **_of(state, "layout failed damage target flow method policy network"),
+        **vars(state),  # layout, damage, target, method, policy, network
+        "failed": state.failed,
+        "flow": state.flow,
         # The layout with the limits that are left to damaged actuators.
         "able": before["able"] if same and before is not None else state.able,
-        **_of(session, "saved selected selection desk display draft swim loops"),
+        **vars(session),  # saved, desk, display, draft, swim, loops
+        "selected": session.selected,
+        "selection": session.selection,
         "task": session.desk.task,
         "undo": session.history.undo_name,
         "redo": session.history.redo_name,
-        **_of(session.guide, "stop solved"),
-        # The newest answer, which may be older than the state, and what of it is on the robot.
-        **_of(answering, "best shown busy error modes searching proving"),
-        "in_reach": answering.reply is not None and answering.reply.in_reach,
-        "mode": min(session.mode, max(len(modes.shown) - 1, 0)),
-        "step": session.step if not answering.searching and modes.steps else None,
+        "stop": session.guide.stop,
+        "solved": session.guide.solved,
+        **seen._asdict(),
         "playing": jobs.refining.running,
         "ranges": jobs.ranging.findings,
         "ranges_error": jobs.ranging.error,
@@ -65,18 +70,10 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
     }
 
 
-def _of(source: object, names: str) -> Facts:
-    return {name: getattr(source, name) for name in names.split()}
-
-
 PLAIN = (str, int, float, bool, tuple)
 """Facts that are compared by value; the others, which may hold arrays, by identity."""
 UNKNOWN = object()
 """In place of what was made last, where that is not known."""
-
-
-def _named(make: Callable[..., Any]) -> list[str]:
-    return [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
 
 
 class Rule:
@@ -85,12 +82,12 @@ class Rule:
     def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
         """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
         self.group, self.make, self.handle, self.key = group, make, handle, key
-        self.names = _named(make)
+        self.names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
         self.is_due, self.last = True, UNKNOWN
 
     def write(self, facts: Facts) -> None:
         """Make it again, and send what has changed."""
-        made = self.make(*[facts[name] for name in self.names])
+        made = self.make(*map(facts.__getitem__, self.names))
         if self.handle is not None:
             if self.key == "content" and type(made) is not Markup:
                 made = escape(made)  # content that is not marked as markup is text
@@ -153,9 +150,11 @@ class Board:
             self._of_handle.setdefault(id(handle), []).append(self._declare(make, handle, key))
         return handle
 
-    def act(self, make: Callable[..., None]) -> None:
-        """Call a function of facts whenever these change."""
-        self._declare(make)
+    def act(self, make: Callable[..., None], *handles: Any) -> None:
+        """Call a function of facts whenever these change, or a user has changed one of the `handles`."""
+        rule = self._declare(make)
+        for handle in handles:
+            self._of_handle.setdefault(id(handle), []).append(rule)
 
     def _declare(self, make: Callable[..., Any], handle: Any = None, key: str = "") -> Rule:
         rule = Rule(self.groups[-1], make, handle, key)
@@ -164,14 +163,10 @@ class Board:
             self._of_fact[name].append(rule)
         return rule
 
-    @staticmethod
-    def value_of(make: Callable[..., Any], facts: Facts) -> Any:
-        """What a function makes of facts."""
-        return make(*[facts[name] for name in _named(make)])
-
     def doubt(self, handle: Any) -> None:
         """A user has changed a handle, and the session may have refused it."""
-        self._due(self._of_handle.get(id(handle), []))
+        for rule in self._of_handle.get(id(handle), []):
+            rule.is_due = rule.group.is_due = True
 
     def distrust(self) -> None:
         """Something went wrong: all is made again next time."""
@@ -193,11 +188,8 @@ class Board:
             for name, rules in self._of_fact.items():
                 old, new = before[name], facts[name]
                 if old is not new and not (type(old) in PLAIN and old == new):
-                    self._due(rules)
+                    for rule in rules:
+                        rule.is_due = rule.group.is_due = True
         for group in self.groups:
             if group.is_due and group.there:
                 group.write(facts)
-
-    def _due(self, rules: list[Rule]) -> None:
-        for rule in rules:
-            rule.is_due = rule.group.is_due = True

@@ -25,14 +25,10 @@ def put(handle: Any, **values: Any) -> None:
     for key, value in values.items():
         if key == "content":
             value = str(escape(value))
-        if not _same(getattr(handle, key), value):
+        old = getattr(handle, key)
+        arrays = isinstance(old, np.ndarray) or isinstance(value, np.ndarray)
+        if not (np.array_equal(old, value) if arrays else old == value):
             setattr(handle, key, value)
-
-
-def _same(old: Any, new: Any) -> bool:
-    if isinstance(old, np.ndarray) or isinstance(new, np.ndarray):
-        return np.array_equal(np.asarray(old), np.asarray(new))
-    return bool(old == new)
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:

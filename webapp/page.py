@@ -15,7 +15,7 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
-from webapp.board import Board, Facts, facts_of
+from webapp.board import Board, facts_of
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
@@ -74,7 +74,7 @@ class Page:
     @property
     def shown(self) -> Allocation | None:
         """What is on the robot."""
-        return self.jobs.answering.shown
+        return self.jobs.answering.seen().shown
 
     @property
     def busy(self) -> bool:
@@ -117,28 +117,24 @@ class Page:
         """A slider, number or vector; `digits` are shown behind the point. What the page only shows rounded
         stays as exact as it is."""
 
+        exact: Any = None
+
         @wraps(value)
         def shown(*facts: Any) -> Any:
-            now = value(*facts)
-            if isinstance(now, (tuple, list)):
-                return tuple([round(v, digits) + 0.0 for v in now])
-            return round(float(now), digits) + 0.0
+            nonlocal exact
+            exact = value(*facts)
+            if isinstance(exact, (tuple, list)):
+                return tuple([round(v, digits) + 0.0 for v in exact])
+            return round(float(exact), digits) + 0.0
 
         def meant(typed: Any) -> None:
-            if isinstance(typed, (tuple, list)):
-                exact = self.board.value_of(value, self._facts())
+            if isinstance(exact, (tuple, list)):
                 both = zip(typed, exact, strict=True)
                 typed = tuple(old if new == round(old, digits) else new for new, old in both)
             act(typed)
 
         handle.precision = digits  # type: ignore[attr-defined]
         return self.bind(handle, meant, shown)
-
-    def bind_display(self, handle: Input, key: str) -> Input:
-        """An input for a field of the session's `Display`."""
-        return self.bind(
-            handle, partial(self.session.set_display, key), lambda display: getattr(display, key)
-        )
 
     def add_html(self, content: Callable[..., str], **made: Callable[..., object]) -> viser.GuiHtmlHandle:
         """Markup, and what else of it is a function of facts."""
@@ -188,20 +184,21 @@ class Page:
 
     # From the session to the page.
 
-    def _facts(self) -> Facts:
-        scale = self.scenery.fit(self.session.state.target, self.shown)
-        return facts_of(self.session, self.jobs, self.scenery.robot.dragged, scale, self.board.facts)
-
     def _refresh(self) -> None:
         if self._soon is not None:
             self._soon.cancel()
             self._soon = None
         with self.client.atomic():
             try:
-                if self.shown is not None and not self.busy:
-                    self.session.guide.take(self.shown)
+                guide, seen = self.session.guide, self.jobs.answering.seen()
+                if guide.stop is not None and seen.shown is not None and not seen.busy:
+                    guide.take(seen.shown)
                 self.scenery.follow_guide()
-                facts = self._facts()
+                scale, dragged = (
+                    self.scenery.fit(self.session.state.target, seen.shown),
+                    self.scenery.robot.dragged,
+                )
+                facts = facts_of(self.session, self.jobs, seen, dragged, scale, self.board.facts)
             except Exception as error:
                 self.board.fail(error)
             else:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 Rgb = tuple[int, int, int]
 
@@ -99,17 +100,20 @@ def look(dark: bool) -> Look:
     return DARK if dark else LIGHT
 
 
+@cache
 def ink(color: Rgb) -> str:
     """Colour of a number on a colour, as CSS: dark or light, whichever stands out."""
     red, green, blue = color
     return "#111" if 0.299 * red + 0.587 * green + 0.114 * blue > 118 else "#fff"
 
 
+@cache
 def fin_color(index: int) -> Rgb:
     """Colour of the fin at this place in the layout."""
     return FIN_COLORS[index % len(FIN_COLORS)]
 
 
+@cache
 def css(color: Rgb, alpha: float = 1.0) -> str:
     """The colour as CSS."""
     return f"rgba({color[0]},{color[1]},{color[2]},{alpha:g})"

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
+from itertools import starmap
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
@@ -129,14 +131,16 @@ def _quicken() -> None:
     icons: Any = _icons
     opened: Any = cache(ZipFile)
     icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(opened(archive)))
+    for name, kind in vars(_messages).items():
+        if name.endswith("Props"):
+            kind.finlab_hints = get_type_hints(kind)
     handles: Any = AssignablePropsBase
-    hints: Any = cache(get_type_hints)
-    handles._prop_hints = property(lambda handle: hints(type(handle._impl.props)))
+    handles._prop_hints = property(attrgetter("_impl.props.finlab_hints"))
 
 
 def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, str], ...]) -> None:
     """Other marks (value and text) on a slider that stands already; viser takes them only when it is made."""
-    wanted = tuple(_messages.GuiSliderMark(value=value, label=text) for value, text in marks)
+    wanted = tuple(starmap(_messages.GuiSliderMark, marks))
     if slider._marks != wanted:
         slider._marks = wanted
 

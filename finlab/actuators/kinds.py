@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from finlab.actuators.actuator import Actuator, Places
 from finlab.actuators.azimuth import Azimuth, Tilt
 from finlab.actuators.fin.fin import Fin
-from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import Rudder
@@ -52,11 +51,6 @@ def _kinds(actuators: Sequence[Actuator]) -> Iterator[tuple[Places, type[Actuato
 def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
     """Which commands (n, 3) are angles; whether they may turn freely depends on their limits."""
     return np.array([[k == part.ANGLE for k in range(3)] for part in actuators])
-
-
-def file_stamps(actuators: Sequence[Actuator]) -> tuple[tuple[int, int] | None, ...]:
-    """Returns the stamps of the files that laws read, for what is kept until one of them changes."""
-    return tuple([file_stamp(part.reads) for part in actuators])
 
 
 for _module in filter(None, os.environ.get("FINLAB_KINDS", "").split(",")):

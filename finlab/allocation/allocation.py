@@ -86,7 +86,7 @@ class Answer(PlainData, Generic[Number]):
         """Names of the actuators, in the order of `command`."""
         return self.layout.names
 
-    @property
+    @cached_property
     def unallocated(self) -> Array:
         """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
         return np.nan_to_num(self.target - self.wrench)
@@ -94,12 +94,12 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if failed."""
-        return self._by_parts(self._plant.body_forces)
+        return self._by_parts(Plant.body_forces)
 
     @cached_property
     def wrench(self) -> Array:
         """Delivered wrench (6,) or (N, 6) [N, N m] by the actuators' own laws and tables."""
-        return self._by_parts(self._plant.wrench)
+        return self._by_parts(Plant.wrench)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -118,7 +118,7 @@ class Answer(PlainData, Generic[Number]):
     def expected_miss(self) -> Array:
         """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
         what the layout says, or a table's own; zeros where nothing is known to be."""
-        return self._by_parts(lambda rows: expected_miss(self._plant, rows))
+        return self._by_parts(expected_miss)
 
     @cached_property
     def err_norm(self) -> Number:
@@ -134,14 +134,14 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def power(self) -> Number:
         """Mean power [W] of a command, by the actuators' own models: of fins mechanical."""
-        return self._number(self._by_parts(lambda rows: judged_power(self._plant, rows)))
+        return self._number(self._by_parts(judged_power))
 
     @cached_property
     def effort(self) -> Number | None:
         """Effort `J_en` of a command, the paper's energy proxy; None where not all actuators are fins."""
         if not self.layout.is_of_fins:
             return None
-        return self._number(self._by_parts(lambda rows: judged_effort(self.layout, rows)))
+        return self._number(self._by_parts(lambda plant, rows: judged_effort(plant.layout, rows)))
 
     @cached_property
     def bound(self) -> Number | None:
@@ -157,13 +157,14 @@ class Answer(PlainData, Generic[Number]):
     def _plant(self) -> Plant:
         return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
 
-    def _by_parts(self, judge: Callable[[Array], Array]) -> Array:
+    def _by_parts(self, judge: Callable[[Plant, Array], Array]) -> Array:
         """Figures of commands, a few at a time."""
+        plant = self._plant
         if self.command.ndim == 2:
-            return np.asarray(judge(self.command[None])[0])
+            return np.asarray(judge(plant, self.command[None])[0])
         if len(self.command) <= CHUNK:
-            return judge(self.command)
-        return np.concatenate([judge(self.command[rows]) for rows in chunks(len(self.command))])
+            return judge(plant, self.command)
+        return np.concatenate([judge(plant, self.command[rows]) for rows in chunks(len(self.command))])
 
     def _equal_names(self) -> list[str]:
         return [*super()._equal_names(), *self.LAZY]
@@ -241,9 +242,9 @@ class Allocation(Answer[float]):
     @cached_property
     def measure_next(self) -> str:
         """The sentence about what adds most to `expected_error`; empty where that is at most 0.001."""
-        return next_measurement(self, self._plant)
+        return "" if self.expected_error <= REACHED else next_measurement(self, self._plant)
 
-    @property
+    @cached_property
     def reachable(self) -> bool:
         """Whether the target is delivered: an `err_norm` of at most 0.001."""
         return self.err_norm <= REACHED

@@ -16,7 +16,7 @@ from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, Later, chunks_of, first_of
 from finlab.allocation.method import Method
 from finlab.allocation.notes import answer_notes
-from finlab.allocation.policy import CLOSEST, Policy, as_policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import (
     WHOLE,
     Axes,
@@ -270,6 +270,8 @@ class Allocator:
         """
         ready = self._ready_for(result)
         ways = ready.method.refinement(np.nan_to_num(result.target), flow=result.flow, seed=result.seed)
+        if ready.robot.alive.all():
+            return ways
         return tuple(replace(way, command=ready.robot.among_all(way.command)) for way in ways)
 
     def allocate_batch(
@@ -320,7 +322,7 @@ class Allocator:
         seed: int,
         axes: Axes | None = None,
     ) -> Question:
-        policy = as_policy(policy)
+        policy = policy if isinstance(policy, Policy) else Policy(policy)
         check_seed(seed)
         water = check_flow(flow)
         ready = self._ready(damage, axes)

@@ -6,9 +6,10 @@ round.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
@@ -25,10 +26,10 @@ SAME_SIZE = 0.25
 
 
 class ModeSignature(NamedTuple):
-    """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
+    """What matters of commands: numbers per fin (..., n), NaN where the fin rests or has failed."""
 
-    resting: tuple[int, ...]
-    """Places of the fins that rest."""
+    resting: NDArray[np.bool_]
+    """Fins that rest."""
     thrust: Array
     """Logarithm of the force [N]."""
     direction: Array
@@ -61,37 +62,39 @@ class Mode(PlainData):
     @property
     def resting(self) -> tuple[int, ...]:
         """Places of the fins that hardly push, by their own laws."""
-        return self.signature.resting
+        return tuple(np.flatnonzero(self.signature.resting).tolist())
 
 
 def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array) -> tuple[Mode, ...]:
     """The modes among K candidates, best first, in their order, by the size of each fin's force (K, n) [N] as
     `force_sizes` has it, and the lower and upper limits (n, 3)."""
     modes, span = [], np.maximum(upper - lower, 1e-9)
-    signatures = [mode_signature(*each) for each in zip(candidates.command, force, strict=True)]
+    signatures = mode_signature(candidates.command, force)
     for members in cluster(signatures):
         first = members[0]
-        figures = candidates.err_norm, candidates.effort, candidates.power
-        err_norm, effort, power = (float(row[first]) for row in figures)
         command, own = candidates.command[first], force[first]
+        figures = float(candidates.err_norm[first]), float(candidates.effort[first])
         saturation = float(np.clip(np.nanmax(((command - lower) / span)[:, :2]), 0.0, 1.0))
         still = tuple(np.flatnonzero(own < STILL * own.max()).tolist())
-        sources = tuple(dict.fromkeys(candidates.source[k] for k in members))
-        signature = signatures[first]
-        modes.append(Mode(command, err_norm, effort, power, saturation, still, signature, sources))
+        sources = tuple(dict.fromkeys([candidates.source[k] for k in members]))
+        signature, power = _row(signatures, first), float(candidates.power[first])
+        modes.append(Mode(command, *figures, power, saturation, still, signature, sources))
     return tuple(modes)
 
 
-def cluster(signatures: list[ModeSignature]) -> list[list[int]]:
-    """Places of signatures that are the same, each group led by its first."""
+def cluster(signatures: ModeSignature) -> list[list[int]]:
+    """Places of K signatures that are the same, each group led by its first."""
     groups: list[list[int]] = []
-    for k, signature in enumerate(signatures):
-        home = next((group for group in groups if same_signature(signatures[group[0]], signature)), None)
-        if home is None:
-            groups.append([k])
-        else:
-            home.append(k)
+    left = np.arange(len(signatures.thrust))
+    while len(left):
+        same = same_signature(_row(signatures, left[0]), _row(signatures, left))
+        groups.append(left[same].tolist())
+        left = left[~same]
     return groups
+
+
+def _row(signatures: ModeSignature, place: Any) -> ModeSignature:
+    return ModeSignature._make([values[place] for values in signatures])
 
 
 def force_sizes(layout: Layout, command: Array) -> Array:
@@ -100,24 +103,25 @@ def force_sizes(layout: Layout, command: Array) -> Array:
 
 
 def mode_signature(command: Array, force: Array) -> ModeSignature:
-    """What matters of a command (n, 3) with forces of these sizes (n,) [N]."""
+    """What matters of commands (..., n, 3) with forces of these sizes (..., n) [N]."""
     works = np.isfinite(command).all(axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         thrust = np.log(force)
-        style = np.log(command[:, 0]) - np.log(command[:, 1])
-    resting = works & (force < RESTING * np.where(works, force, 0.0).max(initial=0.0))
+        style = np.log(command[..., 0]) - np.log(command[..., 1])
+    strongest = np.where(works, force, 0.0).max(axis=-1, keepdims=True, initial=0.0)
+    resting = works & (force < RESTING * strongest)
     pushes = works & ~resting & np.isfinite(thrust)
-    values = [np.where(pushes, value, np.nan) for value in (thrust, command[:, 2], style)]
-    return ModeSignature(tuple(int(i) for i in np.flatnonzero(resting)), *values)
+    return ModeSignature(resting, *np.where(pushes, (thrust, command[..., 2], style), np.nan))
 
 
 def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
-    """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
+    """How `b` differs from `a` (3, ..., n) in direction, thrust and style; 1 is what counts as different."""
     turn = wrapped(b.direction - a.direction) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
     return np.asarray(np.nan_to_num(np.concatenate([turn[None], rest])))
 
 
-def same_signature(a: ModeSignature, b: ModeSignature) -> bool:
-    """Whether two commands with these signatures are one mode."""
-    return a.resting == b.resting and bool((np.abs(signature_difference(a, b)) < 1.0).all())
+def same_signature(a: ModeSignature, b: ModeSignature) -> NDArray[np.bool_]:
+    """Whether commands with these signatures are one mode, for one pair or many (...)."""
+    alike = (np.abs(signature_difference(a, b)) < 1.0).all(axis=(0, -1))
+    return np.asarray(alike & (a.resting == b.resting).all(axis=-1))

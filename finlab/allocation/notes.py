@@ -4,8 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.actuators.fin.force_table_file import DOUBT
-from finlab.actuators.kinds import KINDS, file_stamps
+from finlab.actuators.kinds import KINDS
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.axes import axes_in, wrapped
@@ -37,7 +38,8 @@ def answer_notes(
     notes = fin_notes(layout, flow) + own
     wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
     named = axes_in(wanted)
-    if left := [axis for axis in named if axis in method.undriven]:
+    undriven = method.undriven
+    if left := [axis for axis in named if axis in undriven]:
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
     if left := [axis for axis in named if axis not in layout.axes]:
         its = f"layout {layout.name} does not command {' or '.join(left)} (axes)"
@@ -61,7 +63,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 
     None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    notes = _made(layout, file_stamps(layout.actuators))
+    notes = _made(layout, layout.stamps)
     foils = [part for part in layout.actuators if part.BY_FLOW]
     if flow is None and not foils:
         return notes
@@ -86,8 +88,9 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     first = layout.description.partition("\n")[0]
     notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
-    for fin, stamp in zip(layout.fins, file_stamps(layout.fins), strict=True):
-        notes += [note.replace("{name}", fin.name) for note in _notes_of(fin.model, fin.limits, stamp)]
+    for fin in layout.fins:
+        own = _notes_of(fin.model, fin.limits, file_stamp(fin.reads))
+        notes += [note.replace("{name}", fin.name) for note in own]
     return tuple(notes)
 
 

@@ -13,7 +13,6 @@ from finlab.axes import AXES
 from finlab.command_end import aligned
 from finlab.layout import Layout
 from finlab.physics.expected_miss import sources_of_miss
-from finlab.physics.objective import REACHED
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
@@ -94,9 +93,7 @@ def doubts(result: Allocation) -> tuple[str, ...]:
 
 
 def next_measurement(result: Allocation, plant: Plant) -> str:
-    """The sentence about what adds most to the expected error of an answer; empty where that is none."""
-    if result.expected_error <= REACHED:
-        return ""
+    """The sentence about what adds most to the expected error of an answer."""
     sources = sources_of_miss(plant, result.command[None])
     parts = np.array([(source.variance[0] / result.scale**2).sum() for source in sources])
     most = int(parts.argmax())

@@ -61,10 +61,11 @@ class Candidates(PlainData):
     def __len__(self) -> int:
         return len(self.command)
 
-    def rows(self, places: Sequence[int]) -> "Candidates":
+    def rows(self, places: Sequence[int] | slice) -> "Candidates":
         """Some of them, by their places."""
-        arrays = {name: getattr(self, name)[list(places)] for name in ARRAYS}
-        return Candidates(**arrays, source=tuple(self.source[k] for k in places))
+        some = places if isinstance(places, slice) else list(places)
+        arrays = {name: getattr(self, name)[some] for name in ARRAYS}
+        return Candidates(**arrays, source=tuple(np.array(self.source, object)[some]))
 
     def exact(self, within: float) -> "Candidates":
         """Those whose error is at most that, the ones of least effort first."""

@@ -2,6 +2,7 @@
 weakest direction of all."""
 
 from collections.abc import Collection
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -119,18 +120,26 @@ def axis_ranges(
 ) -> Ranges:
     """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by about a
     millionth at most; `failed`, `flow` and errors are as for `force_sets`."""
-    axes = np.concatenate([np.eye(6), -np.eye(6)])
-    parts = convex_parts(force_sets(layout, failed, flow))
-    n_parts = len(parts.radius)
-    basis = orthogonal_complement(axes)
+    water = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
+    parts, axes, basis = _parts(layout, tuple(failed), water, layout.stamps)
+    n_parts = len(parts.radius) // 12
     held = (np.asarray(wrench, dtype=np.float64) / SCALE) @ basis
     origin, bases = np.tile(axes, (n_parts, 1)), np.tile(basis, (n_parts, 1, 1))
-    ends = largest(parts.repeat(12), origin, bases, np.tile(held, (n_parts, 1)), TOLERANCE)
-    size = ends.size.reshape(n_parts, 2, 6)
+    size = largest(parts, origin, bases, np.tile(held, (n_parts, 1)), TOLERANCE).size.reshape(n_parts, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -NOTHING
-    high, low = (np.where(there, size[:, k], -np.inf).max(axis=0) for k in range(2))
-    return Ranges(*(np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)))
+    high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
+    return Ranges(*[np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)])
+
+
+@lru_cache(maxsize=16)
+def _parts(
+    layout: Layout, failed: tuple[str, ...], flow: tuple[float, ...] | None, stamps: object
+) -> tuple[ForceSets, Array, Array]:
+    """Convex parts of a robot, each for both ways along all axes, with these (12, 6) and what is across."""
+    axes = np.concatenate([np.eye(6), -np.eye(6)])
+    sets = convex_parts(force_sets(layout, failed, flow)).repeat(len(axes))
+    return sets, axes, orthogonal_complement(axes)
 
 
 RANK_TOLERANCE = 1e-6

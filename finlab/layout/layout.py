@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin import Fin
+from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.arrays import Array
 from finlab.axes import AXES, CommandedAxes, mask_of
 from finlab.errors import LayoutError
@@ -86,6 +87,15 @@ class Layout(Checked):
     def fins_alone(self) -> "Layout":
         """The robot with its fins alone; it has some."""
         return replace(self, actuators=self.fins)
+
+    @cached_property
+    def _files(self) -> tuple[str, ...]:
+        return tuple(part.reads for part in self.actuators if part.reads)
+
+    @property
+    def stamps(self) -> tuple[tuple[int, int] | None, ...]:
+        """Time and size of each file that a law reads, for what is kept until one of them changes."""
+        return tuple(map(file_stamp, self._files)) if self._files else ()
 
     @property
     def is_of_fins(self) -> bool:

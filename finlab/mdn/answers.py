@@ -10,7 +10,7 @@ from finlab.allocation.dual.policies import Box
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
 from finlab.mdn.descent import EffortProblem, descend, effort_problem, realize, wrench
-from finlab.mdn.effort_fins import EffortFins
+from finlab.mdn.effort_fins import EffortFins, Projected
 from finlab.mdn.features import RobotView, robot_view
 from finlab.physics.objective import ZERO_DIRECTION, EffortMeter, effort_scale
 from finlab.physics.plant import Plant
@@ -125,7 +125,11 @@ def traced(robot: EffortRobot, target: Array, force: AnyArray, steps: Steps) -> 
     """Commands (K, n, 3) for one normalized target (6,): first of forces (K, n), complex, as proposed, then
     after each step of their refinement."""
     each = np.repeat(target[None], len(force), axis=0)
-    ways = [realize(robot.forces, at)[0] for at in descend(robot.forces, each, force, steps.descent)]
+    reached = list(descend(robot.forces, each, force, steps.descent))
+    gauges = [np.broadcast_to(at.gauge, force.shape) for at in reached]
+    parts = [at.unit for at in reached], [at.size for at in reached], [at.wanted for at in reached], gauges
+    command, _ = realize(robot.forces, Projected._make(map(np.concatenate, parts)))
+    ways = list(command.reshape(len(reached), *force.shape, 3))
     for _ in range(steps.commands):
         ways.append(refine(robot.commands, each, ways[-1], 1).command)
     return ways

@@ -56,7 +56,7 @@ class Found(NamedTuple):
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
     """What the proposals for a single target are called."""
-    return tuple(f"component {k + 1}" for k in proposal.component[0])
+    return tuple([f"component {k + 1}" for k in proposal.component[0]])
 
 
 class Mdn(Method):
@@ -101,7 +101,9 @@ class Mdn(Method):
         with self._one_thread():
             proposal = self.proposals(wanted, seed)
             ways = traced(self.robot, wanted[0], proposal.force[0].astype(complex), WHOLE)
-        return tuple(self._judged(wanted, command, names_of(proposal)) for command in ways)
+        names, count = names_of(proposal), len(ways[0])
+        every = self._judged(wanted, np.concatenate(ways), names * len(ways))
+        return tuple([every.rows(slice(k, k + count)) for k in range(0, len(every.command), count)])
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""

@@ -19,7 +19,6 @@ import numpy as np
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.fin.fin_laws import TableLaw, make_law
-from finlab.actuators.kinds import file_stamps
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
@@ -56,7 +55,7 @@ class Known:
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
     """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
-    return _known(layout, file_stamps(layout.actuators))
+    return _known(layout, layout.stamps)
 
 
 @lru_cache(maxsize=256)

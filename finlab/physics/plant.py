@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_laws import make_law
-from finlab.actuators.kinds import file_stamps, free_angles, laws_of
+from finlab.actuators.kinds import free_angles, laws_of
 from finlab.actuators.law import ActuatorLaw, Blade
 from finlab.actuators.propeller import held
 from finlab.arrays import Array
@@ -103,6 +103,8 @@ class Plant:
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be finite."""
+        if not self.feels_flow and len(self._laws) == 1:
+            return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
@@ -134,6 +136,8 @@ class Plant:
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's."""
+        if not self.feels_flow and len(self._laws) == 1:
+            return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:
@@ -223,7 +227,7 @@ def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ..
 def plant_of(layout: Layout) -> Plant:
     """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a fin's
     force table cannot be read."""
-    return _made(layout, file_stamps(layout.actuators))
+    return _made(layout, layout.stamps)
 
 
 @lru_cache(maxsize=256)

@@ -127,19 +127,19 @@ def test_a_refinement_is_played_step_by_step_on_the_robot() -> None:
         refining.toggle()
     answering.ask()
     loop.ring()
-    modes, best = answering.modes, answering.shown
+    modes, best = answering.modes, answering.seen().shown
     assert modes.steps == 2 and not answering.searching
     session.show_mode(1)
     refining.toggle()
     seen = []
     while session.step is not None:
-        proposal, shown = modes.ends.index(1), answering.shown
+        proposal, shown = modes.ends.index(1), answering.seen().shown
         assert shown is not None and refining.running
         np.testing.assert_array_equal(shown.command, modes.ways[session.step].command[proposal])
         seen.append(session.step)
         loop.ring()
-    assert seen == [0, 1] and not refining.running and answering.shown not in (None, best)
-    np.testing.assert_array_equal(answering.shown.command, modes.shown[1].mode.command)
+    assert seen == [0, 1] and not refining.running and answering.seen().shown not in (None, best)
+    np.testing.assert_array_equal(answering.seen().shown.command, modes.shown[1].mode.command)
     session.set_loop(True)
     refining.toggle()
     for _ in range(2 + HOLD):

@@ -22,8 +22,7 @@ from webapp.session.state import State
 from webapp.session.swim_plan import SCENARIOS, Plan, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
-from webapp.tasks.moment import POWER, Figures
-from webapp.tasks.swimmer import Swimmer, closed_loop
+from webapp.tasks.swimmer import POWER, Figures, Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout("ucat")

@@ -16,8 +16,8 @@ from webapp.markup.outcomes import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
-from webapp.tasks.moment import ERROR, FORCES, TIME
 from webapp.tasks.solver import Solver
+from webapp.tasks.swimmer import ERROR, FORCES, TIME
 from webapp.tasks.swimming import LAG_S, Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])

@@ -1,6 +1,7 @@
 """What is asked and delivered: six bars, and the table of commands with one row per fin."""
 
 import math
+from functools import cache
 
 import numpy as np
 from markupsafe import Markup
@@ -13,7 +14,6 @@ from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import Damage
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
-from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
 
 HEADER = Markup(
@@ -21,6 +21,12 @@ HEADER = Markup(
     "<th title='zero direction'>dir. [°]</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
+BARS_HEADER = Markup(
+    "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right given'>delivered</b>"
+    "<b class='right missing'>missing</b>"
+)
+MIDDLE = "<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"
+"""Where nothing is asked, in the track of bars."""
 PLAIN_HEADER = Markup(
     "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
@@ -38,48 +44,48 @@ def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
         max(nice_limit(np.abs(values[:, part]).max()), least)
         for part, least in ((slice(0, 3), 2), (slice(3, 6), 0.5))
     ]
-    rows = [html("<span class='dim scale'>±{:g} N, ±{:g} N m</span>", *scales)]
-    words = (("asked", "asked"), ("given", "delivered"), ("missing", "missing"))
-    rows += [html("<b class='right {}'>{}</b>", *word) for word in words]
+    rows = []
     for k in range(6):
-        scale = scales[k // 3]
-        rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
-        free = np.isnan(demanded[k])
-        rows.append(_track(None if free else demanded[k] / scale, None if got is None else got[k] / scale))
-        rest = None if got is None or free else _value(demanded[k] - got[k], k)
-        kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
-        delivered = "–" if got is None else _value(got[k], k)
-        wish = "free" if free else _value(demanded[k], k)
-        cells = (("asked", wish), ("given", delivered), (kind, rest or "–"))
-        rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
-    return html("<div class='fl'><div class='bars'>{}</div></div>", rows)
+        wish = None if np.isnan(demanded[k]) else float(demanded[k])
+        rows.append(_bar_row(k, wish, None if got is None else float(got[k]), scales[k // 3]))
+    header = BARS_HEADER.format(f"±{scales[0]:g} N, ±{scales[1]:g} N m")
+    return html("<div class='fl'><div class='bars'>{}{}</div></div>", header, Markup("".join(rows)))
 
 
-def _value(value: float, axis: int) -> str:
-    digits = 2 if axis < 3 else 3
-    rounded = round(value, digits)
-    return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
+def nice_limit(value: float) -> float:
+    """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
+    if value < 1e-6:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(1.2 * value))
+    share = 1.2 * value / power
+    return power * (1.0 if share <= 1.0 else 2.0 if share <= 2.0 else 5.0 if share <= 5.0 else 10.0)
 
 
-def _track(demanded: float | None, got: float | None) -> str:
-    parts: list[str] = [
-        Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")
-    ]
-    if demanded is not None:
-        parts.append(_bar(0.0, demanded, 1, 5, "var(--fl-asked)"))
+def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> str:
+    """Name, bars and figures of one axis, of which nothing is wished where it is free."""
+    digits, rest = 2 if axis < 3 else 3, None if wish is None or got is None else wish - got
+    bars = [] if wish is None else [(0.0, wish, 1, "asked")]
     if got is not None:
-        parts.append(_bar(0.0, got, 8, 5, "var(--fl-delivered)"))
-        if demanded is not None and abs(demanded - got) > 0.02:
-            parts.append(_bar(got, demanded, 8, 5, "var(--fl-missing)"))
-    return html("<div class='track'>{}</div>", parts)
+        bars.append((0.0, got, 8, "delivered"))
+    if wish is not None and got is not None and abs(wish - got) > 0.02 * scale:
+        bars.append((got, wish, 8, "missing"))
+    parts = [
+        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span><div class='track'>{MIDDLE}"
+    ]
+    for start, end, top, word in bars:
+        low, high = sorted((min(max(start / scale, -1.0), 1.0), min(max(end / scale, -1.0), 1.0)))
+        place = f"left:{50 + 50 * low:.2f}%;width:{50 * (high - low):.2f}%;top:{top}px;height:5px"
+        parts.append(f"<i style='{place};background:var(--fl-{word})'></i>")
+    parts.append("</div>")
+    for kind, value, none in (("asked", wish, "free"), ("given", got, "–"), ("missing", rest, "–")):
+        rounded = 0.0 if value is None else round(value, digits)
+        text = f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
+        said = "dim" if kind == "missing" and not rounded else kind
+        parts.append(f"<span class='right {said}'>{none if value is None else text}</span>")
+    return "".join(parts)
 
 
-def _bar(start: float, end: float, top: int, height: int, color: str) -> str:
-    low, high = sorted((float(np.clip(start, -1, 1)), float(np.clip(end, -1, 1))))
-    place = f"left:{50 + 50 * low:.2f}%;width:{50 * (high - low):.2f}%;top:{top}px;height:{height}px"
-    return html("<i style='{};background:{}'></i>", place, color)
-
-
+@cache
 def swatch(index: int, failed: bool = False) -> str:
     """The fin's number on its colour."""
     color = DEAD if failed else fin_color(index)
@@ -92,13 +98,13 @@ def fin_table(
     layout: Layout, damage: Damage, allocation: Allocation | None, full: Array, selected: str | None
 ) -> str:
     """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
-    limits = None if allocation is None else saturated(allocation)
+    limits, damaged = None if allocation is None else saturated(allocation), bool(damage.partly)
     rows = []
     for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (remark := damage_words(damage, fin.name)):
+        if damaged and not failed and (remark := damage_words(damage, fin.name)):
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
@@ -115,11 +121,10 @@ def fin_table(
 def _cells(
     part: Actuator, command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int
 ) -> str:
-    amplitude, frequency, direction = command
+    amplitude, frequency, direction = command.tolist()
     share = min(force / max(full, 1e-9), 1.0)
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
-    meter = html("<span class='meter'><i style='{}'></i></span>", bar)
-    at_limit = ["full" if one else "" for one in limits]
+    meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
     if not isinstance(part, Fin):
         along = force if part.TURNS else command[0]
         remark = f"{part.type}, {_degrees(command[part.HELD])}°" if part.TURNS else part.type
@@ -130,9 +135,11 @@ def _cells(
             f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
         )
         return html("{}{}<td>{}</td>", words, cell, meter)
-    bounded = "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td>"
-    first = html(bounded, at_limit[0], math.degrees(amplitude), at_limit[1], frequency)
-    return html("{}<td>{}</td><td>{:.2f}</td><td>{}</td>", first, _degrees(direction), force, meter)
+    first, second = np.where(limits, "full", "").tolist()
+    angles = (
+        f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td class='{second}'>{frequency:.2f}</td>"
+    )
+    return Markup(f"{angles}<td>{_degrees(direction)}</td><td>{force:.2f}</td><td>{meter}</td>")
 
 
 def _degrees(angle: float) -> str:

@@ -1,6 +1,7 @@
 """The modes of an answer as numbered rings that can be picked, and what led to them: effort against error."""
 
 import math
+from functools import cache
 
 import numpy as np
 from markupsafe import Markup
@@ -39,7 +40,8 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     error = np.array([named.mode.err_norm for named in modes.shown])
     effort = np.array([named.mode.effort for named in modes.shown])
     refined = np.stack([effort, _logarithm(error)], axis=1)
-    raw = np.array([[way.effort, _logarithm(way.err_norm)] for way in modes.ways]).swapaxes(1, 2)
+    raw = np.array([[way.effort, way.err_norm] for way in modes.ways]).swapaxes(1, 2)
+    raw[..., 1] = _logarithm(raw[..., 1])
     far = max(float(effort.max()), FAR * float(effort[len(effort) > 1 :].max()))
     near = raw[0, :, 0] <= far
     drawn = raw[:, near].clip(max=(far, np.inf))
@@ -83,6 +85,7 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
+@cache
 def _color(end: int, alpha: float) -> str:
     return css(DEAD if end < 0 else MODE_COLORS[end], alpha)
 
@@ -102,10 +105,11 @@ def _dots(kind: str, now: Array, ends: list[int], alpha: float, before: Array | 
 def _trails(places: Array, ends: list[int]) -> str:
     if len(places) == 1:
         return Markup()
-    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1).tolist()
+    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1)
+    way = "L".join(["%g %g"] * kept.shape[1])
     lines = [
-        f"<path d='M{'L'.join(f'{x:g} {y:g}' for x, y in way)}' stroke='{_color(end, 0.3)}'/>"
-        for way, end in zip(kept, ends, strict=True)
+        f"<path d='M{way % tuple(row)}' stroke='{_color(end, 0.3)}'/>"
+        for row, end in zip(kept.reshape(-1, 2 * kept.shape[1]).tolist(), ends, strict=True)
     ]
     return Markup(f"<g class='trails'>{''.join(lines)}</g>")
 

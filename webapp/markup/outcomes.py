@@ -4,8 +4,7 @@ from markupsafe import Markup
 
 from webapp.markup.words import fins_words, html, row, three_digits, unlearned_sentence
 from webapp.tasks.fitting import Fitted
-from webapp.tasks.moment import Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 
 

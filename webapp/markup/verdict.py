@@ -60,8 +60,8 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
     if verdict is Verdict.EXACT:
-        doubtful = allocation.expected_error > REACHED
-        within = f" by the model, expected within {allocation.expected_error:.2g}" if doubtful else ""
+        expected = allocation.expected_error
+        within = f" by the model, expected within {expected:.2g}" if expected > REACHED else ""
         return f"{verdict.value}{within}"
     if verdict is Verdict.APPROXIMATE:
         return f"{verdict.value}: the robot can, {allocation.method} does not"

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,14 +27,16 @@ def html(template: str, *values: object) -> str:
     """Markup, a text that is marked as such, with values in the place of `{}`, which may have formats, as
     `str.format` has them. Of several things in one, all stand one after the other."""
     # Much faster than the format of `Markup`, which looks at each value through a formatter of its own.
-    safe = [v if type(v) in SAFE else v.translate(ESCAPES) if type(v) is str else _joined(v) for v in values]
+    safe: list[Any] = []
+    for value in values:
+        if type(value) in SAFE:
+            safe.append(value)
+        elif isinstance(value, str) or not isinstance(value, Iterable):
+            safe.append(str(value).translate(ESCAPES))
+        else:
+            parts = value if isinstance(value, (list, tuple)) else tuple(value)
+            safe.append(html("{}" * len(parts), *parts))
     return str.__new__(Markup, template.format(*safe))
-
-
-def _joined(value: object) -> str:
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        return "".join([v if type(v) is Markup else html("{}", v) for v in value])
-    return str(value).translate(ESCAPES)
 
 
 def row(*cells: object) -> str:
@@ -172,11 +175,16 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
     """Which of the first two numbers of commands (n, 2) are at their limits, but for free angles."""
     layout, command = allocation.layout, allocation.command[:, :2]
-    turns = free_angles(layout.actuators)[:, :2]
+    turns = _turning(layout)[:, :2]
     with np.errstate(invalid="ignore"):
         high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
         low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
     return np.asarray((high | low) & ~turns)
+
+
+@lru_cache(maxsize=8)
+def _turning(layout: Layout) -> NDArray[np.bool_]:
+    return free_angles(layout.actuators)
 
 
 def parts_word(layout: Layout) -> str:

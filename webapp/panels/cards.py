@@ -1,28 +1,25 @@
 """The bar above all, cards beside and over the view, and what else is nothing but markup."""
 
 from collections.abc import Callable
+from functools import partial
 
-import numpy as np
 import viser
 from markupsafe import Markup
 
-from finlab.allocation.allocation import Allocation
 from finlab.allocation.methods import METHODS, method_class
 from finlab.analysis.score_card import quick_check
 from finlab.deploy.design_files import LAYOUTS
 from finlab.exchange import FOREIGN
 from finlab.layout import Layout
 from webapp.handles import add_html, press
-from webapp.markup.answer import wrench_bars
 from webapp.markup.score_card import check_card, warnings
-from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import html, marker, righting_sentences
 from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import TASKS
-from webapp.session.state import LEAST, Flow, State, least_of
+from webapp.session.state import LEAST, Flow, least_of
 from webapp.tasks.designs import KINDS
 
 SWITCHES = {
@@ -64,23 +61,6 @@ def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | No
     return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, remarks)
 
 
-def add_answer(page: Page) -> None:
-    """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
-    stands beside what was asked then."""
-    page.add_html(_bars)
-    page.add_html(_said)
-
-
-def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
-    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
-    return wrench_bars(demanded, None if shown is None else shown.wrench)
-
-
-def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
-    said = answer_sentence(state, shown, busy, proving or step is not None)
-    return html("<div class='fl'><div class='said'>{}</div></div>", said)
-
-
 def camera() -> str:
     """Sides to look from, and framing."""
     looks = (
@@ -119,7 +99,8 @@ def _button(label: str, word: str, primary: bool = False) -> str:
 def add_switches(page: Page) -> None:
     """All of them."""
     for key, (label, hint) in SWITCHES.items():
-        page.bind_display(page.gui.add_checkbox(label, False, hint=hint), key)
+        box = page.gui.add_checkbox(label, False, hint=hint)
+        page.bind(box, partial(page.session.set_display, key), lambda display, key=key: getattr(display, key))
 
 
 DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))

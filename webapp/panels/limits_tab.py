@@ -21,7 +21,8 @@ from webapp.tasks.jobs import Findings
 def add_reach(page: Page) -> None:
     """What is drawn, and the card."""
     about = "Forces that it can give without torque, or torques without force, as a body in the view."
-    page.bind_display(page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
+    sets = page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about)
+    page.bind(sets, partial(page.session.set_display, "drawn"), lambda display: display.drawn)
     page.add_html(_findings)
 
 

@@ -9,7 +9,6 @@ from webapp.panels.actuator_inspector import add_actuator
 from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
 from webapp.panels.cards import (
-    add_answer,
     add_answering,
     add_file,
     add_history,
@@ -27,7 +26,7 @@ from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
-from webapp.panels.wrench_tab import add_commands, add_target
+from webapp.panels.wrench_tab import add_answer, add_commands, add_target
 from webapp.session.looking import TASKS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS

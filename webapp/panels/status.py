@@ -1,6 +1,7 @@
 """What lies over the 3D view: the status line and the legend."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from markupsafe import Markup
@@ -16,9 +17,8 @@ from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.jobs import Findings
-from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.solver import Modes
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import ERROR, Moment, Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
 
 LONG = 24
@@ -63,6 +63,7 @@ def _written(
     return corner(state, legend(*scale, size, drawn), shown, busy, error, shown is best, in_reach, refined)
 
 
+@lru_cache(maxsize=32)
 def legend(newtons: float, torque: float, cut: bool, size: float, also: str) -> str:
     """Arrows, scales ([N] of 0.1 m where `size` is 1, [N m] of half a turn; `cut` where a ring would have to
     be longer than one), and rows of more."""
@@ -138,10 +139,8 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) 
     if refined:
         color, verdict = DEAD, refined
     pill = "pill long" if len(verdict) > LONG else "pill"
-    rest = ", ".join(
-        f"{axis} {value:+.2g} {unit}"
-        for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
-    ).replace("-", "−")
+    missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
+    rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace("-", "−")
     costs = []
     kinds = (("power", "watts", allocation.power, " W"), ("effort", "effort", allocation.effort, ""))
     for word, kind, value, unit in kinds:

@@ -20,8 +20,7 @@ from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
 from webapp.session.swim_plan import CHOICES, SCENARIOS, SPEEDS, SwimSettings
 from webapp.session.targets import axis_reach
-from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, SURGE, TIME, Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import DEPTH_ERROR, ERROR, FORCES, POWER, SURGE, TIME, Moment, Swimmer
 from webapp.theme import ASKED, DELIVERED, Rgb, fin_color
 
 
@@ -149,7 +148,7 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
     """Errors, power, surge asked and delivered, forces, and the monitor's doubts, as plots.
 
     Args:
-        record: rows (N, 9 + 2 n) of a swim, as `tasks/moment.py` describes them.
+        record: rows (N, 9 + 2 n) of a swim, as `tasks/swimmer.py` describes them.
         n: number of actuators.
         duration_s: of the whole swim [s].
     """

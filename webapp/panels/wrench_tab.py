@@ -5,16 +5,18 @@ from functools import partial
 import numpy as np
 import viser
 
+from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.handles import add_html, placed, press, put
-from webapp.markup.answer import fin_table
+from webapp.markup.answer import fin_table, wrench_bars
+from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
 
@@ -47,7 +49,19 @@ def add_target(page: Page) -> None:
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
-    sliders = [_add_slider(page, k) for k in range(6)]
+    sliders, ends = [_add_slider(page, k) for k in range(6)], [1.0] * 6
+
+    def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+        ends[:] = [slider_end(size) for size in axis_reach(able, failed, flow).tolist()]
+
+    def ask(target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+        """Show the target; first the ends: a value beyond them would not be shown."""
+        for value, slider, most in zip(target, sliders, ends, strict=True):
+            end = max(most, abs(value))
+            put(slider, max=end, min=-end, value=round(value, 4) + 0.0)
+
+    board.act(reach)
+    board.act(ask, *sliders)
 
     def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show what is within reach on the sliders."""
@@ -79,13 +93,9 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
-
-    def end(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> float:
-        return max(slider_end(float(axis_reach(able, failed, flow)[axis])), abs(target[axis]))
-
-    # First the ends: a value beyond them would not be shown.
-    page.board.show(slider, max=end, min=lambda able, failed, flow, target: -end(able, failed, flow, target))
-    return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
+    slider.precision = 4
+    page.on_change(slider, partial(session.set_target, axis))
+    return slider
 
 
 def _switch(axis: int, counts: bool) -> str:
@@ -120,19 +130,17 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
     if not np.isfinite(low):
         return ()
-    first, last = _short(low, width), _short(high, width)
+    fine, ends = 1 if width >= 2.0 else 2 if width >= 0.2 else 3, []
+    for value in (low, high):
+        digits = 0 if abs(value) >= 9.95 else fine
+        rounded = round(value, digits)
+        ends.append(f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0")
+    first, last = ends
     if high - low <= 1e-3:
         return ((round(low, 3), first),)
     if high - low < CLOSE * width:
         first, last = "", f"±{last}" if first == f"−{last}" else f"{first} … {last}"
     return (round(low, 3), first), (round(high, 3), last)
-
-
-def _short(value: float, width: float) -> str:
-    fine = next((k for k, size in ((1, 2.0), (2, 0.2)) if width >= size), 3)
-    digits = 0 if abs(value) >= 9.95 else fine
-    rounded = round(value, digits)
-    return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
 
 
 def _hint(axis: int, low: float, high: float, reach: float) -> str:
@@ -142,3 +150,20 @@ def _hint(axis: int, low: float, high: float, reach: float) -> str:
         return f"{word}: the other five are out of reach as they are; {at_most}."
     ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
     return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."
+
+
+def add_answer(page: Page) -> None:
+    """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
+    stands beside what was asked then."""
+    page.add_html(_bars)
+    page.add_html(_said)
+
+
+def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
+    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, None if shown is None else shown.wrench)
+
+
+def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
+    said = answer_sentence(state, shown, busy, proving or step is not None)
+    return html("<div class='fl'><div class='said'>{}</div></div>", said)

@@ -41,19 +41,16 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     if across is None:
         across = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
-    first = _cross(tangent, across)
+    # Cross products; `np.cross` takes ten times as long for few vectors.
+    left, right = tangent[:, [1, 2, 0]], tangent[:, [2, 0, 1]]
+    first = left * across[[2, 0, 1]] - right * across[[1, 2, 0]]
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = _cross(tangent, first)
+    second = left * first[:, [2, 0, 1]] - right * first[:, [1, 2, 0]]
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
     points = path[:, None] + radius[:, None, None] * ring
     vertices = np.concatenate([points.reshape(-1, 3), path[:1], path[-1:]])
     return Mesh(vertices, _tube_faces(len(path), sides))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products of vectors (..., 3); `np.cross` takes ten times as long for few of them."""
-    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 @cache
@@ -124,13 +121,16 @@ def shaft() -> Mesh:
     return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
 
 
+_FAN = triangles(*(np.arange(16) + shift for shift in (0, 1, 17, 1, 18, 17)))
+
+
 def sweep(amplitude: float) -> Mesh:
     """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
     angle = np.linspace(-amplitude, amplitude, 17)
     arc = np.stack([np.full(17, ROOT + SPAN / 2), -np.cos(angle), -np.sin(angle)], axis=-1)
-    rings = [arc * [1.0, radius, radius] for radius in (0.035, CHORD - 0.004)]
-    k = np.arange(16)
-    return Mesh(np.concatenate(rings), triangles(k, k + 1, k + 17, k + 1, k + 18, k + 17))
+    rings = np.array([0.035, CHORD - 0.004])[:, None, None] * arc
+    rings[..., 0] = arc[:, 0]
+    return Mesh(rings.reshape(-1, 3), _FAN)
 
 
 def foil(slenderness: float) -> Mesh:

@@ -17,15 +17,14 @@ from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
-from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, part_size, view_size
+from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.context import Context
 from webapp.tasks.jobs import Findings
-from webapp.tasks.moment import Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color
 from webapp.viser_internals import run_script
 
@@ -200,10 +199,8 @@ class RobotScene:
             demanded, delivered = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
         elif shown is not None:
             delivered, missing = shown.wrench, missing_part(shown)
-        hull = hull_of(drawn)
-        top = hull.center[2] + hull.half[2]
         lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
-        self._wrench.refresh(demanded, delivered, missing, top, *lengths, arrow_size(drawn))
+        self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
 
     def _show_sets(
         self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout

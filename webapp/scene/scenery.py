@@ -19,8 +19,7 @@ from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.context import Context
-from webapp.tasks.moment import PLACE, Moment
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import PLACE, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
 from webapp.viser_internals import run_script

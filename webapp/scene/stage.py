@@ -105,20 +105,22 @@ class Shape:
         self.node = scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=color, receive_shadow=False, **options
         )
-        self._made_from: tuple[Any, ...] | None = None
+        self._made_from: list[Any] | None = None
 
     def show(self, make: Callable[..., Mesh], *arguments: Any) -> None:
         """Give the node the shape `make(*arguments)`; always called with the same function."""
-        key = tuple(a.tobytes() if isinstance(a, np.ndarray) else a for a in arguments)
-        if key == self._made_from:
-            return
-        self.become(make(*arguments))
-        self._made_from = key
+        key = []
+        for argument in arguments:
+            key.append(argument.tobytes() if isinstance(argument, np.ndarray) else argument)
+        if key != self._made_from:
+            self.become(make(*arguments))
+            self._made_from = key
 
     def become(self, mesh: Mesh) -> None:
         """Give the node another shape."""
         self.node.vertices = mesh.vertices.astype(np.float32)
-        put(self.node, faces=mesh.faces.astype(np.uint32))
+        if not np.array_equal(self.node.faces, mesh.faces):
+            self.node.faces = mesh.faces.astype(np.uint32)
 
 
 def _bow(hull: Surface) -> Mesh:
@@ -145,6 +147,14 @@ def view_size(layout: Layout) -> float:
     return max(float(np.linalg.norm(hull.half)), float(reach)) / HALF_DIAGONAL
 
 
+@lru_cache(maxsize=8)
+def hull_top(layout: Layout) -> float:
+    """Height [m] of the highest point of the hull."""
+    hull = hull_of(layout)
+    return hull.center[2] + hull.half[2]
+
+
+@lru_cache(maxsize=8)
 def arrow_size(layout: Layout) -> float:
     """How much larger arrows and rings are than for a U-CAT: one of `STEPS`."""
     return float(STEPS[np.argmin(np.abs(np.log(STEPS / view_size(layout))))])

@@ -106,8 +106,9 @@ class WrenchNodes:
         """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is missing
         enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of rings [rad/(N m)]."""
         put(self._root, position=np.array([0.0, 0.0, top + HEIGHT * size]))
-        for node in self._nodes:
-            put(node, scale=size)
+        if self._nodes[0].scale != size:
+            for node in self._nodes:
+                put(node, scale=size)
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
         self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
@@ -134,6 +135,8 @@ class AttainableNodes:
     def refresh(self, findings: Findings | None, target: Array, size: float) -> None:
         """Show the sets of findings, nothing for None, as large as `size` says; the ball marks what `target`
         (6,) asks in them."""
+        if findings is None and not (self._now.node.visible or self._whole.node.visible):
+            return
         now, full = (None, None) if findings is None else (findings.now, findings.whole)
         scale = 1.0 if findings is None else set_scale(findings)
         for shape, body in ((self._now, now), (self._whole, full)):

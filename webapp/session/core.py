@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,8 @@ class Core:
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
-    @property
-    def state(self) -> State:
-        """The present state."""
-        return self.history.state
+    state: State = property(attrgetter("history.state"))  # type: ignore[assignment]
+    """The present state."""
 
     # The state and its undo.
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from finlab.analysis import Bounds
@@ -32,7 +33,7 @@ class Desk:
     folded: bool = False
     """Whether of the drawer only its tabs are seen."""
 
-    @property
+    @cached_property
     def opened(self) -> dict[str, str]:
         """What lies uppermost in the drawer of each task; nothing where a task has none."""
         return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(self.drawers)

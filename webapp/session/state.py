@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -56,13 +57,13 @@ class State:
     speed: float = 0.0
     """Speed ahead through the water [m/s]."""
 
-    @property
+    @cached_property
     def flow(self) -> Flow | None:
         """Velocity (6,) relative to the water where an actuator feels it and it is not at rest; else None."""
         felt = self.speed != 0.0 and plant_of(self.layout).feels_flow
         return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
-    @property
+    @cached_property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
         return self.damage.applied_to(self.layout)
@@ -75,7 +76,8 @@ class State:
     def asking(self, other: "State") -> "State":
         """The same robot with the question of another state: what is asked for, of whom, and how."""
         robot = {key: getattr(self, key) for key in ("layout", "damage", "links")}
-        return replace(other, **robot, method=method_for(self.layout, other.method))
+        fits = self.layout is other.layout
+        return replace(other, **robot, method=other.method if fits else method_for(self.layout, other.method))
 
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""

@@ -1,6 +1,5 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
-import math
 from functools import lru_cache
 
 import numpy as np
@@ -27,13 +26,17 @@ STEPS = (5, 5, 73)
 """Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg apart."""
 
 
+@lru_cache(maxsize=64)
 def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the others
     free, in a flow (6,) [m/s, rad/s]."""
     works = np.array([name not in failed for name in layout.names])
-    return np.asarray(_extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0))
+    reach: Array = _extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0)
+    reach.setflags(write=False)
+    return reach
 
 
+@lru_cache(maxsize=64)
 def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
     """Largest force (n,) of each actuator [N]."""
     return _extents(layout, flow)[0]
@@ -55,11 +58,3 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
 def slider_end(reach: float) -> float:
     """Where a slider ends: a quarter beyond the reach, to two digits; 1 where there is no reach at all."""
     return float(f"{1.25 * reach:.1e}") if reach > 1e-6 else 1.0
-
-
-def nice_limit(value: float) -> float:
-    """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
-    if value < 1e-6:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(1.2 * value))
-    return next((factor * power for factor in (1.0, 2.0, 5.0) if factor * power >= 1.2 * value), 10.0 * power)

@@ -2,13 +2,14 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import FinlabError
+from webapp.session import Session
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.solver import NO_MODES, Modes, Reply
@@ -21,28 +22,40 @@ HOLD = 5
 """Steps for which the end is seen before it begins anew."""
 
 
+class Seen(NamedTuple):
+    """What is seen of the newest answer, which may be older than the state."""
+
+    best: Allocation | None
+    """The answer itself."""
+    shown: Allocation | None
+    """What is on the robot: the answer with the chosen mode's command, or, while that is refined, with what
+    has become so far of the proposal that leads to it."""
+    in_reach: bool
+    busy: bool
+    error: str | None
+    """Why the present state has no answer."""
+    modes: Modes
+    searching: bool
+    proving: bool
+    """True until what is proved of the answer is known."""
+    mode: int
+    """Which of the modes is shown."""
+    step: int | None
+    """How many steps of their refinement the network's proposals have had; None for all."""
+
+
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
     def __init__(self, context: Context, known: Callable[[], None]) -> None:
         """Answer what the page's session asks; `known` is called when its candidates are."""
-        self._session = context.session
+        self._session: Session = context.session
         self._changed, self._known, self._notify = context.changed, known, context.notify
         self._noted: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
         self._solver, loop, worker = context.solver, context.loop, context.workers.answers
         self._answer = Newest(loop, worker, self._solver.reply, self._take)
         self._search = Newest(loop, worker, self._modes, self._take_modes, SEARCH_REST_S)
-
-    @property
-    def reply(self) -> Reply | None:
-        """The newest answer with all that belongs to it; it may be older than the state."""
-        return self._answer.findings
-
-    @property
-    def best(self) -> Allocation | None:
-        """The newest answer itself."""
-        return None if self.reply is None else self.reply.answer
 
     @property
     def modes(self) -> Modes:
@@ -60,26 +73,25 @@ class Answering:
         """True until all modes of the newest answer are known."""
         return self.busy or self._search.busy
 
-    @property
-    def proving(self) -> bool:
-        """True until what is proved of the newest answer is known."""
-        return self.busy or self._search.answered is None or self._search.answered[0] is not self.reply
-
-    @property
-    def error(self) -> str | None:
-        """Why the present state has no answer."""
-        return None if self.busy else self._answer.error
-
-    @property
-    def shown(self) -> Allocation | None:
-        """What is on the robot: the answer with the chosen mode's command, or, while that is refined, with
-        what has become so far of the proposal that leads to it."""
-        best, mode, step, modes = self.best, self._session.mode, self._session.step, self.modes
-        if best is None or self.searching:
-            return best
-        if step is not None and step < modes.steps and (proposal := modes.proposal_of(mode)) is not None:
-            return self._variant(best, modes.ways[step].command[proposal])
-        return self._variant(best, modes.shown[mode].mode.command) if 0 < mode < len(modes.shown) else best
+    def seen(self) -> Seen:
+        """What is seen of the newest answer now."""
+        session, search, reply = self._session, self._search, self._answer.findings
+        busy, modes, mode = self.busy, search.findings or NO_MODES, session.mode
+        searching = busy or search.busy
+        best = shown = None if reply is None else reply.answer
+        steps = 0 if searching else modes.steps
+        step = session.step if steps else None
+        if best is not None and not searching:
+            proposal = modes.proposal_of(mode) if step is not None and step < steps else None
+            if step is not None and proposal is not None:
+                shown = self._variant(best, modes.ways[step].command[proposal])
+            elif 0 < mode < len(modes.shown):
+                shown = self._variant(best, modes.shown[mode].mode.command)
+        return Seen(
+            *(best, shown, reply is not None and reply.in_reach, busy, None if busy else self._answer.error),
+            *(modes, searching, busy or search.answered is None or search.answered[0] is not reply),
+            *(min(mode, max(len(modes.shown) - 1, 0)), step),
+        )
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
@@ -96,7 +108,7 @@ class Answering:
 
     def _look(self, at_once: bool) -> None:
         """Prove the newest answer, and search for its modes once these can be seen."""
-        reply, session = self.reply, self._session
+        reply, session = self._answer.findings, self._session
         if reply is not None and self._search.question != (reply, True):
             seen = session.drawer == "Candidates" or session.mode > 0
             self._search.ask((reply, seen), at_once)
@@ -112,7 +124,7 @@ class Answering:
 
     def _take(self) -> None:
         error = self._answer.error
-        if self.reply is not None:
+        if self._answer.findings is not None:
             self._look(at_once=False)
         else:
             self._search.forget()

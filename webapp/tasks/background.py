@@ -81,7 +81,8 @@ class Worker:
     def _run(self) -> None:
         while True:
             with self._wake:
-                self._wake.wait_for(lambda: self._jobs or self._stopped)
+                while not (self._jobs or self._stopped):
+                    self._wake.wait()
                 if self._stopped:
                     return
                 job, failed = self._jobs.pop(next(iter(self._jobs)))

@@ -170,8 +170,9 @@ class Jobs:
             self._robot = robot
             for task in (self.answering, self.analyst, self.ranging):
                 task.forget()
-        self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn, state.flow))
-        self.ranging.ask(State(state.able, Damage(state.failed), target=state.target, speed=state.speed))
+        able, drawn = state.able, session.display.drawn
+        self.analyst.ask(Question(able, state.failed, session.saved, drawn, state.flow))
+        self.ranging.ask(State(able, Damage(state.failed), target=state.target, speed=state.speed))
         self.answering.ask()
 
     def _beside(self) -> None:

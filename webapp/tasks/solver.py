@@ -12,6 +12,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
+from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -67,13 +68,12 @@ def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple
     a network proposed for it, and its refinement."""
     layout = answer.layout
     modes = find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
-    shown, last = named_modes(modes, badge), ways[-1]
-    signatures = map(mode_signature, last.command, force_sizes(layout, last.command))
-    ends = tuple(
-        next((k for k, named in enumerate(shown) if same_signature(named.mode.signature, end)), -1)
-        for end in signatures
-    )
-    return Modes(shown, len(modes), ways, ends)
+    shown, last = named_modes(modes, badge), ways[-1].command
+    signatures = mode_signature(last, force_sizes(layout, last))
+    ends = np.full(len(last), -1)
+    for k, named in reversed(list(enumerate(shown))):
+        ends[same_signature(named.mode.signature, signatures)] = k
+    return Modes(shown, len(modes), ways, tuple(ends.tolist()))
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
@@ -104,6 +104,7 @@ KEPT = 24
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
+POLICIES = {kind: Policy(kind) for kind in KINDS}
 RUNS = "runs"
 """Folder in the one where the app was started, whose folders are looked at."""
 
@@ -188,7 +189,9 @@ class Solver:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
         milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
         answer, state = reply.answer, reply.state
-        _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
+        _ = answer.bound  # to prove what is least takes longer than to find it
+        if answer.unknown_fins or not answer.reachable:
+            _ = answer.notes  # the page shows them
         if not seen:
             return NO_MODES
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
@@ -209,7 +212,7 @@ class Solver:
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
-            state.target, damage=state.damage, policy=state.policy, flow=state.flow, seed=0
+            state.target, damage=state.damage, policy=POLICIES[state.policy], flow=state.flow, seed=0
         )
 
 

@@ -12,8 +12,7 @@ from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
-from webapp.tasks.moment import Moment
-from webapp.tasks.swimmer import Swimmer, closed_loop
+from webapp.tasks.swimmer import Moment, Swimmer, closed_loop
 
 LAG_S = 0.25
 """What the swim may be behind the clock [s]; what is more is dropped, so that nothing piles up."""
@@ -43,14 +42,11 @@ class Swimming:
         self._stretch = Newest(loop, worker, self._advance, self._take)
         self.swimmer: Swimmer | None = None
         """The robot; None while it is being made."""
+        self.active = False
+        """Whether there is a swim, running or not."""
         self.running = False
         self.pace = Pace()
         self._acts: deque[Callable[[Swimmer], None]] = deque()
-
-    @property
-    def active(self) -> bool:
-        """Whether there is a swim, running or not."""
-        return self._start.question is not None
 
     @property
     def busy(self) -> bool:
@@ -70,7 +66,7 @@ class Swimming:
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
         self.stop()
-        self.running = True
+        self.running = self.active = True
         self._start.ask(plan)
 
     def _made(self, plan: Plan) -> Swimmer:
@@ -92,7 +88,7 @@ class Swimming:
         """Give up and forget."""
         self._start.forget()
         self._stretch.forget()
-        self.swimmer, self.running = None, False
+        self.swimmer, self.running, self.active = None, False, False
         self._acts.clear()
         self.pace.start_anew()
 

@@ -5,7 +5,7 @@ from copy import copy
 import numpy as np
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import with_square
+from finlab.actuators.response import Group, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
@@ -25,6 +25,13 @@ class Compiled:
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
+        self._alike: list[tuple[Group, Group]] = []
+        for places, group in self.groups:
+            tables = [(r.table, r.reverse) for r in group.responses if isinstance(r, Plane)]
+            same = all(a is b for pair in tables for a, b in zip(pair, tables[0], strict=True))
+            if same and len(tables) == len(group.responses) > 1:
+                first = slice(places[0], places[0] + 1)
+                self._alike += [(group, groups_of(layout.actuators[first], plant.effectiveness[first])[0][1])]
         self._prepare()
 
     def _prepare(self) -> None:
@@ -62,6 +69,14 @@ class Compiled:
             command[:, places] = group.commands(own[:, places], before)
         return command
 
+    def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
+        """See `Group.radial_worth`, at prices (m, N): where all actuators are alike, one answers for all."""
+        for alike, one in self._alike:
+            if alike is group:
+                worth = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))
+                return None if worth is None else worth.reshape(ahead.shape).T
+        return group.radial_worth(ahead.T, back.T)
+
     def within(self, lower: Array, upper: Array) -> Sets:
         """What commands between limits (n, 3) can give."""
         reach = np.empty((self.count, 4))
@@ -88,7 +103,7 @@ def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
     ahead, back, worth = along
     for places, group in compiled.groups:
         own = group.worth(price)
-        own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
+        own = compiled.radial_worth(group, ahead[places], back[places]) if own is None else own
         if own is not None:
             worth[places] = own.T
     paid = price * (wrench - compiled.beside)

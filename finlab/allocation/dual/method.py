@@ -195,7 +195,7 @@ class Dual(Method):
             "it out of the layout's axes, or ask nan of it"
         }
 
-    @property
+    @cached_property
     def undriven(self) -> tuple[str, ...]:
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return axes_in(size <= NOTHING * size.max())
@@ -204,12 +204,12 @@ class Dual(Method):
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
         wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
         bound = proved_power(self.compiled, wrench, price)
-        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, value), bound)
+        bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
         power = self.plant.power(command).sum(axis=-1)
         slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
-    @property
+    @cached_property
     def _unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: with what doubt
         costs, or of the smooth shape that stands for a measured table."""
@@ -350,7 +350,9 @@ class Dual(Method):
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
-        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        return self._missing(wrench_of_forces(self.plant.force(command), self.plant.effectiveness), aim)
+
+    def _missing(self, wrench: Array, aim: Array) -> Array:
         missing = (wrench - aim) / self.scale
         return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
 
