@@ -17,6 +17,7 @@ from finlab.actuators.fin.fin_model import FinModelSpec, Limits
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.actuators.thruster import Thruster
 from finlab.arrays import Array
+from finlab.axes import wrapped
 from finlab.errors import DataError
 from finlab.layout.layout import Layout
 
@@ -122,6 +123,28 @@ FAMILIES: dict[str, Numbers] = {
     },
 }
 """Fin model -> its numbers; what is not named stays as it is by default."""
+
+FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
+"""Number of fins to learn from -> how often it is drawn; with 2 or 3 there is next to nothing to choose."""
+WIDE_BOX = (1.5 * TRAINING_BOX[0], 1.5 * TRAINING_BOX[1], 2.0 * TRAINING_BOX[2])
+"""Largest |x|, |y|, |z| of a fin [m]: as far as split `ood` goes."""
+WIDE: dict[str, Numbers] = {
+    "drag": {"area": (0.003, 0.06), "lever": (0.04, 0.2)},
+    "lighthill": {"length": (0.08, 0.4), "width": (0.04, 0.2)},
+    "soft": {
+        "e": (0.0, 0.3),
+        "k": (0.5, 12.0),
+        "p": (0.7, 2.5),
+        "x0": (0.4, 2.0),
+        "q": (2.0, 8.0),
+        "phi_e": (-math.pi, math.pi),
+        "d": (-0.3, 0.3),
+    },
+}
+"""Families of fins to learn from: wider than any fin that is evaluated."""
+
+FinKind = tuple[FinModelSpec, Limits]
+"""A fin, wherever it is mounted."""
 
 Draw = Callable[[np.random.Generator, str, float], Actuator]
 """From a generator, a name and the robot's size to an actuator."""
@@ -230,3 +253,61 @@ def _law(rng: np.random.Generator) -> PowerLaw:
     exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
     forward = log_uniform(rng, 0.3, 3.0) * 20.0 ** (1.5 - exponent)
     return PowerLaw(forward, forward * rng.uniform(0.8, 3.0), exponent)
+
+
+def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], list[FinKind]]:
+    """`count` fins with nominal limits, and as many with limits drawn as in split `limits`; half of the soft
+    ones push alike in all directions. Few, since compiling one takes as long as many answers."""
+    models = [random_fin_model(rng, None, WIDE) for _ in range(2 * count)]
+    for k, model in enumerate(models):
+        if model.type == "soft" and rng.random() < 0.5:
+            models[k] = FinModelSpec("soft", tuple({**dict(model.parameters), "e": 0.0}.items()))
+    varied = [random_layout(rng, n_fins=1, limits="varied").fins[0].limits for _ in range(count)]
+    nominal = [(model, Limits()) for model in models[:count]]
+    return nominal, list(zip(models[count:], varied, strict=True))
+
+
+def random_fin_robot(rng: np.random.Generator, kinds: tuple[list[FinKind], list[FinKind]], n: int) -> Layout:
+    """Draw a robot of n fins to learn from; none is one that is evaluated.
+
+    Fins are of one kind or each of its own, half of the robots have limits of their own, and a third are
+    symmetric, where fins are equals and only chance can tell them apart.
+    """
+    symmetric = rng.random() < 1 / 3
+    position, angle = _symmetric_places(rng, n) if symmetric else _places(rng, n)
+    source = kinds[not symmetric and rng.random() < 0.5]
+    one_kind = symmetric or rng.random() < 0.5
+    chosen = np.full(n, rng.integers(len(source))) if one_kind else rng.integers(len(source), size=n)
+    fins = []
+    for i, (place, turn, (model, limits)) in enumerate(
+        zip(position, angle, (source[k] for k in chosen), strict=True)
+    ):
+        fins.append(Fin(f"fin_{i + 1}", tuple(place.tolist()), float(turn), limits, model=model))
+    return Layout("random", tuple(fins))
+
+
+def _places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Positions (n, 3) [m] and angles (n,) [rad] of a robot without symmetry, some of them flat."""
+    box = np.array(TRAINING_BOX if rng.random() < 0.6 else WIDE_BOX)
+    if rng.random() < 0.3:
+        box[2] = 0.0
+    return rng.uniform(-1.0, 1.0, (n, 3)) * box, rng.uniform(-math.pi, math.pi, n)
+
+
+def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """The same with mirrored pairs, stacked pairs, or fins evenly around the hull."""
+    kind = rng.integers(3)
+    if kind == 0:  # evenly around
+        azimuth = 2.0 * math.pi * np.arange(n) / n + rng.uniform(0.0, 2.0 * math.pi)
+        radius = rng.uniform(0.08, 0.35)
+        position = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros(n)], axis=-1)
+        return position, np.asarray(wrapped(azimuth + rng.choice([0.0, rng.uniform(-math.pi, math.pi)])))
+    half = n // 2
+    one, turn = _places(rng, n - half)
+    if kind == 1:  # port and starboard: the mirror image of a shaft's azimuth is its negative
+        other, turned = one[:half] * np.array([1.0, -1.0, 1.0]), -turn[:half]
+    else:  # one above the other
+        one[:half, 2] = rng.uniform(0.0, 0.1)
+        other, turned = one[:half] * np.array([1.0, 1.0, -1.0]), turn[:half]
+    order = rng.permutation(n)
+    return np.concatenate([one, other])[order], np.asarray(wrapped(np.concatenate([turn, turned])))[order]

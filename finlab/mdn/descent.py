@@ -23,16 +23,7 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array, solve
 from finlab.axes import wrapped
-from finlab.mdn.effort_fins import (
-    AMPLITUDE,
-    EFFORT,
-    FREQUENCY,
-    LEAST,
-    MOBILITY,
-    STIFFNESS,
-    EffortFins,
-    Projected,
-)
+from finlab.mdn import effort_fins
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
@@ -47,7 +38,7 @@ class EffortProblem(NamedTuple):
     """Normalized wrench per newton (2n, 6), of each fin's horizontal and vertical force in turn."""
     products: Array
     """What a, real b and imaginary b of each fin's M add to B M B^T (3n, 36), slightly regularized."""
-    fins: EffortFins
+    fins: effort_fins.EffortFins
     """What the fins can do, and with what effort."""
     direction_cost: Array
     """Effort per squared zero direction (n,) [1/rad^2]."""
@@ -56,7 +47,7 @@ class EffortProblem(NamedTuple):
 
 
 def effort_problem(
-    effectiveness: Array, fins: EffortFins, direction_cost: Array, idle_direction: Array
+    effectiveness: Array, fins: effort_fins.EffortFins, direction_cost: Array, idle_direction: Array
 ) -> EffortProblem:
     """A problem from normalized wrenches (n, 2, 6) per newton of each fin's planar force."""
     x, z = effectiveness[:, 0], effectiveness[:, 1]
@@ -70,7 +61,9 @@ def effort_problem(
     )
 
 
-def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) -> Iterator[Projected]:
+def descend(
+    problem: EffortProblem, target: Array, force: AnyArray, steps: int
+) -> Iterator[effort_fins.Projected]:
     """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give of them,
     then what each of `steps` problems makes of it."""
     fins = problem.fins
@@ -82,7 +75,7 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
         shift, a, b = _respond(problem, reached, cut)
         missing = target - wrench(problem, shift)
         matrix = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
-        matrix[:, ::7] += LEAST  # the diagonal
+        matrix[:, ::7] += effort_fins.LEAST  # the diagonal
         multiplier = solve(matrix.reshape(-1, 6, 6), missing[..., None])[..., 0]
         pull = (multiplier @ problem.effectiveness.T).view(complex)
         answer = shift + a * pull + b * pull.conj()
@@ -90,7 +83,9 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
             answer = 0.5 * (answer + before)
         before = answer
         reached = fins.project(answer)
-        cut = np.minimum(cut * fins.largest * reached.gauge / np.maximum(reached.wanted, LEAST), 1.0)
+        cut = np.minimum(
+            cut * fins.largest * reached.gauge / np.maximum(reached.wanted, effort_fins.LEAST), 1.0
+        )
         yield reached
 
 
@@ -99,25 +94,27 @@ def wrench(problem: EffortProblem, force: AnyArray) -> Array:
     return np.ascontiguousarray(force).view(float) @ problem.effectiveness
 
 
-def realize(problem: EffortProblem, reached: Projected) -> tuple[Array, Array]:
+def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
     row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
     turn = wrapped(direction - problem.fins.deflection(direction))
-    command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], turn], axis=-1)
-    effort = row[..., EFFORT] + problem.direction_cost * turn * turn
+    command = np.stack([row[..., effort_fins.AMPLITUDE], row[..., effort_fins.FREQUENCY], turn], axis=-1)
+    effort = row[..., effort_fins.EFFORT] + problem.direction_cost * turn * turn
     return command, effort.sum(-1)
 
 
-def _respond(problem: EffortProblem, reached: Projected, cut: Array) -> tuple[AnyArray, Array, AnyArray]:
+def _respond(
+    problem: EffortProblem, reached: effort_fins.Projected, cut: Array
+) -> tuple[AnyArray, Array, AnyArray]:
     """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by the
     quadratics that touch the efforts at the present forces."""
     row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
     # The same command gives less in weaker directions, so a newton more costs more there.
-    across = np.exp(row[..., MOBILITY]) * reached.gauge**2 * cut
-    softness = 1.0 / row[..., STIFFNESS]
+    across = np.exp(row[..., effort_fins.MOBILITY]) * reached.gauge**2 * cut
+    softness = 1.0 / row[..., effort_fins.STIFFNESS]
     along = across * softness
     turn = wrapped(direction - problem.fins.deflection(direction))
-    size = np.maximum(reached.size, LEAST)
+    size = np.maximum(reached.size, effort_fins.LEAST)
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
     pull = 2.0 * problem.direction_cost * across / size
     held = 1.0 / (1.0 + pull / size)

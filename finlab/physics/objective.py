@@ -118,9 +118,7 @@ def yardstick(layout: Layout) -> Array:
     about the origin, each actuator alone. A robot that gives nothing has F = 1 N. Raises DataError: a fin's
     force table cannot be read."""
     plant = Plant(layout)
-    share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
-    command = plant.lower + share.reshape(-1, 1, 3) * plant.width
-    wrench = np.einsum("kni,niw->knw", plant.force(command), plant.effectiveness)
+    wrench = np.einsum("kni,niw->knw", plant.force(plant.grid(STEPS)), plant.effectiveness)
     force = float(np.sqrt((wrench[..., :3] ** 2).sum(-1).max(0).sum())) or 1.0
     torque = float(np.sqrt((wrench[..., 3:] ** 2).sum(-1).max(0).sum()))
     scale = np.repeat([force, max(torque, LEAST_LEVER * force)], 3)

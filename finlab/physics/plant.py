@@ -4,6 +4,7 @@ It judges every allocation method, and the model-based methods optimize over it.
 velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
 """
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import astuple
 from functools import cached_property, lru_cache
@@ -185,6 +186,11 @@ class Plant:
             return command
         rest = np.clip(0.0, self.lower, self.upper)
         return np.where(held(command, self._dead_band) == command, command, rest)
+
+    def grid(self, counts: Sequence[int]) -> Array:
+        """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each number."""
+        share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in counts), indexing="ij"), -1)
+        return np.asarray(self.lower + share.reshape(-1, 1, 3) * self.width)
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
         """Returns uniform commands (*size, n, 3) within the limits."""

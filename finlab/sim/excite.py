@@ -158,12 +158,8 @@ class Exciting(Method):
         if layout.n_fins:
             self._plant = plant_of(layout.fins_alone)
             self._largest = self._most[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
-            shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
-            grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)
-            lower, upper = self._plant.lower[:, :2], self._plant.upper[:, :2]
-            directions = np.zeros((len(grid), len(lower), 1))
-            self._grid = np.concatenate([lower + grid * (upper - lower), directions], axis=-1)
-            self._amplitude = upper[:, 0]
+            self._grid = self._plant.grid((13, 41, 1))
+            self._amplitude = self._plant.upper[:, 0]
 
     def solve(self, targets: Array, **asked: Any) -> Solution:
         """See `Method`; each target is a tick of the controller."""

@@ -46,10 +46,7 @@ def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
 def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
     """Largest force (n,) of each actuator, and what it gives at most along each axis either way (2, n, 6)."""
     plant = plant_of(layout)
-    share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
-    force = plant.force(
-        plant.lower + share.reshape(-1, 1, 3) * plant.width, flow=None if flow is None else np.array(flow)
-    )
+    force = plant.force(plant.grid(STEPS), flow=None if flow is None else np.array(flow))
     wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
     both = np.stack([wrench.max(axis=0), -wrench.min(axis=0)])
     return np.linalg.norm(force, axis=-1).max(axis=0), np.maximum(both, 0.0)

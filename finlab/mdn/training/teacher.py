@@ -11,10 +11,10 @@ from torch import Tensor
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
+from finlab.layout.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
 from finlab.mdn.answers import LAST, EffortRobot, distinct, effort_robot
 from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.features import VECTORS, features
-from finlab.mdn.training.random_robots import FIN_COUNTS, random_kinds, random_robot, random_targets
 from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant
 from finlab.whole_file import write_whole
@@ -114,7 +114,7 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     groups: dict[int, list[dict[str, Array]]] = {}
     for _ in range(settings.robots):
         n = int(rng.choice(counts, p=often / often.sum()))
-        layout = random_robot(rng, kinds, n)
+        layout = random_fin_robot(rng, kinds, n)
         robot = effort_robot(Plant(layout), yardstick(layout))
         groups.setdefault(n, []).append(_answers(rng, robot, settings))
     arrays = {
@@ -208,3 +208,19 @@ class Answers:
 def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:
     """Complex values (B, ...), conjugate where `rows` (B,) is true."""
     return np.where(rows.reshape(-1, *(1,) * (values.ndim - 1)), values.conj(), values)
+
+
+def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> Array:
+    """Normalized targets (count, 6): half are wrenches of uniform commands, a quarter of commands where some
+    fins rest, a quarter one to three axes together, as far as no fin gives more than its largest force."""
+    plant, quarter = robot.plant, count // 4
+    command = plant.sample(rng, (count - quarter,))
+    rests = rng.random((quarter, plant.n_fins)) > rng.uniform(0.3, 1.0, (quarter, 1))
+    command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])
+    full = robot.forces.effectiveness * np.repeat(robot.view.largest, 2)[:, None]
+    axes = rng.random((quarter, 6)).argsort(axis=1) < rng.integers(1, 4, (quarter, 1))
+    wanted = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
+    share = wanted @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
+    largest = np.hypot(share[:, 0::2], share[:, 1::2]).max(1, keepdims=True)
+    share *= rng.uniform(0.03, 0.9, (quarter, 1)) / np.maximum(largest, 1e-9)
+    return np.concatenate([robot.commands.wrench(command), share @ full])

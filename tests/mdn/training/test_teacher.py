@@ -4,10 +4,18 @@ import numpy as np
 import pytest
 
 from finlab.layout import Layout
+from finlab.layout.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
 from finlab.mdn.answers import EffortRobot, effort_robot
 from finlab.mdn.descent import realize, wrench
-from finlab.mdn.training.random_robots import FIN_COUNTS, NUMBERS, random_kinds, random_robot, random_targets
-from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
+from finlab.mdn.training.teacher import (
+    APART,
+    DEAREST,
+    Ways,
+    random_targets,
+    root_share,
+    shares_of_ways,
+    ways_to_deliver,
+)
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 
@@ -16,7 +24,7 @@ STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 def told() -> tuple[EffortRobot, np.ndarray, Ways]:
     rng = np.random.default_rng(6)
-    layout = random_robot(rng, random_kinds(rng, 2), 6)
+    layout = random_fin_robot(rng, random_kinds(rng, 2), 6)
     robot = effort_robot(Plant(layout), STD)
     target = random_targets(rng, robot, 12)
     return robot, target, ways_to_deliver(rng, robot.forces, target)
@@ -70,14 +78,14 @@ def test_roots_of_shares_keep_the_direction() -> None:
 def robots() -> list[Layout]:
     rng = np.random.default_rng(1)
     kinds = random_kinds(rng, 3)
-    return [random_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]
+    return [random_fin_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]
 
 
 def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
     assert {robot.n_fins for robot in robots} == set(range(2, 13))
     one_kind = [len({(fin.model, fin.limits) for fin in robot.fins}) == 1 for robot in robots]
     assert any(one_kind) and not all(one_kind)
-    assert {fin.model.type for robot in robots for fin in robot.fins} == set(NUMBERS)
+    assert {fin.model.type for robot in robots for fin in robot.fins} == set(WIDE)
     # Some robots have a fin whose mirror image, or whose twin above it, is a fin as well.
     symmetric = 0
     for robot in robots:
