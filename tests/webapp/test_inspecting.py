@@ -20,7 +20,7 @@ from webapp.markup.verdict import verdict_sentence
 from webapp.panels.actuator_list import actuator_list
 from webapp.panels.files_tab import command_line
 from webapp.session import Session, files
-from webapp.session.actuator_edits import modelled
+from webapp.session.layout_edits import modelled
 from webapp.session.state import LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.solver import Solver

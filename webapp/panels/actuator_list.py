@@ -13,7 +13,7 @@ from webapp.handles import add_html, placed, press
 from webapp.markup.answer import swatch
 from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.session.actuator_edits import partner
+from webapp.session.layout_edits import partner
 from webapp.session.state import State
 
 HULL = Markup(

@@ -12,9 +12,9 @@ from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
-from webapp.session import actuator_edits, layout_edits
-from webapp.session.actuator_edits import followed, partner, unlinked
+from webapp.session import layout_edits
 from webapp.session.core import Core
+from webapp.session.layout_edits import followed, partner, unlinked
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
 from webapp.session.state import method_for
@@ -194,11 +194,11 @@ class Session(Core):
     def set_value(self, key: str, value: Any) -> None:
         """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""
         what = f"{key_words(key)} of"
-        self._change(what, lambda part: actuator_edits.with_value(part, key, value))
+        self._change(what, lambda part: part.with_value(key, value))
 
     def choose_model(self, kind: str) -> None:
         """Another kind of model for all selected actuators that may have it."""
-        self._change(f"Model {kind} for", lambda part: actuator_edits.modelled(part, kind))
+        self._change(f"Model {kind} for", lambda part: layout_edits.modelled(part, kind))
 
     def set_model(self, names: Sequence[str], **fields: Any) -> None:
         """Another model for some actuators, and other fields that came with it."""

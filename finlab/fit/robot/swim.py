@@ -22,7 +22,7 @@ from finlab.errors import DataError
 from finlab.files.csv_table import TURNS
 from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.fit.columns import MAX_BYTES, read_columns
-from finlab.layout import Actuator, Fin, Layout
+from finlab.layout import Fin, Layout
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion
 from finlab.vehicle.vehicle import body_rates, body_velocity
@@ -151,7 +151,7 @@ def _check_duration(seconds: float, path: Path) -> None:
 
 
 def _csv(path: Path, layout: Layout) -> Swim:
-    commands = [f"{one.name}.{part}" for one in layout.actuators for part in _columns(one)]
+    commands = [f"{one.name}.{part}" for one in layout.actuators for part in dict(one.NUMBERS)]
     names = {name: name for name in ("t", *CHANNELS, *commands)}
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
     expected = f"t, what was measured, and what was commanded, {', '.join(commands)}"
@@ -183,16 +183,11 @@ def _check_time(time: Array, places: Sequence[str]) -> None:
         )
 
 
-def _columns(part: Actuator) -> list[str]:
-    """What is commanded of an actuator, by name."""
-    return [name for name, _ in part.NUMBERS]
-
-
 def _rows(values: Array, layout: Layout) -> Array:
     """Commands (n, actuators, 3) of values (n, columns); what an actuator does not have is 0."""
     command, begin = np.zeros((len(values), layout.n, 3)), 0
     for i, part in enumerate(layout.actuators):
-        own = values[:, begin : begin + len(_columns(part))]
+        own = values[:, begin : begin + len(dict(part.NUMBERS))]
         command[:, i, : own.shape[1]] = own
         command[np.isnan(own).all(axis=1), i] = np.nan
         begin += own.shape[1]
@@ -202,12 +197,12 @@ def _rows(values: Array, layout: Layout) -> Array:
 def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
     known = np.isfinite(command)
     for k, i in np.argwhere(known.any(axis=2) & ~known.all(axis=2)):
-        columns = ", ".join(f"{layout.names[i]}.{part}" for part in _columns(layout.actuators[i]))
+        columns = ", ".join(f"{layout.names[i]}.{part}" for part in dict(layout.actuators[i].NUMBERS))
         raise DataError(
             f"{places[k]}: of {columns} some are empty; fill all, or none for an actuator that was lost"
         )
     for i, one in enumerate(layout.actuators):
-        for part, name in enumerate(_columns(one)):
+        for part, name in enumerate(dict(one.NUMBERS)):
             if name not in UNIT_OF:
                 continue
             low, high = one.lower[part], one.upper[part]
