@@ -97,7 +97,6 @@ def test_a_step_makes_few_calls_in_few_files(
         assert (tab.view.jobs.answering.modes.steps > 0) == (drawer == "Candidates")
         steps.append((count.calls, len(count.files), written[0]))
     print(f"{drawer}: {steps[2:]} own calls, files and times that the page is written in a step")
-    calls, files, times = min(
-        steps[2:]
-    )  # where the machine is busy, an answer may come later than the page waits
+    calls, files = max(step[0] for step in steps[2:]), max(step[1] for step in steps[2:])
+    times = min(step[2] for step in steps[2:])  # on a busy machine an answer may be later than the page waits
     assert 100 < calls <= most and files <= MOST_FILES and 1 < times <= MOST_WRITTEN
