@@ -66,7 +66,7 @@ def tab(count: Count) -> Iterator[Tab]:
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
-@pytest.mark.parametrize(("drawer", "most"), [("Candidates", 4000), ("Comparison", 900), ("folded", 900)])
+@pytest.mark.parametrize(("drawer", "most"), [("Candidates", 4000), ("Comparison", 800), ("folded", 800)])
 def test_a_step_makes_few_calls_in_few_files(
     tab: Tab, count: Count, drawer: str, most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -258,17 +258,17 @@ class _Box:
     def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
         """Gradient (K, 2) and Hessian (K, 2, 2) of what commands are worth, by amplitude and frequency."""
         at = np.where(beat + probe > self.upper[:2], beat - probe, beat)
-        slopes = [self._slope(price, at + shift) for shift in (0.0 * probe, probe * [1, 0], probe * [0, 1])]
+        slope, *near = self._slope(price, np.stack([beat, at, at + probe * [1, 0], at + probe * [0, 1]]))
         with np.errstate(invalid="ignore", divide="ignore"):
-            curve = np.stack([slopes[1] - slopes[0], slopes[2] - slopes[0]], axis=-1) / probe
-        return self._slope(price, beat), 0.5 * (curve + curve.swapaxes(-1, -2))
+            curve = np.stack([near[1] - near[0], near[2] - near[0]], axis=-1) / probe
+        return slope, 0.5 * (curve + curve.swapaxes(-1, -2))
 
     def _slope(self, price: Array, beat: Array) -> Array:
         command = self.command(beat)
         force, jacobian = self.law.force_and_jacobian(command)
-        size = np.maximum(np.linalg.norm(force[:, 1:], axis=-1), 1e-300)
-        along = np.einsum("kci,ki->kc", jacobian[:, :2, 1:], force[:, 1:]) / size[:, None]
-        return np.asarray(price[:, None] * along - self.law.power_gradient(command)[:, :2])
+        size = np.maximum(np.linalg.norm(force[..., 1:], axis=-1), 1e-300)
+        along = np.einsum("...ci,...i->...c", jacobian[..., :2, 1:], force[..., 1:]) / size[..., None]
+        return np.asarray(price[:, None] * along - self.law.power_gradient(command)[..., :2])
 
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
