@@ -18,7 +18,6 @@ from finlab.allocation.method import Method
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import (
-    WHOLE,
     Axes,
     Usable,
     axes_of,
@@ -37,7 +36,7 @@ from finlab.arrays import Array
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import WHOLE, Damage
 from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import yardstick
@@ -357,7 +356,7 @@ class Allocator:
 
     def _ready(self, damage: Damage, axes: Axes | None = None) -> Ready:
         """The robot in a state, asked for some axes, prepared now or kept from an earlier question."""
-        if axes is None and damage is WHOLE:
+        if axes is None and damage == WHOLE:
             return self._whole
         key = damage, axes
         ready = self._prepared.pop(key, None) or self._make(damage, axes)

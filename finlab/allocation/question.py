@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import WHOLE, Damage
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
@@ -23,9 +23,6 @@ MAX_FLOW = 100.0
 
 Axes = tuple[Axis, ...]
 """Axes that a question asks for."""
-
-
-WHOLE = Damage()
 
 
 class Usable(NamedTuple):

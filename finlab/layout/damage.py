@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
@@ -27,31 +27,24 @@ _VALUES: Mapping[str, Any] = {
 }
 
 
-class _Known(dict[str, Any]):
-    """Values by name that never change, so that damage is hashed."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(frozenset(self.items()))
-
-
 @dataclass(frozen=True)
 class Damage:
     """What is known of damaged actuators, by name; those that are not named are whole.
 
     All but `lost` is a layout with other limits, or with a smaller fin, so that every method accounts for it
-    and limits hold as always. Immutable. Raises AllocationError: a share out of range, an angle that is no
-    number, names that are no list.
+    and limits hold as always. Not to be changed. Raises AllocationError: a share out of range, an angle that
+    is no number, names that are no list.
     """
 
     lost: Sequence[str] = ()
     """Those that give no force and leave the layout."""
-    weak: Mapping[str, float] = _Known()
+    weak: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Share, above 0 and up to 1, that is left of the largest amplitude and frequency, or of the force."""
-    torn: Mapping[str, float] = _Known()
+    torn: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Share of its law's thrust that one gives at every command, as a fin with a torn blade does."""
-    stuck: Mapping[str, float] = _Known()
+    stuck: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Angle [rad] at which one no longer turns; it still pushes."""
-    running: Mapping[str, Vector] = _Known()
+    running: Mapping[str, Vector] = field(default_factory=dict, hash=False)
     """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
 
     def __post_init__(self) -> None:
@@ -68,7 +61,7 @@ class Damage:
                 name: checked(own, value, AllocationError, f"damage: {kind} {name}")
                 for name, own in known.items()
             }
-            object.__setattr__(self, kind, _Known(each))
+            object.__setattr__(self, kind, each)
         if both := set(self.stuck) & set(self.running):
             raise AllocationError(f"damage: an actuator is stuck or running, got both of {', '.join(both)}")
 
@@ -141,6 +134,10 @@ class Damage:
         is no actuator of a name, or one whose law is a table is torn; AllocationError: its kind cannot be
         damaged so."""
         return _applied(self, layout) if self.partly else layout
+
+
+WHOLE = Damage()
+"""Nothing is damaged."""
 
 
 @lru_cache(maxsize=64)

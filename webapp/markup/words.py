@@ -13,7 +13,7 @@ from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import WHOLE, Damage
 from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.righting import righting_words
 from finlab.vehicle.vehicle import Vehicle
@@ -200,4 +200,5 @@ def damage_words(damage: Damage, name: str) -> str:
         "stuck": lambda angle: f"stuck at {math.degrees(angle):.0f}°",
         "running": lambda command: "runs on",
     }
-    return ", ".join(said[kind](value) for kind, value in damage.of(name).items()).replace("-", "−")
+    known = {} if damage == WHOLE else damage.of(name)
+    return ", ".join(said[kind](value) for kind, value in known.items()).replace("-", "−")

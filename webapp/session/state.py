@@ -14,7 +14,7 @@ from finlab.allocation.policy import AXES, KINDS
 from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import WHOLE, Damage
 from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
 
@@ -44,7 +44,7 @@ class State:
     """A layout, its failures and the question asked of it."""
 
     layout: Layout
-    damage: Damage = Damage()
+    damage: Damage = WHOLE
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
     temperature: float | None = None
@@ -66,7 +66,7 @@ class State:
     @cached_property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
-        return self.damage.applied_to(self.layout)
+        return self.layout if self.damage == WHOLE else self.damage.applied_to(self.layout)
 
     @property
     def failed(self) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State, compared
 from webapp.tasks.answering import Answering, Refining
@@ -172,7 +171,7 @@ class Jobs:
                 task.forget()
         able, drawn = state.able, session.display.drawn
         self.analyst.ask(Question(able, state.failed, session.saved, drawn, state.flow))
-        self.ranging.ask(State(able, Damage(state.failed), target=state.target, speed=state.speed))
+        self.ranging.ask(State(able, state.damage, target=state.target, speed=state.speed))
         self.answering.ask()
 
     def _beside(self) -> None:
