@@ -131,6 +131,8 @@ def _key(scope: str, name: str, named: Named) -> str:
 
 def _pose(part: Element) -> Array:
     """The pose (4, 4) that a part has as <origin> in URDF, or as <pose> in SDF."""
+    if part.find("origin") is None and part.find("pose") is None:
+        return np.eye(4)
     what = f"the pose of {part.tag} {part.get('name', '')!r:.60}"
     origin = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
     quaternion = said(part, "pose@rotation_format") == "quat_xyzw"
