@@ -37,7 +37,7 @@ app: setup
 
 test: setup
 	@tools/find-browser || tools/apt-install chromium fonts-dejavu-core || tools/no-browser
-	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser $(CASES)
+	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal --ignore tests/browser $(CASES)
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser $(CASES)
 
 test-all: CASES := -m ""
