@@ -12,6 +12,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
+from tests.exhaustive import sampled
 
 Layouts = Callable[[str], Layout]
 
@@ -110,7 +111,7 @@ SHIPPED = {
 }
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", sampled(SHIPPED, every=2))
 def test_any_actuator_moves_within_bounds_and_keeps_the_mirror(shipped: Layouts, name: str) -> None:
     layout, (names, settings) = shipped(name), SHIPPED[name]
     parts = [layout.actuators[layout.index(part)] for part in names]

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -146,6 +147,7 @@ def test_missing_checkpoint_is_named() -> None:
     assert "elsewhere: no such checkpoint folder" in error
 
 
+@cache
 def hostile_files() -> dict[str, bytes]:
     """Layout files that should not have been written, by what is wrong with them."""
     base = yaml.safe_load(shipped_layouts()["A"].read_text())

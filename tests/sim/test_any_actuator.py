@@ -10,6 +10,7 @@ from finlab.control import FaultMonitor
 from finlab.evaluation.experiments.hard_days import OTHER_HEAVY
 from finlab.layout import Layout
 from finlab.sim import NO_NOISE, ClosedLoop, Fault, RunLog, make_trajectory, straight
+from tests.exhaustive import crossed, sampled
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def error(log: RunLog) -> float:
     return float(np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize("name", ["bluerov2", "bluerov2_heavy", "turtle_hybrid", "mixed"])
+@pytest.mark.parametrize("name", sampled(["turtle_hybrid", "bluerov2", "mixed", "bluerov2_heavy"], every=2))
 def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
     robot = load_layout(name)
     log = ClosedLoop(robot, Allocator(robot), make_trajectory("circle"), seed=1).run()
@@ -42,8 +43,7 @@ def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
     assert np.abs(late).max() < 0.1 * np.abs(log.allocated[150:]).max()
 
 
-@pytest.mark.parametrize("kind", ["lost", "torn", "stuck"])
-@pytest.mark.parametrize("announced", [True, False])
+@pytest.mark.parametrize(("kind", "announced"), crossed(["lost", "torn", "stuck"], [True, False], every=2))
 def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str, announced: bool) -> None:
     fault = Fault(heavy.names[1], 15.0, kind)  # type: ignore[arg-type]
     loop = ClosedLoop(
