@@ -275,7 +275,7 @@ class Rudder(actuator.Actuator):
     BOXES = (
         actuator.Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
         actuator.Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
-        actuator.Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
+        actuator.Box("Lag [s]", "time_constant", "Time to 63 % of a new deflection.", 0.05),
     )
     LAW_BOXES = (
         actuator.Box("Area [m²]", "area", "Of the foil.", 0.001),

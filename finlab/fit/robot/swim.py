@@ -187,7 +187,7 @@ def _rows(values: Array, layout: Layout) -> Array:
     """Commands (n, actuators, 3) of values (n, columns); what an actuator does not have is 0."""
     command, begin = np.zeros((len(values), layout.n, 3)), 0
     for i, part in enumerate(layout.actuators):
-        own = values[:, begin : begin + len(dict(part.NUMBERS))]
+        own = values[:, begin : begin + len(part.NUMBERS)]
         command[:, i, : own.shape[1]] = own
         command[np.isnan(own).all(axis=1), i] = np.nan
         begin += own.shape[1]
