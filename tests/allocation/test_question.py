@@ -6,15 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from finlab.allocation.question import (
-    MAX_WRENCH,
-    check_layout,
-    check_previous,
-    check_seed,
-    check_wrenches,
-    damage_of,
-    usable,
-)
+from finlab.allocation import question
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Damage, Fin, Layout, Limits
 
@@ -23,12 +15,12 @@ ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in
 
 def test_commands_of_all_fins_are_handed_through() -> None:
     command = np.ones((2, 3, 3))
-    assert usable(ROBOT, Damage()).among_all(command) is command
-    assert usable(ROBOT, Damage([])).among_all(command) is command
+    assert question.usable(ROBOT, Damage()).among_all(command) is command
+    assert question.usable(ROBOT, Damage([])).among_all(command) is command
 
 
 def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
-    fins = usable(ROBOT, Damage(["b"]))
+    fins = question.usable(ROBOT, Damage(["b"]))
     assert fins.damage.lost == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
     assert fins.alive.tolist() == [True, False, True]
     command = np.arange(12.0).reshape(2, 2, 3)
@@ -39,7 +31,7 @@ def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
 
 
 def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
-    fins = usable(ROBOT, Damage(["a"], running={"c": (0.2, 1.0, 0.5)}))
+    fins = question.usable(ROBOT, Damage(["a"], running={"c": (0.2, 1.0, 0.5)}))
     kept = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
     assert fins.layout.fins[2].limits == fins.healthy.fins[1].limits == kept
     assert fins.layout.fins[1] == ROBOT.fins[1]
@@ -55,60 +47,60 @@ def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
 )
 def test_failed_fins_are_a_list_of_names(failed: object, sentence: str) -> None:
     with pytest.raises(AllocationError, match=f"^{re.escape(sentence)}$"):
-        damage_of(None, failed, ())  # type: ignore[arg-type]
+        question.damage_of(None, failed, ())  # type: ignore[arg-type]
 
 
 def test_damage_of_another_type_is_refused() -> None:
     with pytest.raises(AllocationError, match="damage: expected a Damage, got 'weak'"):
-        damage_of("weak", (), ())  # type: ignore[arg-type]
+        question.damage_of("weak", (), ())  # type: ignore[arg-type]
 
 
 def test_the_largest_wrench_is_still_taken() -> None:
-    most = [MAX_WRENCH, -MAX_WRENCH, 0, 0, 0, 0]
-    np.testing.assert_array_equal(check_wrenches(most, single=True), most)
-    assert check_wrenches([1, 2, 3, 4, 5, 6], single=True).dtype == np.float64
-    assert check_wrenches(np.empty((0, 6)), single=False).shape == (0, 6)
+    most = [question.MAX_WRENCH, -question.MAX_WRENCH, 0, 0, 0, 0]
+    np.testing.assert_array_equal(question.check_wrenches(most, single=True), most)
+    assert question.check_wrenches([1, 2, 3, 4, 5, 6], single=True).dtype == np.float64
+    assert question.check_wrenches(np.empty((0, 6)), single=False).shape == (0, 6)
     sentence = r"wrench: Tx must be at most 1e\+06 in size, or NaN where it is free, got -1000001"
     with pytest.raises(CommandError, match=sentence):
-        check_wrenches([[0] * 6, [0, 0, 0, -MAX_WRENCH - 1, 0, 9e9]], single=False)
+        question.check_wrenches([[0] * 6, [0, 0, 0, -question.MAX_WRENCH - 1, 0, 9e9]], single=False)
 
 
 @pytest.mark.parametrize("shape", [(6,), (2, 5), (1, 2, 6), ()])
 def test_many_wrenches_are_rows_of_six(shape: tuple[int, ...]) -> None:
     sentence = f"wrench: expected an array of shape (N, 6) in N and N m, got an array of shape {shape}"
     with pytest.raises(CommandError, match=f"^{re.escape(sentence)}$"):
-        check_wrenches(np.zeros(shape), single=False)
+        question.check_wrenches(np.zeros(shape), single=False)
 
 
 def test_complex_numbers_are_no_wrench() -> None:
     with pytest.raises(CommandError, match="wrench: expected six numbers"):
-        check_wrenches([1j, 0, 0, 0, 0, 0], single=True)
+        question.check_wrenches([1j, 0, 0, 0, 0, 0], single=True)
 
 
 @pytest.mark.parametrize("seed", [0, 1, np.int64(3)])
 def test_seeds_are_whole_numbers_from_0(seed: object) -> None:
-    check_seed(seed)
+    question.check_seed(seed)
 
 
 @pytest.mark.parametrize("seed", [-1, True, 1.0, "1", None])
 def test_other_seeds_are_refused(seed: object) -> None:
     with pytest.raises(AllocationError, match=f"^seed: expected a whole number from 0, got {seed!r}$"):
-        check_seed(seed)
+        question.check_seed(seed)
 
 
 def test_no_layout_is_refused() -> None:
     with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
-        check_layout("A")
+        question.check_layout("A")
 
 
 def test_previous_commands_may_hold_nan_but_nothing_infinite() -> None:
     previous = np.zeros((3, 3))
     previous[1] = math.nan
-    np.testing.assert_array_equal(check_previous(previous, ROBOT), previous)
+    np.testing.assert_array_equal(question.check_previous(previous, ROBOT), previous)
     previous[2, 1] = -math.inf
     with pytest.raises(CommandError, match="previous: expected finite commands"):
-        check_previous(previous, ROBOT)
+        question.check_previous(previous, ROBOT)
     for wrong in (np.zeros((2, 3)), np.zeros((3, 2)), np.zeros(9)):
         sentence = f"(3, 3) for layout 'robot', got shape {wrong.shape}; pass the `command`"
         with pytest.raises(CommandError, match=re.escape(sentence)):
-            check_previous(wrong, ROBOT)
+            question.check_previous(wrong, ROBOT)

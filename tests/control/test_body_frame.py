@@ -5,16 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from finlab import control
 from finlab.arrays import Array
-from finlab.control import (
-    CONTROLLERS,
-    Measurement,
-    Setpoint,
-    VelocityController,
-    WaypointController,
-    make_controller,
-    steerable_loss,
-)
 from finlab.control.body_frame import Pid
 from finlab.control.contract import NO_WRENCH
 from finlab.errors import FinlabError
@@ -22,7 +14,7 @@ from finlab.layout import load_layout
 from finlab.sim import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight
 from tests.any_robot import AnyRobot
 
-AT_REST = Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
+AT_REST = control.Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
 
 
 def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: int = 0) -> RunLog:
@@ -31,9 +23,9 @@ def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: i
         robot,
         method.on(robot),
         task,
-        make_controller(controller, robot),
+        control.make_controller(controller, robot),
         sensors=NO_NOISE,
-        failures=[(fin, 0.0) for fin in steerable_loss(robot, lost) or ()],
+        failures=[(fin, 0.0) for fin in control.steerable_loss(robot, lost) or ()],
     )
     loop.state[:3] = 0.0, 0.0, -1.0
     return loop.run()
@@ -57,13 +49,13 @@ def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AnyRobot) -
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.04
 
 
-def wrench_at(controller: WaypointController, x: float, y: float, z: float) -> Array:
+def wrench_at(controller: control.WaypointController, x: float, y: float, z: float) -> Array:
     controller.reset()
-    return controller.wrench(AT_REST, Setpoint(np.array([x, y, z]), 0.0), NO_WRENCH)
+    return controller.wrench(AT_REST, control.Setpoint(np.array([x, y, z]), 0.0), NO_WRENCH)
 
 
 def test_the_printed_law_of_a_waypoint_at_rest() -> None:
-    controller = WaypointController(load_layout("A"))
+    controller = control.WaypointController(load_layout("A"))
     (k_d, k_z, k_psi), most = controller.gains, controller.most
     ahead = wrench_at(controller, 0.3, 0.1, -1.1)
     e = math.atan2(0.1, 0.3)
@@ -75,12 +67,12 @@ def test_the_printed_law_of_a_waypoint_at_rest() -> None:
 
 
 def test_the_yaw_rate_is_damped_and_bounded() -> None:
-    controller = VelocityController(load_layout("A"))
+    controller = control.VelocityController(load_layout("A"))
     turning = AT_REST._replace(rates=np.array([0.0, 0.0, 0.2]))
-    wrench = controller.wrench(turning, Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH)
+    wrench = controller.wrench(turning, control.Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH)
     np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.yaw_damping], atol=1e-9)
     spun = AT_REST._replace(rates=np.array([0.0, 0.0, -99.0]))
-    wrench = controller.wrench(spun, Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)
+    wrench = controller.wrench(spun, control.Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)
     bounds = controller.surge.most, controller.depth.most, controller.max_yaw
     np.testing.assert_allclose(wrench[[0, 2, 5]], bounds)
 
@@ -100,12 +92,12 @@ def test_an_integral_makes_up_for_a_force_that_stays() -> None:
     assert height == pytest.approx(0.0, abs=1e-3) and pid.summed == pytest.approx(1.5, abs=0.01)
 
 
-@pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "tracking"])
+@pytest.mark.parametrize("name", [name for name in control.CONTROLLERS if name != "tracking"])
 def test_what_dives_by_its_pitch_is_refused(name: str) -> None:
     with pytest.raises(FinlabError, match="'torpedo' cannot give"):
-        make_controller(name, load_layout("torpedo"))
+        control.make_controller(name, load_layout("torpedo"))
 
 
 def test_an_unknown_controller_is_a_sentence() -> None:
     with pytest.raises(FinlabError, match="one of tracking, waypoint, velocity, got 'pd'"):
-        make_controller("pd", load_layout("A"))
+        control.make_controller("pd", load_layout("A"))

@@ -20,13 +20,7 @@ from safetensors.torch import load_file, save_file
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
 from finlab.layout import load_layout
-from finlab.networks.checkpoint import (
-    checkpoint_files,
-    read_checkpoint,
-    read_normalization,
-    resolve_checkpoint,
-    write_checkpoint,
-)
+from finlab.networks import checkpoint
 from finlab.networks.trained import to_command, to_normalized
 from tests.any_robot import AnyRobot
 
@@ -67,7 +61,7 @@ def change_weights(folder: Path, change: Callable[[dict[str, torch.Tensor]], obj
 def refusal(folder: Path) -> str:
     """The sentence with which a folder is refused, at the latest by the method that would answer with it."""
     with pytest.raises(CheckpointError) as caught:
-        read_checkpoint(folder)
+        checkpoint.read_checkpoint(folder)
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
     message = str(caught.value)
     assert "\n" not in message and folder.name in message
@@ -75,9 +69,9 @@ def refusal(folder: Path) -> str:
 
 
 def test_round_trip(untrained_checkpoint: Path, tmp_path: Path) -> None:
-    first = read_checkpoint(untrained_checkpoint)
+    first = checkpoint.read_checkpoint(untrained_checkpoint)
     first = replace(first, metrics={"surrogate": {"error": 0.25}}, training={"seed": 7})
-    second = write_checkpoint(tmp_path / "again", first)
+    second = checkpoint.write_checkpoint(tmp_path / "again", first)
     assert second.name == "again"
     kept = ("preset", "training", "metrics", "fin_model", "sha256", "network_sizes", "surrogate_sizes")
     for name in kept:
@@ -186,7 +180,7 @@ def test_refuses_another_precision(folder: Path) -> None:
 @pytest.mark.parametrize("name", shipped_checkpoints())
 def test_shipped_files_are_what_is_written_for_their_weights(name: str) -> None:
     folder = checkpoint_path(name)
-    files = checkpoint_files(read_checkpoint(folder))
+    files = checkpoint.checkpoint_files(checkpoint.read_checkpoint(folder))
     for file in ("config.json", "model.safetensors"):
         assert files[file] == (folder / file).read_bytes()
 
@@ -229,16 +223,18 @@ def test_refuses_sizes_and_statistics_that_cannot_be(
 
 
 def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
-    write_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
-    assert read_checkpoint(folder).network_sizes is None
+    checkpoint.write_checkpoint(
+        folder, replace(checkpoint.read_checkpoint(folder), network_sizes=None, network={})
+    )
+    assert checkpoint.read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* of the shipped `paper`"):
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
 
 
 def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Path, tmp_path: Path) -> None:
-    first = read_checkpoint(untrained_mdn)
+    first = checkpoint.read_checkpoint(untrained_mdn)
     assert first.surrogate_sizes is None and first.network_sizes is not None
-    assert write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
+    assert checkpoint.write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
         AnyRobot("paper", checkpoint=untrained_mdn).on(load_layout("A"))
 
@@ -249,21 +245,21 @@ def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:
 
 
 def test_normalization_alone_is_read_without_the_weights(folder: Path) -> None:
-    expected = read_checkpoint(folder).normalization
+    expected = checkpoint.read_checkpoint(folder).normalization
     (folder / "model.safetensors").unlink()
-    np.testing.assert_array_equal(read_normalization(folder).std, expected.std)
+    np.testing.assert_array_equal(checkpoint.read_normalization(folder).std, expected.std)
     change_config(folder, lambda config: config["normalization"].pop("std"))
     with pytest.raises(CheckpointError, match="normalization is missing or malformed"):
-        read_normalization(folder)
+        checkpoint.read_normalization(folder)
 
 
 def test_names_and_folders_are_told_apart(folder: Path) -> None:
-    assert resolve_checkpoint(folder) == folder
-    assert resolve_checkpoint("default").name == "default"
+    assert checkpoint.resolve_checkpoint(folder) == folder
+    assert checkpoint.resolve_checkpoint("default").name == "default"
     with pytest.raises(CheckpointError, match="'magic' is not among the shipped ones"):
-        resolve_checkpoint("magic")
+        checkpoint.resolve_checkpoint("magic")
     with pytest.raises(CheckpointError, match=r"away/from/home: no such checkpoint folder"):
-        resolve_checkpoint("away/from/home")
+        checkpoint.resolve_checkpoint("away/from/home")
 
 
 LOWER = torch.tensor([[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64)

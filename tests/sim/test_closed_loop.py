@@ -7,28 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab import sim
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout
-from finlab.sim import (
-    NO_NOISE,
-    ClosedLoop,
-    Fault,
-    RunLog,
-    Tick,
-    load_log,
-    make_trajectory,
-    perturbed,
-    straight,
-)
 from finlab.sim.log import log_of_ticks
 from finlab.vehicle.fossen import ucat_body
 from tests.any_robot import AnyRobot
 from tests.ripple import rippled
 
 
-def swum(swim: ClosedLoop, seconds: float) -> RunLog:
+def swum(swim: sim.ClosedLoop, seconds: float) -> sim.RunLog:
     """The log of the first seconds."""
     while swim.time < seconds:
         swim.step()
@@ -37,8 +27,8 @@ def swum(swim: ClosedLoop, seconds: float) -> RunLog:
 
 @pytest.mark.parametrize("truth", ["drawn", "ripple", "askew"])
 def test_it_follows_a_circle_whatever_its_fins_do(layout_a: Layout, analytic: AnyRobot, truth: str) -> None:
-    built = perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
-    loop = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), truth=built, seed=7)
+    built = sim.perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
+    loop = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle"), truth=built, seed=7)
     log = swum(rippled(loop) if truth == "ripple" else loop, 20.0)
     error = np.linalg.norm(log.position - log.reference, axis=1)
     assert error.max() < 0.25
@@ -47,7 +37,7 @@ def test_it_follows_a_circle_whatever_its_fins_do(layout_a: Layout, analytic: An
 
 def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
     swims = [
-        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), seed=seed)
+        sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=seed)
         for seed in (1, 1, 2)
     ]
     first, again, other = ([swim.step() for _ in range(30)][-1].position for swim in swims)
@@ -56,15 +46,17 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
 
 
 def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRobot) -> None:
-    log = swum(ClosedLoop(layout_a, analytic.on(layout_a), straight(30.0, 0.15), sensors=NO_NOISE), 20.0)
+    log = swum(
+        sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.straight(30.0, 0.15), sensors=sim.NO_NOISE), 20.0
+    )
     late = log.time > 15.0
     assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.02
 
 
 def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
-    swim = ClosedLoop(
-        layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), failures=[("front_left", 0.5)]
+    swim = sim.ClosedLoop(
+        layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), failures=[("front_left", 0.5)]
     )
     ticks = [swim.step() for _ in range(8)]
     lost = layout_a.index("front_left")
@@ -84,29 +76,29 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
 
 
 def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
-    task = make_trajectory("circle", 20.0)
+    task = sim.make_trajectory("circle", 20.0)
     with pytest.raises(LayoutError, match="no fin 'tail'"):
-        ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
+        sim.ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
     with pytest.raises(FinlabError, match="0 s or more"):
-        ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
+        sim.ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
 
 
 def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: Path) -> None:
-    swim = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), seed=3)
+    swim = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=3)
     ticks = [swim.step() for _ in range(5)]
     log = swim.log
     log.save(tmp_path / "log.npz")
-    read = load_log(tmp_path / "log.npz")
+    read = sim.load_log(tmp_path / "log.npz")
     assert (read.names, read.method, read.seed, read.n_ticks) == (layout_a.names, "analytic", 3, 5)
-    for name in Tick._fields:
+    for name in sim.Tick._fields:
         np.testing.assert_array_equal(getattr(read, name), getattr(log_of_ticks_like(log, ticks), name))
     (tmp_path / "bad.npz").write_bytes(b"no archive")
     for path in ("bad.npz", "missing.npz"):
         with pytest.raises(DataError, match="expected a swim log"):
-            load_log(tmp_path / path)
+            sim.load_log(tmp_path / path)
 
 
-def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
+def log_of_ticks_like(log: object, ticks: list[sim.Tick]) -> object:
     """The same log made anew from its ticks."""
     about = {
         name: getattr(log, name) for name in ("layout", "names", "method", "controller", "task", "water")
@@ -115,10 +107,10 @@ def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
 
 
 def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobot) -> None:
-    events = [Fault("front_left", 2.0), Fault("back_left", 2.0, "torn", 0.5)]
-    events += [Fault("back_right", 2.0, "stuck"), Fault("back_left", 4.0, "whole")]
-    swim = ClosedLoop(
-        layout_a, analytic.on(layout_a), make_trajectory("circle"), failures=events, announced=False
+    events = [sim.Fault("front_left", 2.0), sim.Fault("back_left", 2.0, "torn", 0.5)]
+    events += [sim.Fault("back_right", 2.0, "stuck"), sim.Fault("back_left", 4.0, "whole")]
+    swim = sim.ClosedLoop(
+        layout_a, analytic.on(layout_a), sim.make_trajectory("circle"), failures=events, announced=False
     )
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
@@ -137,7 +129,7 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
 
 
 def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: AnyRobot) -> None:
-    swim = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"))
+    swim = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle"))
     swum(swim, 1.0)
     swim.fail("front_left", "torn", 0.4)
     swim.fail("back_left", "stuck")
@@ -154,9 +146,11 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])
 def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share: float) -> None:
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
-        Fault("front_left", 1.0, kind, share).checked()
+        sim.Fault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
-        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle")).fail("front_left", kind, share)
+        sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle")).fail(
+            "front_left", kind, share
+        )
 
 
 @pytest.mark.filterwarnings("error")
@@ -173,8 +167,8 @@ def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[st
     """A body typed in with weight far from lift, or that water stops within a period."""
     layout = replace(layout_a, body=replace(ucat_body(), **{"buoyancy_n": None, **body}))
     monitor = FaultMonitor(layout)
-    task = make_trajectory("lissajous")
-    loop = ClosedLoop(
+    task = sim.make_trajectory("lissajous")
+    loop = sim.ClosedLoop(
         layout, AnyRobot("analytic").on(layout), task, TrackingController(layout), monitor=monitor
     )
     for _ in range(60):

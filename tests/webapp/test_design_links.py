@@ -19,17 +19,7 @@ from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
 from tests.webapp.stand_in import page_of
-from webapp.session import Session
-from webapp.session.files import (
-    ARCHIVE,
-    FRAGMENT,
-    MAX_LINK,
-    PLAIN,
-    packed,
-    stored_hull,
-    table_folder,
-    unpacked,
-)
+from webapp.session import Session, files
 from webapp.tasks.designs import Designs
 
 
@@ -39,51 +29,51 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def link_of(text: str, kind: str = PLAIN) -> str:
+def link_of(text: str, kind: str = files.PLAIN) -> str:
     return kind + base64.urlsafe_b64encode(zlib.compress(text.encode())).decode().rstrip("=")
 
 
 @pytest.mark.parametrize("name", ["ucat", "octo", "mixed", "restricted"])
 def test_a_design_comes_back_whole(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
-    text = packed(layout)
-    assert unpacked(text).layout == layout and len(text) < MAX_LINK
+    text = files.packed(layout)
+    assert files.unpacked(text).layout == layout and len(text) < files.MAX_LINK
     assert text.replace("-", "a").replace("_", "a").isalnum(), "nothing that an address would have to escape"
 
 
 def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path) -> None:
     session = Session(load_layout("pair"))
     session.import_hull(
-        stored_hull("hull.stl", trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl"))
+        files.stored_hull("hull.stl", trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl"))
     )
-    opened = unpacked(packed(session.state.layout))
+    opened = files.unpacked(files.packed(session.state.layout))
     assert opened.layout.body is not None and opened.layout.body.hull is not None
     assert opened.layout.body.hull.mesh is not None and opened.missing == ()
 
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
-    session.import_hull(stored_hull("hull.stl", rough.export(file_type="stl")))
+    session.import_hull(files.stored_hull("hull.stl", rough.export(file_type="stl")))
     with pytest.raises(FinlabError, match=r"with its files needs [\d,]+ characters, .* share the ZIP"):
-        packed(session.state.layout)
+        files.packed(session.state.layout)
 
 
-WHOLE = packed(load_layout("ucat"))
+WHOLE = files.packed(load_layout("ucat"))
 
 
 @pytest.mark.parametrize(
-    "text", ["", "y", "y!!!", "q" + "A" * 20, "yAAAA", ARCHIVE + "AAAA", "y" + "é" * 8, WHOLE[:-9]]
+    "text", ["", "y", "y!!!", "q" + "A" * 20, "yAAAA", files.ARCHIVE + "AAAA", "y" + "é" * 8, WHOLE[:-9]]
 )
 def test_what_is_no_design_is_refused_with_a_sentence(text: str) -> None:
     with pytest.raises(FinlabError) as told:
-        unpacked(text)
+        files.unpacked(text)
     assert len(str(told.value)) < 300
 
 
 def test_a_bomb_is_not_unpacked() -> None:
     bomb = link_of(" " * (200 * MAX_BYTES))
-    assert len(bomb) < 50 * MAX_LINK
+    assert len(bomb) < 50 * files.MAX_LINK
     with pytest.raises(FinlabError, match="is larger than"):
-        unpacked(bomb)
+        files.unpacked(bomb)
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "../../etc/passwd", "/dev/zero", "forces.csv"])
@@ -91,7 +81,7 @@ def test_a_link_opens_no_file_of_the_server(path: str) -> None:
     values = layout_to_dict(load_layout("ucat"))
     values["fins"][0]["model"] = {"type": "table", "path": path}
     with pytest.raises(FinlabError, match="did not come along"):
-        unpacked(link_of(yaml_text(values)))
+        files.unpacked(link_of(yaml_text(values)))
 
 
 class Browser:
@@ -154,7 +144,9 @@ def test_a_measured_fin_travels_with_its_table(tmp_path: Path) -> None:
     turn = np.linspace(-np.pi, np.pi, 9)
     write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
     session = Session(load_layout("pair"))
-    session.set_model([session.state.layout.names[0]], model=stored_table(path.read_bytes(), table_folder()))
-    opened = unpacked(packed(session.state.layout, 60_000))
+    session.set_model(
+        [session.state.layout.names[0]], model=stored_table(path.read_bytes(), files.table_folder())
+    )
+    opened = files.unpacked(files.packed(session.state.layout, 60_000))
     assert opened.layout.fins[0].model == session.state.layout.fins[0].model
-    assert FRAGMENT == "design="
+    assert files.FRAGMENT == "design="

@@ -17,6 +17,7 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.exhaustive import sampled
 from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.panels.frame import View
 from webapp.session import Display, Session
@@ -161,8 +162,14 @@ def tab(workers: Workers) -> Iterator[Tab]:
 
 @pytest.mark.parametrize(
     ("place", "fault"),
-    [(place, RuntimeError(WORDS)) for place in COMPUTED + DRAWN]
-    + [(place, FinlabError(WORDS)) for place in (COMPUTED[0], DRAWN[2])],
+    sampled(
+        [
+            pytest.param(place, kind(WORDS))
+            for kind, places in ((RuntimeError, COMPUTED + DRAWN), (FinlabError, (COMPUTED[0], DRAWN[2])))
+            for place in places
+        ],
+        every=3,
+    ),
 )
 def test_no_figure_of_the_robot_before_stays(
     workers: Workers, tab: Tab, place: str, fault: Exception, monkeypatch: pytest.MonkeyPatch

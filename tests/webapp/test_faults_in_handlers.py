@@ -11,6 +11,7 @@ import viser
 
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.exhaustive import sampled
 from tests.webapp.stand_in import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
@@ -111,13 +112,16 @@ def test_every_widget_survives_a_fault_in_what_it_does(
 
 @pytest.mark.parametrize(
     ("place", "task", "selected"),
-    [
-        ("webapp.panels.damage.button_colors", "Allocate", None),
-        ("webapp.panels.hull_panel.hull_of", "Design", None),
-        ("webapp.panels.files_tab.command_line", "Export", None),
-        ("webapp.panels.swim_tab.axis_reach", "Simulate", None),
-        ("webapp.panels.actuator_model.model_card", "Design", "front_left"),
-    ],
+    sampled(
+        [
+            pytest.param("webapp.panels.actuator_model.model_card", "Design", "front_left"),
+            pytest.param("webapp.panels.damage.button_colors", "Allocate", None),
+            pytest.param("webapp.panels.hull_panel.hull_of", "Design", None),
+            pytest.param("webapp.panels.files_tab.command_line", "Export", None),
+            pytest.param("webapp.panels.swim_tab.axis_reach", "Simulate", None),
+        ],
+        every=2,
+    ),
 )
 def test_every_widget_survives_a_fault_in_what_is_written(
     server: viser.ViserServer,

@@ -14,19 +14,8 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.file import parse_layout
+from tests import mixed_robots
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.mixed_robots import (
-    KINDS,
-    beyond,
-    bluerov2_heavy,
-    fins_with_a_tail,
-    layout_of,
-    load,
-    random_plant,
-    random_robot,
-    with_rates,
-    within,
-)
 from tests.own_plant import OwnPlant
 
 REACHED = 1e-3
@@ -37,10 +26,10 @@ def missing(plant: OwnPlant, commands: Array, wrench: Array) -> float:
 
 
 def test_a_heavy_takes_the_watts_of_clarabel() -> None:
-    plant, rng = OwnPlant(bluerov2_heavy()), np.random.default_rng(4)
-    allocator = finlab.Allocator(load(plant.layout))
+    plant, rng = OwnPlant(mixed_robots.bluerov2_heavy()), np.random.default_rng(4)
+    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for _ in range(10):
-        wrench = within(plant, rng)
+        wrench = mixed_robots.within(plant, rng)
         commands = plant.commands_of(allocator.allocate(wrench))
         assert missing(plant, commands, wrench) <= 1e-6
         assert plant.excess(commands) == 0.0
@@ -48,10 +37,10 @@ def test_a_heavy_takes_the_watts_of_clarabel() -> None:
 
 
 def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
-    plant, rng = OwnPlant(bluerov2_heavy()), np.random.default_rng(5)
-    allocator = finlab.Allocator(load(plant.layout))
+    plant, rng = OwnPlant(mixed_robots.bluerov2_heavy()), np.random.default_rng(5)
+    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for times in (1.2, 2.0, 3.0):
-        wrench = beyond(plant, rng, times)
+        wrench = mixed_robots.beyond(plant, rng, times)
         along = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         most = farthest(plant, wrench)
         assert missing(plant, along, most * wrench) <= 2e-3
@@ -60,13 +49,13 @@ def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
 
 
 @pytest.mark.parametrize("number", [0, 1, pytest.param(2, marks=pytest.mark.exhaustive)])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", mixed_robots.KINDS)
 def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
-    plant, rng = random_plant(kind, number, 7), np.random.default_rng(number)
-    allocator = finlab.Allocator(load(plant.layout))
+    plant, rng = mixed_robots.random_plant(kind, number, 7), np.random.default_rng(number)
+    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     most = plant.power(np.array([each.limits[1] for each in plant.actuators]))
     for _ in range(2):
-        wrench = within(plant, rng)
+        wrench = mixed_robots.within(plant, rng)
         result = allocator.allocate(wrench, flow=plant.flow)
         commands = plant.commands_of(result)
         assert missing(plant, commands, wrench) <= REACHED
@@ -81,19 +70,19 @@ def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
 
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins", "mixed"])
 def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
-    plant, rng = random_plant(kind, 3, 7), np.random.default_rng(0)
-    allocator = finlab.Allocator(load(plant.layout))
+    plant, rng = mixed_robots.random_plant(kind, 3, 7), np.random.default_rng(0)
+    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for times in (1.2, 3.0):
-        wrench = beyond(plant, rng, times)
+        wrench = mixed_robots.beyond(plant, rng, times)
         commands = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         assert missing(plant, commands, wrench / times) <= 2e-3
 
 
 def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
     for number in range(4):
-        plant, rng = OwnPlant(fins_with_a_tail(number, 3)), np.random.default_rng(number)
-        wrench = within(plant, rng)
-        commands = plant.commands_of(finlab.Allocator(load(plant.layout)).allocate(wrench))
+        plant, rng = OwnPlant(mixed_robots.fins_with_a_tail(number, 3)), np.random.default_rng(number)
+        wrench = mixed_robots.within(plant, rng)
+        commands = plant.commands_of(finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench))
         assert missing(plant, commands, wrench) <= REACHED
         assert plant.power(commands) <= 1.01 * lower_bound(plant, wrench)
 
@@ -103,9 +92,12 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
 def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
     """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in its
     direction, among those that may follow."""
-    plant, rng = OwnPlant(with_rates(random_robot(kind, 1, 7))), np.random.default_rng(1)
-    allocator = finlab.Allocator(load(plant.layout), period_s=period)
-    first, last = within(plant, rng), within(plant, rng)
+    plant, rng = (
+        OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7))),
+        np.random.default_rng(1),
+    )
+    allocator = finlab.Allocator(mixed_robots.load(plant.layout), period_s=period)
+    first, last = mixed_robots.within(plant, rng), mixed_robots.within(plant, rng)
     before: Array | None = None
     for share in np.linspace(0.0, 1.0, 6):
         wrench = (1.0 - share) * first + share * last
@@ -141,7 +133,7 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
             | {"model": LAW}
         )
-    allocator = Allocator(parse_layout(layout_of(f"r{number}", parts)))
+    allocator = Allocator(parse_layout(mixed_robots.layout_of(f"r{number}", parts)))
     return allocator, np.array(columns).T, *np.array(ends).T
 
 
@@ -211,7 +203,7 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
             parts.append(
                 band | {"name": f"t{k}", "axis": axis.tolist(), "position_m": rng.uniform(-1, 1, 3).tolist()}
             )
-        allocator = Allocator(parse_layout(layout_of(f"b{number}", parts)))
+        allocator = Allocator(parse_layout(mixed_robots.layout_of(f"b{number}", parts)))
         targets = rng.normal(size=(20, 6)) * allocator.scale * 10.0 ** rng.uniform(-2, 1, (20, 1))
         for policy, target in itertools.product(("closest", "direction", "priority"), targets):
             force = allocator.allocate(target, policy=policy).command[:, 0]

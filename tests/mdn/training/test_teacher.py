@@ -7,36 +7,28 @@ from finlab.layout import Layout
 from finlab.layout.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
 from finlab.mdn.answers import EffortRobot, effort_robot
 from finlab.mdn.descent import realize, wrench
-from finlab.mdn.training.teacher import (
-    APART,
-    DEAREST,
-    Ways,
-    random_targets,
-    root_share,
-    shares_of_ways,
-    ways_to_deliver,
-)
+from finlab.mdn.training import teacher
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
-def told() -> tuple[EffortRobot, np.ndarray, Ways]:
+def told() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
     rng = np.random.default_rng(6)
     layout = random_fin_robot(rng, random_kinds(rng, 2), 6)
     robot = effort_robot(Plant(layout), STD)
-    target = random_targets(rng, robot, 12)
-    return robot, target, ways_to_deliver(rng, robot.forces, target)
+    target = teacher.random_targets(rng, robot, 12)
+    return robot, target, teacher.ways_to_deliver(rng, robot.forces, target)
 
 
 @pytest.fixture(scope="module")
-def effort() -> tuple[EffortRobot, np.ndarray, Ways]:
+def effort() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
     return told()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
-    effort: tuple[EffortRobot, np.ndarray, Ways],
+    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
 ) -> None:
     robot, target, ways = effort
     known = np.isfinite(ways.cost)
@@ -48,29 +40,31 @@ def test_ways_deliver_the_target_at_the_cost_that_is_told(
         assert cost[0] == pytest.approx(ways.cost[row, k], rel=0.02)
 
 
-def test_ways_differ_and_the_cheapest_comes_first(effort: tuple[EffortRobot, np.ndarray, Ways]) -> None:
+def test_ways_differ_and_the_cheapest_comes_first(
+    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
+) -> None:
     robot, _, ways = effort
-    root = root_share(ways.force, robot.forces.fins.maximum)
+    root = teacher.root_share(ways.force, robot.forces.fins.maximum)
     assert np.isfinite(ways.cost[:, 1]).any()
     for row, cost in enumerate(ways.cost):
         found = np.flatnonzero(np.isfinite(cost))
         if not len(found):
             continue
-        assert (np.diff(cost[found]) >= 0).all() and cost[found[-1]] <= DEAREST * cost[0]
+        assert (np.diff(cost[found]) >= 0).all() and cost[found[-1]] <= teacher.DEAREST * cost[0]
         for k in found[1:]:
-            assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= APART
+            assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= teacher.APART
 
 
 def test_weights_fall_with_the_cost() -> None:
     cost = np.array([[1.0, 1.03, 1.06, np.inf], [2.0, np.inf, np.inf, np.inf], [np.inf] * 4])
-    weight = shares_of_ways(Ways(np.zeros((3, 4, 1), complex), cost), 0.03)
+    weight = teacher.shares_of_ways(teacher.Ways(np.zeros((3, 4, 1), complex), cost), 0.03)
     np.testing.assert_allclose(weight[0, 1] / weight[0, 0], np.exp(-1.0))
     np.testing.assert_allclose(weight[0, 2] / weight[0, 0], np.exp(-2.0))
     np.testing.assert_allclose(weight.sum(1), [1.0, 1.0, 0.0])
 
 
 def test_roots_of_shares_keep_the_direction() -> None:
-    root = root_share(np.array([4j, -1.0, 0.0]), np.array([16.0, 1.0, 2.0]))
+    root = teacher.root_share(np.array([4j, -1.0, 0.0]), np.array([16.0, 1.0, 2.0]))
     np.testing.assert_allclose(root, [0.5j, -1.0, 0.0], atol=1e-5)
 
 
@@ -100,9 +94,9 @@ def test_targets_are_within_reach_of_fins_that_turn_fully(robots: list[Layout]) 
     rng = np.random.default_rng(2)
     for layout in robots[:12]:
         robot = effort_robot(Plant(layout), yardstick(layout))
-        target = random_targets(rng, robot, 24)
+        target = teacher.random_targets(rng, robot, 24)
         assert target.shape == (24, 6) and np.isfinite(target).all()
         if not robot.forces.fins.turns_fully:
             continue
-        ways = ways_to_deliver(rng, robot.forces, target[:18])  # the last quarter are axes
+        ways = teacher.ways_to_deliver(rng, robot.forces, target[:18])  # the last quarter are axes
         assert np.isfinite(ways.cost[:, 0]).mean() > 0.8

@@ -10,14 +10,7 @@ from finlab.layout import Layout, random_layout
 from finlab.networks.trained import Normalization, TrainedWeights, check_state
 from finlab.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig
-from finlab.paper.training.modules import (
-    AllocatorNetwork,
-    Surrogate,
-    features,
-    guidance,
-    imitation,
-    negative_entropy,
-)
+from finlab.paper.training import modules
 from finlab.paper.training.recipes import RECIPES
 from finlab.paper.training.samples import N_FINS, Batch, DataSettings, fresh_batch
 
@@ -64,10 +57,10 @@ def arrays(module: torch.nn.Module) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    module, batch = moved(AllocatorNetwork(SIZES)), padded(robots, fill)
+    module, batch = moved(modules.AllocatorNetwork(SIZES)), padded(robots, fill)
     check_state(arrays(module), SIZES.shapes())
     with torch.no_grad():
-        together = module(features(batch), batch.wrench, batch.mask)
+        together = module(modules.features(batch), batch.wrench, batch.mask)
     for row, layout in enumerate(robots):
         x = raw_features(*(getattr(layout, name) for name in PLACE)).astype(np.float32)[None]
         alone = SIZES(arrays(module), x, batch.wrench[row : row + 1].numpy())
@@ -77,7 +70,7 @@ def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    module, batch = moved(Surrogate(HIDDEN)), padded(robots, fill)
+    module, batch = moved(modules.Surrogate(HIDDEN)), padded(robots, fill)
     check_state(arrays(module), HIDDEN.shapes())
     weights = TrainedWeights(
         "one",
@@ -95,8 +88,8 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 
 def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> None:
-    batch, module = padded(robots, 7.0), AllocatorNetwork(SIZES)
-    x = features(batch).requires_grad_()
+    batch, module = padded(robots, 7.0), modules.AllocatorNetwork(SIZES)
+    x = modules.features(batch).requires_grad_()
     mixture = module(x, batch.wrench, batch.mask)
     sum(
         (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum() for part in mixture
@@ -123,7 +116,7 @@ def mixture_of(batch: Batch, log_std: float) -> Mixture:
 
 def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(batch: Batch) -> None:
     mixture = mixture_of(batch, -0.5)
-    found = imitation(mixture, batch).numpy()
+    found = modules.imitation(mixture, batch).numpy()
     for row in range(len(found)):
         expected = 0.0
         for i in range(int(batch.mask[row].sum())):
@@ -146,7 +139,7 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batc
     draw, std = torch.Generator().manual_seed(2), torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     noise = torch.rand((*batch.mask.shape, 1), generator=draw)
     normal = torch.randn((*noise.shape, 3), generator=draw)
-    found = guidance(mixture, surrogate, batch, std, (noise, normal))
+    found = modules.guidance(mixture, surrogate, batch, std, (noise, normal))
     (command,) = seen
     inside = (command >= batch.lower - 1e-6) & (command <= batch.upper + 1e-6)
     assert inside.all() and (command == batch.upper)[batch.mask].any()
@@ -160,7 +153,7 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batc
 
 def test_entropy_is_that_of_the_weights_over_the_fins_that_exist(batch: Batch) -> None:
     mixture = mixture_of(batch, 0.0)
-    found = negative_entropy(mixture, batch.mask)
+    found = modules.negative_entropy(mixture, batch.mask)
     entropy = torch.distributions.Categorical(logits=mixture.logits).entropy()
     for row, n in enumerate(batch.mask.sum(1)):
         assert float(found[row]) == pytest.approx(-float(entropy[row, :n].mean()), rel=1e-5)
