@@ -43,8 +43,8 @@ def _tree(path: Path) -> ast.Module:
 
 
 def _imports(path: Path) -> Iterator[tuple[str, int]]:
-    """Every module that a file imports, wherever in it, with the line; not those for type checkers alone."""
-    for node in _imported(_tree(path)):
+    """Every module that a file imports, wherever in it, with the line; those for type checkers, too."""
+    for node in ast.walk(_tree(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.name, node.lineno
@@ -93,30 +93,14 @@ def _modules(root: Path) -> dict[str, Path]:
     return named
 
 
-def _imported(node: ast.AST) -> Iterator[ast.AST]:
-    """Everything below a node but what type checkers alone read."""
-    for child in ast.iter_child_nodes(node):
-        if (
-            isinstance(child, ast.If)
-            and isinstance(child.test, ast.Name)
-            and child.test.id == "TYPE_CHECKING"
-        ):
-            for other in child.orelse:
-                yield other
-                yield from _imported(other)
-        else:
-            yield child
-            yield from _imported(child)
-
-
 def _import_graph(root: Path) -> "nx.DiGraph[str]":
-    """Which module needs which, at once or later (in functions, or by a name given to `import_module`); a
-    package's own file only where something is asked of it by name."""
+    """Which module needs which, at once, later (in functions, or by a name given to `import_module`), or for
+    types; a package's own file only where something is asked of it by name."""
     modules = _modules(root)
     graph: nx.DiGraph[str] = nx.DiGraph()
     for name, path in modules.items():
         by_name = "import_module" in path.read_text(encoding="utf-8")
-        for node in _imported(_tree(path)):
+        for node in ast.walk(_tree(path)):
             wanted: list[str] = []
             if isinstance(node, ast.Import):
                 wanted = [alias.name for alias in node.names]
@@ -162,7 +146,7 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     assert _shortest_circles(_import_graph(tmp_path)) == [
-        ["finlab.first", "finlab.second", "finlab.third", "finlab.first"],
+        ["finlab.third", "webapp.fourth", "finlab.third"],
         ["webapp.fifth", "webapp.sixth", "webapp.fifth"],
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from msgspec import to_builtins
@@ -15,8 +15,8 @@ from finlab.layout import Layout
 from finlab.physics.expected_miss import sources_of_miss
 from finlab.physics.plant import Plant
 
-if TYPE_CHECKING:
-    from finlab.allocation.allocation import Allocation
+Allocation = Any
+"""`finlab.allocation.Allocation`, which prints itself by what is here."""
 
 PLAIN_GAP = 0.01
 """Share by which the power may exceed its bound without a sentence."""
