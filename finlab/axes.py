@@ -121,11 +121,6 @@ def least_turn(old: Array, new: Array, spare: Array) -> Array:
     return rotation(axis / size, math.atan2(size, float(old @ new)))
 
 
-def held_at(angle: float, limits: tuple[float, float]) -> float:
-    """Returns an angle [rad] whole turns off, within limits where there is such a one."""
-    return angle + round((0.5 * sum(limits) - angle) / TURN) * TURN
-
-
 def arc_words(low: float, high: float) -> str:
     """Returns an arc [rad] in degrees, in words."""
     low, high = math.degrees(low), math.degrees(high)

@@ -20,22 +20,18 @@ Facts = dict[str, Any]
 """Whoever shows a part names the facts that it is made of, each with its type."""
 
 
-def facts_of(
-    session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale, before: Facts | None
-) -> Facts:
+def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale) -> Facts:
     """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
-    newest answer, the place of the actuator that is `dragged`, and the scale of arrows. `before` are the last
-    ones."""
+    newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
     state, improver, fitting = session.state, jobs.improver, jobs.fitting
     swimming, swimmer = jobs.swimming, jobs.swimming.swimmer
-    same = before is not None and before["layout"] is state.layout and before["damage"] == state.damage
     return {
         "state": state,
         **vars(state),  # layout, damage, target, method, policy, network
         "failed": state.failed,
         "flow": state.flow,
         # The layout with the limits that are left to damaged actuators.
-        "able": before["able"] if same and before is not None else state.able,
+        "able": state.able,
         **vars(session),  # saved, desk, display, draft, swim, loops
         "selected": session.selected,
         "selection": session.selection,

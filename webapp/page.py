@@ -194,11 +194,8 @@ class Page:
                 if guide.stop is not None and seen.shown is not None and not seen.busy:
                     guide.take(seen.shown)
                 self.scenery.follow_guide()
-                scale, dragged = (
-                    self.scenery.fit(self.session.state.target, seen.shown),
-                    self.scenery.robot.dragged,
-                )
-                facts = facts_of(self.session, self.jobs, seen, dragged, scale, self.board.facts)
+                scale = self.scenery.fit(self.session.state.target, seen.shown)
+                facts = facts_of(self.session, self.jobs, seen, self.scenery.robot.dragged, scale)
             except Exception as error:
                 self.board.fail(error)
             else:

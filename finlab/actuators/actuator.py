@@ -12,7 +12,7 @@ kind may use fewer; what it does not have is 0.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -221,7 +221,7 @@ class Actuator(Checked, ABC):
     def with_value(self, key: str, value: Any) -> Self:
         """Returns it with another value under a key, as `value`; as it is where it has no such key. None
         forgets what may be left unsaid. Raises LayoutError: it may not have that value."""
-        return replace(self, **{key: value}) if hasattr(self, key) else self
+        return replace(self, **{key: value}) if key in {field.name for field in fields(self)} else self
 
     def with_model(self, kind: str) -> Self:
         """Returns it with a model of another type of `MODELS`; what both know stays."""
@@ -302,13 +302,13 @@ class Actuator(Checked, ABC):
     def image(self) -> Self:
         """Returns it on the other side of the plane y = 0, under the same name. What turns one way about a
         shaft turns the other way about its image: arcs and the reaction torque change sign."""
-        mirrored = self.turned(np.array(self.frame) * axes.MIRROR, np.array(self.position) * axes.MIRROR)
         changes: dict[str, Any] = {}
         if self.ARC:
             changes[self.ARC] = tuple(-end + 0.0 for end in reversed(getattr(self, self.ARC)))
         if hasattr(self, "torque_per_newton"):
             changes["torque_per_newton"] = -self.torque_per_newton + 0.0
-        return replace(mirrored, **changes)
+        frame, place = np.array(self.frame) * axes.MIRROR, np.array(self.position) * axes.MIRROR
+        return self.turned(frame, place, **changes)
 
     def facing(self, towards: axes.Vector) -> Self:
         """Returns it with its `direction` along a vector of any length; the other axis turns along as little
@@ -345,16 +345,13 @@ def key_words(key: str) -> str:
     return text if len(text) <= 2 or text == "phi e" else text[0].upper() + text[1:]
 
 
-def ahead(frame: Array) -> Array:
-    """Returns own axes (3, 3) whose second one lies ahead, as near as the first allows."""
-    if math.hypot(*frame[0, 1:]) > axes.SHORT:
-        frame[1] = axes.across(frame[0], axes.AHEAD)
-    return frame
-
-
 def held_limits(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:
-    """Returns an angle [rad] as both limits, within them where it can be; themselves where it is None."""
-    return limits if angle is None else (axes.held_at(angle, limits),) * 2
+    """Returns an angle [rad] as both limits, whole turns off, within them where there is such a one;
+    themselves where it is None."""
+    if angle is None:
+        return limits
+    held = angle + round((0.5 * sum(limits) - angle) / axes.TURN) * axes.TURN
+    return held, held
 
 
 def weakened(interval: tuple[float, float], share: float | None) -> tuple[float, float]:

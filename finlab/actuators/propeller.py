@@ -1,4 +1,4 @@
-"""What thrusters have in common, fixed or turning: forces and power of a propeller, and what it is sent."""
+"""The propeller of thrusters, fixed or turning: its description, its law, and its input for a force."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace

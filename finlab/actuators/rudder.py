@@ -21,7 +21,7 @@ from finlab.actuators import actuator
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
-from finlab.axes import Direction3, Vector, arc_words
+from finlab.axes import AHEAD, SHORT, Direction3, Vector, across, arc_words
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
 from finlab.precision import NOTHING
@@ -361,5 +361,7 @@ class Rudder(actuator.Actuator):
         yield "", self.shaft, self.deflection
 
     def settled(self, frame: Array) -> Array:
-        """See `Actuator`: the leading edge lies ahead."""
-        return actuator.ahead(frame)
+        """See `Actuator`: the leading edge lies ahead, as near as the shaft allows."""
+        if math.hypot(*frame[0, 1:]) > SHORT:
+            frame[1] = across(frame[0], AHEAD)
+        return frame

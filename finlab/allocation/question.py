@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import WHOLE, Damage, lost_names
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
@@ -50,7 +50,7 @@ def damage_of(damage: Damage | None, lost: Sequence[str], failed: Sequence[str])
         known = damage
     else:
         raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
-    more = [name for names in (lost, failed) for name in (Damage(names).lost if len(names) else ())]
+    more = [name for names in (lost, failed) if len(names) for name in lost_names(names)]
     return replace(known, lost=[*known.lost, *more]) if more else known
 
 

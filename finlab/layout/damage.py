@@ -27,6 +27,16 @@ _VALUES: Mapping[str, Any] = {
 }
 
 
+def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
+    """Returns the names of what is lost. Raises AllocationError: they are no list of names."""
+    if isinstance(lost, str) or not (
+        isinstance(lost, Sequence) and all(isinstance(name, str) for name in lost)
+    ):
+        hint = f"the text {lost!r}; write [{lost!r}]" if isinstance(lost, str) else repr(lost)
+        raise AllocationError(f"lost: expected a list of names, got {hint}")
+    return tuple(lost)
+
+
 @dataclass(frozen=True)
 class Damage:
     """What is known of damaged actuators, by name; those that are not named are whole.
@@ -48,13 +58,7 @@ class Damage:
     """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
 
     def __post_init__(self) -> None:
-        lost = self.lost
-        if isinstance(lost, str) or not (
-            isinstance(lost, Sequence) and all(isinstance(name, str) for name in lost)
-        ):
-            hint = f"the text {lost!r}; write [{lost!r}]" if isinstance(lost, str) else repr(lost)
-            raise AllocationError(f"lost: expected a list of names, got {hint}")
-        object.__setattr__(self, "lost", tuple(lost))
+        object.__setattr__(self, "lost", lost_names(self.lost))
         for kind, value in _VALUES.items():
             known = checked(getattr(self, kind), dict[str, Any], AllocationError, f"damage: {kind}")
             each = {

@@ -11,7 +11,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import Damage
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
 from webapp.theme import DEAD, css, fin_color, ink
@@ -98,13 +98,13 @@ def fin_table(
     layout: Layout, damage: Damage, allocation: Allocation | None, full: Array, selected: str | None
 ) -> str:
     """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
-    limits, damaged = None if allocation is None else saturated(allocation), damage != WHOLE
+    limits = None if allocation is None else saturated(allocation)
     rows = []
     for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if damaged and not failed and (remark := damage_words(damage, fin.name)):
+        if not failed and (remark := damage_words(damage, fin.name)):
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5

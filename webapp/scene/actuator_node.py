@@ -72,8 +72,11 @@ def _moving(looks: str, slenderness: float) -> Mesh:
 
 def _mount(looks: str, up: bool) -> Mesh:
     """What of an actuator stands still, in its own frame."""
-    fixed = {"thruster": NOTHING, "foil": shapes.stock(), "fin": shapes.shaft()}
-    return shapes.column(up) if looks == "pod" else fixed[looks]
+    if looks == "thruster":
+        return NOTHING
+    if looks == "pod":
+        return shapes.column(up)
+    return shapes.stock() if looks == "foil" else shapes.shaft()
 
 
 def _propeller(along: int) -> Mesh:
@@ -82,8 +85,8 @@ def _propeller(along: int) -> Mesh:
 
 def shape_of(part: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
-    ratio, area = part.value("aspect_ratio"), part.value("area")
-    if part.LOOKS != "foil" or ratio is None or area is None:
+    ratio, area = (part.value("aspect_ratio"), part.value("area")) if part.LOOKS == "foil" else (None, None)
+    if ratio is None or area is None:
         return 1.0, size
     ratio = min(max(ratio, 0.5), 8.0) / 2.0
     span = math.sqrt(ratio * area)

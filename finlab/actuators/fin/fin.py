@@ -141,7 +141,7 @@ class Fin(Actuator):
     LAW_BOXES = tuple(_box(law, key, rule) for law in FORMULAS for key, rule in FIN_MODELS[law].items())
 
     name: Name
-    """Unique within its layout; `--failed NAME` and the app refer to it."""
+    """Unique within its layout; `--lost NAME` and the app refer to it."""
     position: tuple[Coordinate, Coordinate, Coordinate]
     """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
     mounting_angle: MountingAngle | None = None
@@ -285,16 +285,12 @@ class Fin(Actuator):
         there."""
         level = self.mounting_angle is not None
         frame = np.array(self.frame) * axes.MIRROR * ([[1.0], [-1.0], [1.0]] if level else 1.0)
-        mirrored = self.turned(frame, np.array(self.position) * axes.MIRROR)
-        low, high = self.limits.zero_direction
-        if axes.is_full_turn(high - low):
-            return mirrored
-        middle, half = (
-            float(axes.wrapped((math.pi if level else 0.0) - 0.5 * (low + high))),
-            0.5 * (high - low),
-        )
-        limits = replace(mirrored.limits, zero_direction=(middle - half, middle + half))
-        return replace(mirrored, limits=limits)
+        limits, (low, high) = self.limits, self.limits.zero_direction
+        if not axes.is_full_turn(high - low):
+            middle = float(axes.wrapped((math.pi if level else 0.0) - 0.5 * (low + high)))
+            half = 0.5 * (high - low)
+            limits = replace(limits, zero_direction=(middle - half, middle + half))
+        return self.turned(frame, np.array(self.position) * axes.MIRROR, limits=limits)
 
     def settled(self, frame: Array) -> Array:
         """See `Actuator`: a fin that turns all round has zero where a mounting angle has it, or ahead."""
