@@ -14,6 +14,7 @@ from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
 from webapp.tasks.answering import Seen
+from webapp.tasks.background import Newest
 from webapp.tasks.jobs import Jobs
 
 Facts = dict[str, Any]
@@ -26,8 +27,9 @@ def facts_of(
     """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
     newest answer, the place of the actuator that is `dragged`, and the scale of arrows. `before` are the last
     ones."""
-    state, improver, fitting = session.state, jobs.improver, jobs.fitting
-    swimming, swimmer = jobs.swimming, jobs.swimming.swimmer
+    state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
+    tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
+    tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
     same = before is not None and before["layout"] is state.layout and before["damage"] == state.damage
     return {
         "state": state,
@@ -46,19 +48,13 @@ def facts_of(
         "solved": session.guide.solved,
         **seen._asdict(),
         "playing": jobs.refining.running,
-        "ranges": jobs.ranging.findings,
-        "ranges_error": jobs.ranging.error,
-        "found": jobs.analyst.findings,
+        **{name: task.findings for name, task in tasks.items()},
+        **{f"{name}_error": task.error for name, task in tasks.items()},
         "finding": jobs.analyst.busy,
-        "found_error": jobs.analyst.error,
         "run": jobs.comparison.run,
-        "better": improver.findings,
-        "progress": improver.progress,
-        "improving": improver.busy,
-        "better_error": improver.error,
-        "fitted": fitting.findings,
-        "fitting": fitting.progress,
-        "fitted_error": fitting.error,
+        "progress": jobs.improver.progress,
+        "improving": jobs.improver.busy,
+        "fitting": jobs.fitting.progress,
         "swims": swimming.active,
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.shown,

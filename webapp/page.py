@@ -19,8 +19,7 @@ from webapp.board import Board, facts_of
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.background import EventLoop, Workers
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, EventLoop, Workers
 from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.solver import Solver

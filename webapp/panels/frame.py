@@ -7,7 +7,6 @@ here. So widgets that were seen once stay mounted, and a change of task is one m
 
 import json
 from collections.abc import Callable
-from functools import partial
 from importlib.resources import files
 
 from markupsafe import Markup
@@ -82,13 +81,14 @@ class Frame:
 
     def __init__(self, page: Page) -> None:
         self._page, gui = page, page.gui
-        run_file(gui, "places.js")
+        run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         page.board.group(self._fail)
         self._shown = gui.add_html("")
         page.board.act(self._arrange)
         page.board.act(self._guard)
-        page.board.act(self._title)
+        title = "document.title = {};"
+        page.board.act(lambda layout: run_script(gui, title.format(json.dumps(layout.name + " · finlab"))))
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
@@ -103,8 +103,7 @@ class Frame:
                     for index, place in enumerate(places.PLACES)
                     if place.region == region
                 ]
-        for name in ("habits.js", "frames.js"):
-            run_file(gui, name)
+        run_file(gui, "frames.js")
 
     def _fail(self, error: Exception | None) -> None:
         if error is not None:
@@ -145,29 +144,22 @@ class Frame:
         drops = str(swims or fitting is not None or improving).lower()
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
-    def _title(self, layout: Layout) -> None:
-        run_script(self._page.gui, f"document.title = {json.dumps(layout.name + ' · finlab')};")
-
     def _listen(self) -> None:
         session, robot = self._page.session, self._page.scenery.robot
-        acts: dict[str, Callable[[str], object]] = {
-            "task": session.show_task,
-            "drawer": session.show_drawer,
-            "fold": lambda _: session.fold_drawer(),
-            "stop": session.guide.open,
-            "on": lambda _: session.guide.go(1),
-            "back": lambda _: session.guide.go(-1),
-            "end": lambda _: session.guide.end(),
-            "look": robot.look_from,
-            "frame": lambda _: robot.frame(),
-            "typed": lambda _: session.history.end_merge(),
+        acts: dict[str, Callable[[str, str], object]] = {
+            "task": lambda name, _: session.show_task(name),
+            "drawer": lambda name, _: session.show_drawer(name),
+            "fold": lambda *_: session.fold_drawer(),
+            "stop": lambda name, _: session.guide.open(name),
+            "on": lambda *_: session.guide.go(1),
+            "back": lambda *_: session.guide.go(-1),
+            "end": lambda *_: session.guide.end(),
+            "look": lambda view, _: robot.look_from(view),
+            "frame": lambda *_: robot.frame(),
+            "typed": lambda *_: session.history.end_merge(),
         }
         for kind, act in acts.items():
-            self._page.presses.on(kind, partial(_by_key, act))
-
-
-def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:
-    return act(key)
+            self._page.presses.on(kind, act)
 
 
 def _strip(desk: Desk) -> str:

@@ -18,7 +18,7 @@ from webapp.handles import Presses
 from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context
 from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 

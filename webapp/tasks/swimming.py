@@ -10,8 +10,7 @@ from finlab.layout.damage import Kind
 from finlab.sim import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 from webapp.tasks.swimmer import Moment, Swimmer, closed_loop
 
 LAG_S = 0.25
