@@ -78,6 +78,11 @@ def press(kind: str, key: str) -> str:
     return html("data-press='{}' data-key='{}'", kind, key)
 
 
+def button(word: str, kind: str, key: str = "", attributes: str = "") -> str:
+    """A button in markup that can be pressed; `attributes` are markup."""
+    return html("<button {} {}>{}</button>", attributes, press(kind, key), word)
+
+
 def placed(key: str, count: int) -> int:
     """The place that a page names, of `count`. FinlabError: there is no such place."""
     if not key.isdecimal() or len(key) > 6 or int(key) >= count:

@@ -57,7 +57,7 @@ class Page:
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
-        self.opening = Opening(client.gui, self.presses)
+        self.opening = Opening(self.presses)
         hold_uploads(client.gui, LARGEST_BUNDLE, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()

@@ -12,7 +12,7 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
-from webapp.handles import add_html, press, put
+from webapp.handles import add_html, button, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
@@ -165,24 +165,13 @@ class Frame:
 def _strip(desk: Desk) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
     opened, folded = desk.opened[desk.task], desk.folded
-    tabs = Markup().join(
-        html(
-            "<button aria-pressed='{}' {}>{}</button>",
-            str(name == opened and (not folded)).lower(),
-            press("drawer", name),
-            name,
-        )
-        for name in DRAWERS[desk.task]
-    )
+    seen = None if folded else opened
+    pressed = ((name, html("aria-pressed='{}'", str(name == seen).lower())) for name in DRAWERS[desk.task])
+    tabs = [button(name, "drawer", name, attribute) for name, attribute in pressed]
     word = "Open the drawer" if folded else "Fold the drawer"
-    fold = html(
-        "<button class='fold' aria-label='{}' title='{}' {}>{}</button>",
-        word,
-        word,
-        press("fold", ""),
-        "▴" if folded else "▾",
-    )
-    return html("<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", tabs, fold)
+    attributes = html("class='fold' aria-label='{}' title='{}'", word, word)
+    tabs.append(button("▴" if folded else "▾", "fold", "", attributes))
+    return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", tabs)
 
 
 class View(Page):

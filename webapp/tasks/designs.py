@@ -5,8 +5,6 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
 
-import viser
-
 from finlab.deploy.bundle import graph_text, make_bundle
 from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
@@ -20,7 +18,7 @@ from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
 from webapp.tasks.background import Context
 from webapp.tasks.swimming import Swimming
-from webapp.viser_internals import run_file, run_script
+from webapp.viser_internals import run_script
 
 KINDS = (
     "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
@@ -132,10 +130,9 @@ class Designs:
 class Opening:
     """The kinds of files that one page opens, and who takes each."""
 
-    def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
+    def __init__(self, presses: Presses) -> None:
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
-        run_file(gui, "opening.js")
 
     @property
     def suffixes(self) -> str:
