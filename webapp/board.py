@@ -68,6 +68,7 @@ def facts_of(
 
 PLAIN = (str, int, float, bool, tuple)
 """Facts that are compared by value; the others, which may hold arrays, by identity."""
+Fail = Callable[[Exception | None], None]
 UNKNOWN = object()
 """In place of what was made last, where that is not known."""
 
@@ -99,11 +100,11 @@ class Rule:
 class Group:
     """Rules that stand or fall together, and wait while nobody can see what they show."""
 
-    def __init__(self, fail: Callable[[Exception | None], None]) -> None:
-        """`fail` hides all that the rules show, or shows it again where it gets None."""
+    def __init__(self, fail: Fail, fault: Callable[[Exception], None]) -> None:
+        """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears why."""
         self.rules: list[Rule] = []
         self.there, self.is_due, self._failed = True, True, False
-        self._fail = fail
+        self._fail, self._fault = fail, fault
 
     def write(self, facts: Facts) -> None:
         """Make again what is due."""
@@ -123,21 +124,24 @@ class Group:
         """Hide all."""
         self._failed = True
         self._fail(error)
+        self._fault(error)
 
 
 class Board:
     """All rules of one page."""
 
-    def __init__(self) -> None:
+    def __init__(self, fault: Callable[[Exception], None]) -> None:
+        """`fault` hears why something cannot be shown."""
+        self._fault = fault
         self.groups: list[Group] = []
         self._of_fact: dict[str, list[Rule]] = defaultdict(list)
         self._of_handle: dict[int, list[Rule]] = {}
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
 
-    def group(self, fail: Callable[[Exception | None], None]) -> Group:
+    def group(self, fail: Fail = lambda _: None) -> Group:
         """Rules that are declared from now on belong to a group; groups are written in their order."""
-        self.groups.append(Group(fail))
+        self.groups.append(Group(fail, self._fault))
         return self.groups[-1]
 
     def show(self, handle: Any, **made: Callable[..., Any]) -> Any:

@@ -51,7 +51,7 @@ class Page:
         self._note: viser.NotificationHandle | None = None
         context = Context(client, session, solver, workers, page, self.do, self._refresh, self.notify)
         self.context, self.jobs = context, Jobs(context)
-        self.board = Board()
+        self.board = Board(self.fault)
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
         self.presses = Presses(client.gui, self.do)
         self.ask = Asking(client.gui, self.presses).ask

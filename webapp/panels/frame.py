@@ -43,7 +43,7 @@ class Section:
     no old figure stands under a new name."""
 
     def __init__(self, page: Page, place: places.Place, index: int) -> None:
-        self.place, self.name, self._page = place, f"at-{index}", page
+        self.place, self.name, self._session = place, f"at-{index}", page.session
         self._met = False
         gui = page.gui
         self.group = page.board.group(self._fail)
@@ -64,12 +64,9 @@ class Section:
         return there
 
     def _fail(self, error: Exception | None) -> None:
-        if error is None:
-            self._say("")
-            return
-        name = self._page.session.state.layout.name
-        self._say(html("<div class='fl missing'>This cannot be shown of {}: {}</div>", name, str(error)))
-        self._page.fault(error)
+        name = self._session.state.layout.name
+        said = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
+        self._say("" if error is None else html(said, name, str(error)))
 
     def _say(self, text: str) -> None:
         put(self._sentence, content=text, visible=bool(text))
@@ -83,7 +80,7 @@ class Frame:
         self._page, gui = page, page.gui
         run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
-        page.board.group(self._fail)
+        page.board.group()
         self._shown = gui.add_html("")
         page.board.act(self._arrange)
         page.board.act(self._guard)
@@ -96,7 +93,7 @@ class Frame:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
                 if region == places.DRAWER:
-                    page.board.group(self._fail)
+                    page.board.group()
                     page.add_html(_strip)
                 self.sections += [
                     Section(page, place, index)
@@ -104,10 +101,6 @@ class Frame:
                     if place.region == region
                 ]
         run_file(gui, "frames.js")
-
-    def _fail(self, error: Exception | None) -> None:
-        if error is not None:
-            self._page.fault(error)
 
     def _arrange(
         self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None, layout: Layout

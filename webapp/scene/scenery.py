@@ -78,7 +78,6 @@ class Scenery:
             self.robot.show(self._swimming.swimmer)
         else:
             self.robot.hide()
-            self._fault(error)
 
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]: robots that swim move on."""

@@ -102,14 +102,14 @@ class Designs:
         now, solver = self._session.state, self._context.solver
         shipped = State(now.layout, method=now.method)
         self._export(
-            files.bundle_name(now.layout),
+            file_stem(now.layout.name) + files.BUNDLE,
             lambda: make_bundle(solver.allocator(shipped), now.failed).zip_bytes(),
         )
 
     def graph(self) -> None:
         """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
         layout = self._session.state.layout
-        self._export(files.graph_name(layout), lambda: graph_text(layout).encode())
+        self._export(file_stem(layout.name) + files.GRAPH, lambda: graph_text(layout).encode())
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""
