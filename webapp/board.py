@@ -30,6 +30,9 @@ def facts_of(
     state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
     tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
     tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
+    known: Facts = {}
+    for name, task in tasks.items():
+        known |= {name: task.findings, f"{name}_error": task.error}
     same = before is not None and before["layout"] is state.layout and before["damage"] == state.damage
     return {
         "state": state,
@@ -48,8 +51,7 @@ def facts_of(
         "solved": session.guide.solved,
         **seen._asdict(),
         "playing": jobs.refining.running,
-        **{name: task.findings for name, task in tasks.items()},
-        **{f"{name}_error": task.error for name, task in tasks.items()},
+        **known,
         "finding": jobs.analyst.busy,
         "run": jobs.comparison.run,
         "progress": jobs.improver.progress,
