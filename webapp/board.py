@@ -14,6 +14,7 @@ from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
 from webapp.tasks.answering import Seen
+from webapp.tasks.background import Newest
 from webapp.tasks.jobs import Jobs
 
 Facts = dict[str, Any]
@@ -23,8 +24,12 @@ Facts = dict[str, Any]
 def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale) -> Facts:
     """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
     newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
-    state, improver, fitting = session.state, jobs.improver, jobs.fitting
-    swimming, swimmer = jobs.swimming, jobs.swimming.swimmer
+    state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
+    tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
+    tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
+    known: Facts = {}
+    for name, task in tasks.items():
+        known |= {name: task.findings, f"{name}_error": task.error}
     return {
         "state": state,
         **vars(state),  # layout, damage, target, method, policy, network
@@ -42,19 +47,12 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "solved": session.guide.solved,
         **seen._asdict(),
         "playing": jobs.refining.running,
-        "ranges": jobs.ranging.findings,
-        "ranges_error": jobs.ranging.error,
-        "found": jobs.analyst.findings,
+        **known,
         "finding": jobs.analyst.busy,
-        "found_error": jobs.analyst.error,
         "run": jobs.comparison.run,
-        "better": improver.findings,
-        "progress": improver.progress,
-        "improving": improver.busy,
-        "better_error": improver.error,
-        "fitted": fitting.findings,
-        "fitting": fitting.progress,
-        "fitted_error": fitting.error,
+        "progress": jobs.improver.progress,
+        "improving": jobs.improver.busy,
+        "fitting": jobs.fitting.progress,
         "swims": swimming.active,
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.shown,
@@ -68,6 +66,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
 
 PLAIN = (str, int, float, bool, tuple)
 """Facts that are compared by value; the others, which may hold arrays, by identity."""
+Fail = Callable[[Exception | None], None]
 UNKNOWN = object()
 """In place of what was made last, where that is not known."""
 
@@ -99,11 +98,11 @@ class Rule:
 class Group:
     """Rules that stand or fall together, and wait while nobody can see what they show."""
 
-    def __init__(self, fail: Callable[[Exception | None], None]) -> None:
-        """`fail` hides all that the rules show, or shows it again where it gets None."""
+    def __init__(self, fail: Fail, fault: Callable[[Exception], None]) -> None:
+        """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears why."""
         self.rules: list[Rule] = []
         self.there, self.is_due, self._failed = True, True, False
-        self._fail = fail
+        self._fail, self._fault = fail, fault
 
     def write(self, facts: Facts) -> None:
         """Make again what is due."""
@@ -123,21 +122,24 @@ class Group:
         """Hide all."""
         self._failed = True
         self._fail(error)
+        self._fault(error)
 
 
 class Board:
     """All rules of one page."""
 
-    def __init__(self) -> None:
+    def __init__(self, fault: Callable[[Exception], None]) -> None:
+        """`fault` hears why something cannot be shown."""
+        self._fault = fault
         self.groups: list[Group] = []
         self._of_fact: dict[str, list[Rule]] = defaultdict(list)
         self._of_handle: dict[int, list[Rule]] = {}
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
 
-    def group(self, fail: Callable[[Exception | None], None]) -> Group:
+    def group(self, fail: Fail = lambda _: None) -> Group:
         """Rules that are declared from now on belong to a group; groups are written in their order."""
-        self.groups.append(Group(fail))
+        self.groups.append(Group(fail, self._fault))
         return self.groups[-1]
 
     def show(self, handle: Any, **made: Callable[..., Any]) -> Any:

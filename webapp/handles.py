@@ -64,12 +64,6 @@ def _alike(known: Any, value: Any) -> bool:
     return isinstance(value, kind)
 
 
-def numbered(button: str, count: int) -> int | None:
-    """Place that a numbered button stands for (`3`, `3 ✕`: 2), of `count`; None for any other text."""
-    number, numbers = button.split(" ")[0], [str(k + 1) for k in range(count)]
-    return numbers.index(number) if number in numbers else None
-
-
 MAX_MESSAGE = 100_000
 """Longest message of the page that is read; a link with a design is the longest honest one."""
 KINDS = [int, str, str, str]
@@ -82,6 +76,11 @@ Act = Callable[[str, str], object]
 def press(kind: str, key: str) -> str:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
     return html("data-press='{}' data-key='{}'", kind, key)
+
+
+def button(word: str, kind: str, key: str = "", attributes: str = "") -> str:
+    """A button in markup that can be pressed; `attributes` are markup."""
+    return html("<button {} {}>{}</button>", attributes, press(kind, key), word)
 
 
 def placed(key: str, count: int) -> int:

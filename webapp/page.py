@@ -19,8 +19,7 @@ from webapp.board import Board, facts_of
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.background import EventLoop, Workers
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, EventLoop, Workers
 from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.solver import Solver
@@ -52,13 +51,13 @@ class Page:
         self._note: viser.NotificationHandle | None = None
         context = Context(client, session, solver, workers, page, self.do, self._refresh, self.notify)
         self.context, self.jobs = context, Jobs(context)
-        self.board = Board()
+        self.board = Board(self.fault)
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
         self.presses = Presses(client.gui, self.do)
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
-        self.opening = Opening(client.gui, self.presses)
+        self.opening = Opening(self.presses)
         hold_uploads(client.gui, LARGEST_BUNDLE, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()

@@ -20,9 +20,11 @@
   }
 
   window.finlabPresses = {
-    start(uuid) { channel = uuid; last = 0; unheard = []; clearTimeout(timer); },
+    start(uuid) {
+      if (channel === null) setTimeout(() => openLinked(enteredWith()));
+      channel = uuid; last = 0; unheard = []; clearTimeout(timer);
+    },
     tell,
-    ready: () => channel !== null,
     heard(number) { unheard = unheard.filter((word) => word[0] > number); },
   };
 
@@ -45,4 +47,45 @@
   listen('keydown', (event, { press, key }) => {
     if (event.key === 'Enter' && event.target.matches('[data-press][tabindex]')) tell(press, key, '');
   });
+
+  // A file that is dropped anywhere on the page goes the way of one that is chosen by the Open button. On a row of the
+  // list of fins it is for that fin. Several files, or a folder, are refused by the server.
+  const page = document.documentElement;
+  const isFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes('Files');
+  const show = (over) => page.classList.toggle('fl-dropping', over);
+
+  const carried = (kind, hear) => window.addEventListener(kind, (event) => isFiles(event) && hear(event), { capture: true });
+  carried('dragover', (event) => {
+    event.preventDefault();
+    event.dataTransfer.dropEffect = 'copy';
+    show(true);
+  });
+  carried('dragleave', (event) => { if (!event.relatedTarget) show(false); });
+  carried('drop', (event) => {
+    event.preventDefault();
+    event.stopPropagation();
+    show(false);
+    const { files, items } = event.dataTransfer;
+    if (files.length !== 1 || items[0].webkitGetAsEntry?.()?.isDirectory) return void tell('dropped', '', '');
+    const row = event.target.closest?.('.fin-list [data-press=fin]');
+    if (row) tell('fin', row.dataset.key, '');
+    const box = document.querySelector('div:has(> .fl-file) ~ div input[type=file]');
+    box.files = files;
+    box.dispatchEvent(new Event('change', { bubbles: true }));
+  });
+
+  // The design in the address that the page was opened with.
+  function openLinked(hash) {
+    if (!hash.startsWith('#design=')) return;
+    tell('design-link', '', hash.slice(1));
+    history.replaceState(null, '', location.pathname + location.search); // a reload goes on with what was made of it
+  }
+
+  // viser rewrites the address before anything of ours runs; how the page was entered is remembered elsewhere.
+  function enteredWith() {
+    const [entry] = performance.getEntriesByType('navigation');
+    return location.hash || new URL(entry?.name ?? location.href).hash;
+  }
+
+  window.addEventListener('hashchange', () => openLinked(location.hash));
 })();

@@ -22,8 +22,7 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
 from finlab.physics.objective import costs
 from webapp.session import Session
-from webapp.tasks.background import EventLoop
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, EventLoop
 from webapp.tasks.solver import Solver
 
 N_REFINED = 4

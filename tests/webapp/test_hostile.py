@@ -146,11 +146,9 @@ class Taken:
     def __init__(self) -> None:
         """Two takers."""
         self.files: list[tuple[str, str, bytes]] = []
-        interface = SimpleNamespace(queue_message=lambda message: None)
-        gui: Any = SimpleNamespace(_websock_interface=interface)
         self.heard: dict[str, Callable[[str, str], object]] = {}
         presses: Any = SimpleNamespace(on=lambda kind, act: self.heard.update({kind: act}))
-        self.opening = Opening(gui, presses)
+        self.opening = Opening(presses)
         self.opening.add(".csv,.txt", self._taker("fin"))
         self.opening.add(".yaml,.zip", self._taker("design"))
 

@@ -122,9 +122,8 @@ def chosen(name: str, **then: Any) -> SwimSettings:
 def test_every_scenario_plans_what_its_day_says(name: str) -> None:
     day, settings = SCENARIOS[name], chosen(name)
     plan = settings.plan(State(UCAT))
-    assert plan.current == day.current and plan.sensors == day.sensors
+    assert plan.day == day
     assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s
-    assert plan.truth == day.truth
     assert len(plan.losses) == day.lost and len(plan.weak) == (day.weak is not None)
     assert all(loss.time_s == 0.5 * plan.path.duration_s for loss in plan.losses)
     assert plan.announced == day.announced

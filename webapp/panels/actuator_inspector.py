@@ -80,7 +80,7 @@ def _add_place(page: Page) -> None:
     page.add_buttons("Snap to", snaps, hint="Ahead, astern, left, right, up, down.")
     about = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
     other = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=about)
-    page.bind_number(other, session.turn_about, of_part(_other))
+    page.bind_number(other, session.turn_about, of_part(lambda part: part.frame[0 if part.POINTED else 1]))
     board.show(
         other,
         label=of_part(lambda part: part.OTHER),
@@ -96,11 +96,6 @@ def _angles(part: Actuator) -> tuple[float, float]:
     """Azimuth and rise of a direction [deg]."""
     x, y, z = part.direction
     return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
-
-
-def _other(part: Actuator) -> Vector:
-    """The own axis that is not the direction."""
-    return part.frame[0 if part.POINTED else 1]
 
 
 def _has(part: Actuator, box: Box) -> bool:

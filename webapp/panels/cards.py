@@ -11,7 +11,7 @@ from finlab.analysis.score_card import quick_check
 from finlab.deploy.design_files import LAYOUTS
 from finlab.exchange import FOREIGN
 from finlab.layout import Layout
-from webapp.handles import add_html, press
+from webapp.handles import add_html, button
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.words import html, marker, righting_sentences
 from webapp.page import Page
@@ -43,15 +43,7 @@ def robot_name(layout: Layout, saved: Layout) -> str:
 
 def tasks(task: str) -> str:
     """What is being done: one of four tasks."""
-    buttons = (
-        html(
-            "<button {}{}>{}</button>",
-            Markup("aria-current=page ") * (name == task),
-            press("task", name),
-            name,
-        )
-        for name in TASKS
-    )
+    buttons = [button(name, "task", name, Markup("aria-current=page") * (name == task)) for name in TASKS]
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
 
 
@@ -63,13 +55,9 @@ def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | No
 
 def camera() -> str:
     """Sides to look from, and framing."""
-    looks = (
-        html("<button {} title='{}'>{}</button>", press("look", name), key, name)
-        for key, name in enumerate(CAMERAS, 1)
-    )
-    hint = "what is selected fills the view (F)"
-    frame = html("<button {} title='{}'>Frame</button>", press("frame", ""), hint)
-    return html("<div class='fl fl-camera'>{}{}</div>", looks, frame)
+    looks = [button(name, "look", name, html("title='{}'", key)) for key, name in enumerate(CAMERAS, 1)]
+    looks.append(button("Frame", "frame", "", Markup("title='what is selected fills the view (F)'")))
+    return html("<div class='fl fl-camera'>{}</div>", looks)
 
 
 def guide_card(stop: Stop | None, solved: bool) -> str:
@@ -85,15 +73,12 @@ def guide_card(stop: Stop | None, solved: bool) -> str:
         parts.append(html(exercise, "✓" if solved else "○", stop.exercise))
         if solved:
             parts.append(html("<p role='status'>{}</p>", stop.praise))
-    ways = [_button("Back", "back")] if place > 1 else []
-    ways.append(_button("Finish" if place == last else "Next", "on", primary=solved or not stop.exercise))
-    ways += [] if place == last else [_button("Close", "end")]
+    primary = Markup("class='primary'") * (solved or not stop.exercise)
+    ways = [button("Back", "back")] if place > 1 else []
+    ways.append(button("Finish" if place == last else "Next", "on", attributes=primary))
+    ways += [] if place == last else [button("Close", "end")]
     text = "<div class='fl fl-tour {}'><b>{}</b>{}<div class='row'>{}</div></div>"
     return html(text, kind, title, parts, ways)
-
-
-def _button(label: str, word: str, primary: bool = False) -> str:
-    return html("<button class='{}' {}>{}</button>", "primary" if primary else "", press(word, ""), label)
 
 
 def add_switches(page: Page) -> None:
@@ -132,9 +117,9 @@ def add_file(page: Page) -> None:
     page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
     page.opening.add(DESIGNS, designs.open)
     hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
-    button = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
+    opens = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
     # By the time that this is written, the panels below have said what can be opened.
-    page.board.show(button, mime_type=lambda: page.opening.suffixes)
+    page.board.show(opens, mime_type=lambda: page.opening.suffixes)
     save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
     page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
     share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
@@ -175,16 +160,8 @@ def _menu(course: tuple[Stop, ...]) -> str:
     """A button that opens a list of the lessons, or of the tour's stops."""
     said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", f"The app in {len(TOUR)} stops")}
     word, about = said[course]
-    items = (
-        html(
-            "<button {} popovertarget='fl-{}' popovertargetaction='hide'>{}. {}</button>",
-            press("stop", stop.name),
-            word,
-            place,
-            stop.title,
-        )
-        for place, stop in enumerate(course, 1)
-    )
+    hide = html("popovertarget='fl-{}' popovertargetaction='hide'", word)
+    items = [button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)]
     menu = (
         "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl fl-menu'><b>{}</b>"
         "<p>{}. Your own work comes back when you close them.</p>{}</div>"

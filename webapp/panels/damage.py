@@ -10,7 +10,6 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
-from webapp.handles import numbered
 from webapp.markup.words import button_colors
 from webapp.page import Page
 from webapp.session.state import STRENGTH_RANGE
@@ -44,9 +43,9 @@ def add_fin_buttons(
         return tuple([f"{k + 1} ✕" if name in failed else f"{k + 1}" for k, name in enumerate(known)])
 
     def pressed(button: str) -> None:
-        index = numbered(button, len(names))
-        if index is not None:
-            act(names[index])
+        numbers = {str(k + 1): name for k, name in enumerate(names)}
+        if (number := button.split(" ")[0]) in numbers:  # a page may send anything
+            act(numbers[number])
 
     page.add_html(paint)
     buttons = page.gui.add_button_group(label, ("1",), hint=hint)

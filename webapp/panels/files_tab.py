@@ -9,7 +9,7 @@ from finlab.layout import Layout
 from webapp.handles import add_html
 from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.session.files import bundle_name, design_name, graph_name, has_files, shipped, shipped_name
+from webapp.session.files import BUNDLE, GRAPH, design_name, file_stem, has_files, shipped, shipped_name
 from webapp.session.state import State
 
 
@@ -26,13 +26,13 @@ def add_files(page: Page) -> None:
 
 
 def _bundle(state: State) -> str:
-    file = bundle_name(state.layout)
+    file = file_stem(state.layout.name) + BUNDLE
     about = "for the robot: its actuators' physics, method, README and checksums. Test it there first"
     return _about(file, about, shlex.join(["finlab-runtime", "check", file]))
 
 
 def _graph(state: State) -> str:
-    file = graph_name(state.layout)
+    file = file_stem(state.layout.name) + GRAPH
     about = "the graph of actuators that the networks see: nodes, features, edges, for networkx and learners"
     return _about(file, about, shlex.join(["finlab", "layout", "show", file]))
 
@@ -62,7 +62,7 @@ def _about(file: str, about: str, command: str) -> str:
 def command_line(state: State) -> str:
     """The same question for `finlab allocate`, of a file that this page makes."""
     layout = state.layout
-    file = bundle_name(layout) if has_files(layout) else design_name(layout)
+    file = file_stem(layout.name) + BUNDLE if has_files(layout) else design_name(layout)
     words = ["finlab", "allocate", file, "--wrench"]
     words += [f"{value:g}" for value in state.target]
     damage = state.damage

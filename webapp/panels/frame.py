@@ -7,13 +7,12 @@ here. So widgets that were seen once stay mounted, and a change of task is one m
 
 import json
 from collections.abc import Callable
-from functools import partial
 from importlib.resources import files
 
 from markupsafe import Markup
 
 from finlab.layout import Layout
-from webapp.handles import add_html, press, put
+from webapp.handles import add_html, button, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
@@ -44,7 +43,7 @@ class Section:
     no old figure stands under a new name."""
 
     def __init__(self, page: Page, place: places.Place, index: int) -> None:
-        self.place, self.name, self._page = place, f"at-{index}", page
+        self.place, self.name, self._session = place, f"at-{index}", page.session
         self._met = False
         gui = page.gui
         self.group = page.board.group(self._fail)
@@ -65,12 +64,9 @@ class Section:
         return there
 
     def _fail(self, error: Exception | None) -> None:
-        if error is None:
-            self._say("")
-            return
-        name = self._page.session.state.layout.name
-        self._say(html("<div class='fl missing'>This cannot be shown of {}: {}</div>", name, str(error)))
-        self._page.fault(error)
+        name = self._session.state.layout.name
+        said = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
+        self._say("" if error is None else html(said, name, str(error)))
 
     def _say(self, text: str) -> None:
         put(self._sentence, content=text, visible=bool(text))
@@ -82,13 +78,14 @@ class Frame:
 
     def __init__(self, page: Page) -> None:
         self._page, gui = page, page.gui
-        run_file(gui, "places.js")
+        run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
-        page.board.group(self._fail)
+        page.board.group()
         self._shown = gui.add_html("")
         page.board.act(self._arrange)
         page.board.act(self._guard)
-        page.board.act(self._title)
+        title = "document.title = {};"
+        page.board.act(lambda layout: run_script(gui, title.format(json.dumps(layout.name + " · finlab"))))
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
@@ -96,19 +93,14 @@ class Frame:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
                 if region == places.DRAWER:
-                    page.board.group(self._fail)
+                    page.board.group()
                     page.add_html(_strip)
                 self.sections += [
                     Section(page, place, index)
                     for index, place in enumerate(places.PLACES)
                     if place.region == region
                 ]
-        for name in ("habits.js", "frames.js"):
-            run_file(gui, name)
-
-    def _fail(self, error: Exception | None) -> None:
-        if error is not None:
-            self._page.fault(error)
+        run_file(gui, "frames.js")
 
     def _arrange(
         self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None, layout: Layout
@@ -145,52 +137,34 @@ class Frame:
         drops = str(swims or fitting is not None or improving).lower()
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
-    def _title(self, layout: Layout) -> None:
-        run_script(self._page.gui, f"document.title = {json.dumps(layout.name + ' · finlab')};")
-
     def _listen(self) -> None:
         session, robot = self._page.session, self._page.scenery.robot
-        acts: dict[str, Callable[[str], object]] = {
-            "task": session.show_task,
-            "drawer": session.show_drawer,
-            "fold": lambda _: session.fold_drawer(),
-            "stop": session.guide.open,
-            "on": lambda _: session.guide.go(1),
-            "back": lambda _: session.guide.go(-1),
-            "end": lambda _: session.guide.end(),
-            "look": robot.look_from,
-            "frame": lambda _: robot.frame(),
-            "typed": lambda _: session.history.end_merge(),
+        acts: dict[str, Callable[[str, str], object]] = {
+            "task": lambda name, _: session.show_task(name),
+            "drawer": lambda name, _: session.show_drawer(name),
+            "fold": lambda *_: session.fold_drawer(),
+            "stop": lambda name, _: session.guide.open(name),
+            "on": lambda *_: session.guide.go(1),
+            "back": lambda *_: session.guide.go(-1),
+            "end": lambda *_: session.guide.end(),
+            "look": lambda view, _: robot.look_from(view),
+            "frame": lambda *_: robot.frame(),
+            "typed": lambda *_: session.history.end_merge(),
         }
         for kind, act in acts.items():
-            self._page.presses.on(kind, partial(_by_key, act))
-
-
-def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:
-    return act(key)
+            self._page.presses.on(kind, act)
 
 
 def _strip(desk: Desk) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
     opened, folded = desk.opened[desk.task], desk.folded
-    tabs = Markup().join(
-        html(
-            "<button aria-pressed='{}' {}>{}</button>",
-            str(name == opened and (not folded)).lower(),
-            press("drawer", name),
-            name,
-        )
-        for name in DRAWERS[desk.task]
-    )
+    seen = None if folded else opened
+    pressed = ((name, html("aria-pressed='{}'", str(name == seen).lower())) for name in DRAWERS[desk.task])
+    tabs = [button(name, "drawer", name, attribute) for name, attribute in pressed]
     word = "Open the drawer" if folded else "Fold the drawer"
-    fold = html(
-        "<button class='fold' aria-label='{}' title='{}' {}>{}</button>",
-        word,
-        word,
-        press("fold", ""),
-        "▴" if folded else "▾",
-    )
-    return html("<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", tabs, fold)
+    attributes = html("class='fold' aria-label='{}' title='{}'", word, word)
+    tabs.append(button("▴" if folded else "▾", "fold", "", attributes))
+    return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", tabs)
 
 
 class View(Page):

@@ -32,7 +32,6 @@ def add_corner(page: Page) -> None:
     def fail(error: Exception | None) -> None:
         if error is not None:
             put(content, content="")
-            page.fault(error)
 
     page.board.group(fail)
     content = page.add_html(_written)

@@ -22,7 +22,7 @@ from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, 
 from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context
 from webapp.tasks.jobs import Findings
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color

@@ -18,7 +18,7 @@ from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context
 from webapp.tasks.swimmer import PLACE, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
@@ -78,7 +78,6 @@ class Scenery:
             self.robot.show(self._swimming.swimmer)
         else:
             self.robot.hide()
-            self._fault(error)
 
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]: robots that swim move on."""

@@ -56,7 +56,6 @@ class Stage:
     """Everything that stays where it is while fins are edited."""
 
     def __init__(self, scene: viser.SceneApi, hull: Surface) -> None:
-        """Build the stage around a hull."""
         self._scene = scene
         self._hull = hull
         self._look: tuple[bool, bool] | None = None

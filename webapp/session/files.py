@@ -36,6 +36,8 @@ MAX_LINK = 16_000
 """Most characters of a design in a link; chats and mail programs cut longer ones."""
 PLAIN, ARCHIVE = "y", "a"
 """First character: a layout's YAML, compressed, or a ZIP archive with the files that it names."""
+BUNDLE, GRAPH = "_bundle.zip", ".graph.json"
+"""Ends of the names of files, after the layout's."""
 NO_DESIGN = "the link holds no whole design; copy all of it, or ask for the file"
 
 
@@ -65,16 +67,6 @@ def has_files(layout: Layout) -> bool:
 def design_name(layout: Layout) -> str:
     """Name of the file that a layout is saved as."""
     return f"{file_stem(layout.name)}.{'zip' if has_files(layout) else 'yaml'}"
-
-
-def bundle_name(layout: Layout) -> str:
-    """Name of the file of its bundle."""
-    return f"{file_stem(layout.name)}_bundle.zip"
-
-
-def graph_name(layout: Layout) -> str:
-    """Name of the file of its graph."""
-    return f"{file_stem(layout.name)}.graph.json"
 
 
 def read_layout(name: str, content: bytes) -> design_files.Opened:

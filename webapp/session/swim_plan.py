@@ -1,8 +1,6 @@
 """Settings of swims, and the plan that comes of them when a swim starts."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
@@ -10,7 +8,7 @@ from finlab.control import CONTROLLERS, make_controller, steerable_loss
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
-from finlab.sim import SHIPPED, Fault, SensorSettings, Trajectory, make_trajectory
+from finlab.sim import SHIPPED, Fault, Trajectory, make_trajectory
 from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(
@@ -75,21 +73,10 @@ class SwimSettings:
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         make_controller(self.controller, layout)
         affected = _affected(layout, state.failed, day)
-        return Plan(
-            layout,
-            state.failed,
-            path,
-            state.method,
-            self.scenario,
-            day.current,
-            day.truth,
-            day.sensors,
-            affected if day.weak is not None else (),
-            1.0 if day.weak is None else day.weak,
-            tuple(Fault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
-            self.announced,
-            self.controller,
-        )
+        weak = () if day.weak is None else affected
+        losses = tuple(Fault(name, 0.5 * path.duration_s) for name in affected) if day.lost else ()
+        robot = layout, state.failed, path, state.method
+        return Plan(*robot, day, weak, losses, self.announced, self.controller)
 
 
 def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
@@ -110,16 +97,9 @@ class Plan(NamedTuple):
     """Fins that are lost from the start, announced from the start."""
     path: Trajectory
     method: str
-    scenario: str = "nominal"
-    current: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Velocity of the water in the world [m/s]."""
-    truth: Mapping[str, Any] = MappingProxyType({})
-    """What the body really is: options of `finlab.sim.perturbed`."""
-    sensors: SensorSettings = SensorSettings()
+    day: HardDay = SCENARIOS["nominal"]
     weak: tuple[str, ...] = ()
-    """Fins that are weak, unannounced."""
-    share: float = 1.0
-    """Of their thrust that these give."""
+    """Fins that are weak as on that day, unannounced."""
     losses: tuple[Fault, ...] = ()
     announced: bool = True
     controller: str = "tracking"

@@ -10,8 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.session import Session
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 from webapp.tasks.solver import NO_MODES, Modes, Reply
 
 SEARCH_REST_S = 0.2

@@ -1,4 +1,4 @@
-"""Threads that compute, viser's event loop, and questions of which the newest wins."""
+"""Threads that compute, the page that they work for, and questions of which the newest wins."""
 
 import asyncio
 import threading
@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Generic, TypeVar
 
+import viser
+
 from finlab.errors import FinlabError
+from webapp.session import Session
+from webapp.tasks.solver import Solver
 
 Job = Callable[[], None]
 Failed = Callable[[str], None]
@@ -194,3 +198,31 @@ class Newest(Generic[Question, Found]):
         if begun is self._round:
             self.answered, self.findings, self.error, self.progress = question, findings, error, None
             self._changed()
+
+
+@dataclass(frozen=True)
+class Context:
+    """One page."""
+
+    client: viser.ClientHandle
+    session: Session
+    solver: Solver
+    workers: Workers
+    loop: EventLoop
+    do: Callable[[Callable[[], object]], None]
+    changed: Callable[[], None]
+    """Renders the page; called on the loop when there is something new to show."""
+    notify: Callable[..., None]
+    """Shows a note: title and sentence, and whether it is `calm`; called on the loop."""
+
+    def make(self, work: Callable[[], Found], use: Callable[[Found], object], kind: Hashable) -> None:
+        """Do what takes time on a thread, and use what it gives on the loop, as an intent of the user. What
+        waits gives way to a newer one of its `kind`."""
+
+        def job() -> None:
+            self.loop.post(partial(self.do, partial(use, work())))
+
+        def refused(text: str) -> None:
+            self.loop.post(partial(self.notify, "Not possible", text))
+
+        self.workers.readers.submit((id(self), kind), job, refused)

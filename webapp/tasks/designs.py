@@ -5,8 +5,6 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
 
-import viser
-
 from finlab.deploy.bundle import graph_text, make_bundle
 from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
@@ -18,9 +16,9 @@ from webapp.handles import Presses
 from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context
 from webapp.tasks.swimming import Swimming
-from webapp.viser_internals import run_file, run_script
+from webapp.viser_internals import run_script
 
 KINDS = (
     "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
@@ -104,14 +102,14 @@ class Designs:
         now, solver = self._session.state, self._context.solver
         shipped = State(now.layout, method=now.method)
         self._export(
-            files.bundle_name(now.layout),
+            file_stem(now.layout.name) + files.BUNDLE,
             lambda: make_bundle(solver.allocator(shipped), now.failed).zip_bytes(),
         )
 
     def graph(self) -> None:
         """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
         layout = self._session.state.layout
-        self._export(files.graph_name(layout), lambda: graph_text(layout).encode())
+        self._export(file_stem(layout.name) + files.GRAPH, lambda: graph_text(layout).encode())
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""
@@ -132,10 +130,9 @@ class Designs:
 class Opening:
     """The kinds of files that one page opens, and who takes each."""
 
-    def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
+    def __init__(self, presses: Presses) -> None:
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
-        run_file(gui, "opening.js")
 
     @property
     def suffixes(self) -> str:

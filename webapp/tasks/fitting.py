@@ -15,8 +15,7 @@ from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker
 from finlab.layout import Actuator, Fin
 from webapp.session.files import table_folder
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 
 if TYPE_CHECKING:  # scipy takes its time, and only who fits needs it
     from finlab.fit.fin_fit import FinFit

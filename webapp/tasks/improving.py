@@ -16,8 +16,7 @@ from finlab.layout import Layout
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
 from webapp.session.looking import GOAL_WORDS, SearchRequest
 from webapp.session.state import State
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 
 ALONG = np.linspace(ROOT, ROOT + SPAN, 4)
 """Places along a fin's shaft, from where its blade begins to where it ends [m]."""

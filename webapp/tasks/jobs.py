@@ -12,8 +12,7 @@ from finlab.layout import Layout
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State, compared
 from webapp.tasks.answering import Answering, Refining
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming

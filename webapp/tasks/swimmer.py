@@ -126,7 +126,7 @@ class Swimmer:
     @property
     def about(self) -> str:
         """The scenario."""
-        return self._plan.scenario
+        return self._plan.day.name
 
     def step(self) -> None:
         """Swim for one control period."""
@@ -181,21 +181,21 @@ class Swimmer:
 
 def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
     """The swim of a plan with an allocator, at its start."""
-    layout = plan.layout
+    layout, day = plan.layout, plan.day
     swim = ClosedLoop(
         layout,
         allocator,
         plan.path,
         make_controller(plan.controller, layout),
-        sensors=plan.sensors,
-        current=plan.current,
+        sensors=day.sensors,
+        current=day.current,
         failures=plan.losses,
         announced=plan.announced,
         monitor=FaultMonitor(layout),
-        truth=perturbed(layout, **plan.truth),
+        truth=perturbed(layout, **day.truth),
     )
     for name in plan.failed:
         swim.fail(name, announced=True)
     for name in plan.weak:
-        swim.fail(name, "torn", plan.share, announced=False)
+        swim.fail(name, "torn", day.weak or 0.0, announced=False)
     return swim

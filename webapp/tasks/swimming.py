@@ -10,8 +10,7 @@ from finlab.layout.damage import Kind
 from finlab.sim import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
-from webapp.tasks.background import Newest
-from webapp.tasks.context import Context
+from webapp.tasks.background import Context, Newest
 from webapp.tasks.swimmer import Moment, Swimmer, closed_loop
 
 LAG_S = 0.25
@@ -34,7 +33,6 @@ class Swimming:
     """The swim of one page. All methods but `_made` and `_advance` run on the event loop."""
 
     def __init__(self, context: Context) -> None:
-        """Nothing swims yet."""
         # An allocator of its own, for it is used on the thread that swims.
         self._solver, self._changed, self._notify = context.solver.aside, context.changed, context.notify
         loop, worker = context.loop, context.workers.swims
@@ -47,11 +45,6 @@ class Swimming:
         self.running = False
         self.pace = Pace()
         self._acts: deque[Callable[[Swimmer], None]] = deque()
-
-    @property
-    def busy(self) -> bool:
-        """Whether it is just swimming a stretch."""
-        return self._stretch.busy
 
     @property
     def done(self) -> bool:
@@ -161,7 +154,6 @@ class Pace:
     """Counts what is owed to the clock, and measures what is paid."""
 
     def __init__(self) -> None:
-        """At real time, with nothing owed."""
         self.speed = 1.0
         """Simulated time per time on the wall that is asked for."""
         self._owed = 0.0
