@@ -47,6 +47,11 @@ class Swimming:
         self._acts: deque[Callable[[Swimmer], None]] = deque()
 
     @property
+    def busy(self) -> bool:
+        """Whether it is just swimming a stretch."""
+        return self._stretch.busy
+
+    @property
     def done(self) -> bool:
         """Whether it has come to its end."""
         return self.swimmer is not None and self.swimmer.shown.done
