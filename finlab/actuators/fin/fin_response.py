@@ -8,6 +8,7 @@ force that the same cost gives in each direction.
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,9 +144,13 @@ class FinGroup(Group):
         return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
+_LOCK = Lock()
+
+
 def fin_table(fin: Any) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
-    result = _compiled(fin.model, fin.limits, file_stamp(fin.reads))
+    with _LOCK:  # of two threads each would compile one, and equal fins would not be known as alike
+        result = _compiled(fin.model, fin.limits, file_stamp(fin.reads))
     if result is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
