@@ -31,6 +31,7 @@ Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
 """A coordinate of a place on a robot, or an arm of torque [m]."""
 Place = tuple[Metres, Metres, Metres]
 Seconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
+Diameter = Annotated[float, Meta(ge=1e-3, le=20.0)]
 TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
 TurnRateDegrees = Annotated[float, Meta(ge=0.06, le=57000.0)]
 
@@ -231,6 +232,16 @@ class Actuator(Checked, ABC):
     def takes(self) -> tuple[str, ...]:
         """The faults of `FAULTS` that may befall this one."""
         return self.FAULTS
+
+    @property
+    def jet(self) -> float:
+        """Diameter of the jet with which it pushes, where that begins [m]; 0 of one without a jet."""
+        return 0.0
+
+    @property
+    def advance(self) -> float | None:
+        """Share of thrust lost per speed along the thrust over that of the jet; None where it is unknown."""
+        return None
 
     @property
     def delay_s(self) -> float:

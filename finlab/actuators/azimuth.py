@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
-from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.propeller import T200, ForceRate, OpenWater, Propeller, PropellerLaw, Threshold, force_words
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
@@ -175,6 +175,10 @@ class Azimuth(Propeller):
     """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
     uncertainty: actuator.Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
+    diameter: actuator.Diameter | None = None
+    """Of the propeller [m], for its jet; None where it is guessed from the force."""
+    open_water: OpenWater | None = None
+    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

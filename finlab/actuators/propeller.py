@@ -1,5 +1,6 @@
 """The propeller of thrusters, fixed or turning: its description, its law, and its input for a force."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Annotated, Any, ClassVar, Self
@@ -17,6 +18,9 @@ ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
 Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
 T200 = PowerLaw(0.997, 1.449)
 """Power of a T200 of Blue Robotics at 16 V."""
+T200_FORCE, T200_DIAMETER = 51.44, 0.076
+"""Its largest force [N], and the diameter of its propeller [m]."""
+OpenWater = tuple[Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]]
 LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
 
 
@@ -30,11 +34,13 @@ class Propeller(Actuator):
         "torque_per_newton": "torque_per_newton_m",
         "time_constant": "time_constant_s",
         "rate": "rate_n_s",
+        "diameter": "diameter_m",
     }
     BOXES: ClassVar[tuple[Box, ...]] = (
         Box("Dead band [N]", "dead_band", "Forces smaller than this, but 0, cannot be held."),
         Box("Rate [N/s]", "rate", "How fast the force changes; 0: at once.", free=True),
         Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
+        Box("Diameter [m]", "diameter", "Of the propeller, for its jet; 0: by its force.", 0.01, free=True),
         Box("Torque/force [m]", "torque_per_newton", "Reaction torque, signed.", 0.001),
     )
     LAW_BOXES = (
@@ -51,6 +57,22 @@ class Propeller(Actuator):
     model: ThrustModel
     dead_band: float
     rate: float | None
+    diameter: float | None
+    open_water: tuple[float, float] | None
+
+    @property
+    def jet(self) -> float:
+        """See `Actuator`: its diameter, or that at which its largest force loads the disc as a T200's."""
+        return self.diameter or T200_DIAMETER * math.sqrt(max(map(abs, self.force)) / T200_FORCE)
+
+    @property
+    def advance(self) -> float | None:
+        """See `Actuator`. Along the line `Kt = Kt0 (1 - J / J0)`, `J = V / (n D)` (Fossen, 2011, section
+        9.4), the loss is `J / J0`, and the jet's speed at rest is `n D sqrt(8 Kt0 / pi)`."""
+        if self.open_water is None:
+            return None
+        at_rest, none_at = self.open_water
+        return math.sqrt(8.0 * at_rest / math.pi) / none_at
 
     def with_value(self, key: str, value: Any) -> Self:
         if key not in LAW_KEYS:

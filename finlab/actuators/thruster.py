@@ -10,8 +10,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from finlab.actuators.actuator import Box, Command, Faults, Metres, Place, Seconds, Uncertainty
-from finlab.actuators.propeller import T200, ForceRate, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.actuator import Box, Command, Diameter, Faults, Metres, Place, Seconds, Uncertainty
+from finlab.actuators.propeller import T200, ForceRate, OpenWater, Propeller, PropellerLaw, Threshold, force_words
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
@@ -120,6 +120,10 @@ class Thruster(Propeller):
     """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
     uncertainty: Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
+    diameter: Diameter | None = None
+    """Of the propeller [m], for its jet; None where it is guessed from the force."""
+    open_water: OpenWater | None = None
+    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -39,11 +39,14 @@ class CommandProblem:
     """Upper limits (n, 3)."""
     full_turn: NDArray[np.bool_]
     """True (n,) where the zero direction may turn a full circle."""
+    sigma: Array | None = None
+    """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any other."""
 
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
         """A robot as its actuators' own laws say, wrenches normalized by `sigma` (6,)."""
-        return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
+        own = None if plant.interaction is None else sigma
+        return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -59,9 +62,22 @@ class CommandProblem:
 
     def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
+        return self.wrench_of(self.forces.force(command))
+
+    def wrench_of(self, force: AnyArray) -> AnyArray:
+        """The same of forces (R, n, 3)."""
         effectiveness = self.effectiveness.reshape(-1, 6)
-        force: AnyArray = self.forces.force(command)
-        return force.reshape(len(command), len(effectiveness)) @ effectiveness
+        wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
+        return wrench if self.sigma is None else wrench + self.forces.offset(force) / self.sigma
+
+    def slope(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives (R, n, 3, 6)."""
+        force, jacobian = self.forces.force_and_jacobian(command)
+        if self.sigma is None:
+            return self.wrench_of(force), np.matmul(jacobian, self.effectiveness)
+        offset, effectiveness = self.forces.effect(force)
+        wrench = np.einsum("rnk,nkw->rw", force, self.effectiveness) + offset / self.sigma
+        return wrench, np.matmul(jacobian, effectiveness / self.sigma)
 
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first."""
@@ -91,8 +107,7 @@ def refine(
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
-        jacobian = np.matmul(at.jacobian, problem.effectiveness)
-        jacobian *= problem.width[..., None]
+        jacobian = at.jacobian * problem.width[..., None]
         there = _step(problem, at, jacobian, damping)
         there *= problem.width
         there += at.command
@@ -106,7 +121,7 @@ def refine(
 
 class _Evaluated(NamedTuple):
     """R commands, normalized wrenches (R, 6), targets minus these, squared sizes of that (R,), and the
-    derivatives of each force by each command (R, n, 3 commands, 3)."""
+    derivatives of the wrenches (R, n, 3 commands, 6)."""
 
     command: AnyArray
     wrench: AnyArray
@@ -122,13 +137,10 @@ def _evaluated(
     problem: CommandProblem, target: AnyArray, command: AnyArray, jacobian: AnyArray | None
 ) -> _Evaluated:
     """Errors of commands; slopes that are given are not computed again."""
-    rows, n, _ = command.shape
     if jacobian is None:
-        force, jacobian = problem.forces.force_and_jacobian(command)
+        wrench, jacobian = problem.slope(command)
     else:
-        force = problem.forces.force(command)
-    effectiveness = problem.effectiveness.reshape(-1, 6)
-    wrench = force.reshape(rows, len(effectiveness)).dot(effectiveness)
+        wrench = problem.wrench(command)
     residual = target - wrench
     return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), jacobian)
 

@@ -139,7 +139,8 @@ class MotionModel:
         # One that does not work gives nothing, but for one that is stuck and cannot be used.
         force *= (moves.pushes | ~(np.isnan(held) | self._turned_off))[:, None]
         self._thrust = force[0]
-        now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0]
+        offset = self._plant.offset(force, flow=flow)[:, None] / force.shape[1]
+        now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0] + offset
         # What stops, stops at once.
         mean = np.where(np.isfinite(command[:, :1]), 0.5 * (self._force + now), now)
         self._force = now

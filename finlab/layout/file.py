@@ -23,7 +23,7 @@ from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, form, shown
-from finlab.layout.file_form import BODY, HORIZONTAL_FIN, Reader, actuator_form, plain, under
+from finlab.layout.file_form import BODY, HORIZONTAL_FIN, INTERACTION, Reader, actuator_form, plain, under
 from finlab.layout.layout import MAX_ACTUATORS, Layout
 from finlab.whole_file import write_whole
 
@@ -46,7 +46,7 @@ _OF_A_LAYOUT: dict[str, Any] = {
     "format": Literal["finlab-layout"],
     "body": BODY,
     "frame": Frame,
-    "optional": ["frame"],
+    "optional": ["frame", "interaction"],
 }
 _COUNT = Meta(min_length=1, max_length=MAX_ACTUATORS)
 LAYOUT_OF_FINS = form(
@@ -56,6 +56,7 @@ LAYOUT_OF_FINS = form(
     tag=("version", 1),
     actuators=None,
     axes=None,
+    interaction=None,
     fins=Annotated[list[HORIZONTAL_FIN], _COUNT],
     **_OF_A_LAYOUT,
 )
@@ -70,7 +71,8 @@ def layout_form() -> Any:
 def _layout_form(kinds: tuple[type[Actuator], ...]) -> Any:
     kind: Any = list[actuator_form(kinds)]  # type: ignore[misc]
     parts = Annotated[kind, _COUNT]
-    return LAYOUT_OF_FINS | form(Layout, {}, tag=("version", 2), actuators=parts, **_OF_A_LAYOUT)
+    kinds = {"actuators": parts, "interaction": INTERACTION, **_OF_A_LAYOUT}
+    return LAYOUT_OF_FINS | form(Layout, {}, tag=("version", 2), **kinds)
 
 
 def parse_layout(
@@ -91,12 +93,13 @@ def parse_layout(
         key = VERSIONS[data["version"]]
         reader = Reader(folder, may_open)
         values = {}
-        for name in (key, "body"):
+        for name in (key, "body", "interaction"):
             with under(name):
-                values[name] = reader.value(getattr(file, name))
+                values[name] = reader.value(getattr(file, name, None))
         axes = getattr(file, "axes", None) or AXES
         try:
-            return Layout(file.name, values[key], file.description or "", values["body"], tuple(axes))
+            about = file.description or "", values["body"], tuple(axes), values["interaction"]
+            return Layout(file.name, values[key], *about)
         except LayoutError as error:
             raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
@@ -116,7 +119,7 @@ def check_version(data: Any, form: str, *versions: int) -> None:
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
     """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
     horizontal = layout.is_of_fins and all(fin.mounting_angle is not None for fin in layout.fins)
-    horizontal &= layout.axes == AXES
+    horizontal &= layout.axes == AXES and layout.interaction is None
     version = 1 if horizontal else 2
     data: dict[str, Any] = {"format": FORMAT, "version": version, "name": layout.name}
     if layout.description:
@@ -129,7 +132,8 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["fins"] = [{key: value for key, value in part.items() if key != "type"} for part in parts]
     else:
         data["actuators"] = parts
-    return data if layout.body is None else data | {"body": plain(layout.body)}
+    parts = {name: getattr(layout, name) for name in ("body", "interaction")}
+    return data | {name: plain(part) for name, part in parts.items() if part is not None}
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:

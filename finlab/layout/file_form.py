@@ -21,6 +21,8 @@ from finlab.actuators.fin.fin_model import FinModelSpec, Limits, Model
 from finlab.actuators.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row, ThrustModel
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, form
+from finlab.interaction.jets import Jets
+from finlab.interaction.learned import Learned
 from finlab.layout.body import Body, Hull
 
 
@@ -67,6 +69,7 @@ def actuator_form(kinds: tuple[type[Actuator], ...]) -> Any:
 
 
 BODY = form(Body, hull=form(Hull))
+INTERACTION: Any = form(Jets) | form(Learned)
 
 
 @contextmanager

@@ -17,6 +17,8 @@ from finlab.arrays import Array
 from finlab.axes import AXES, CommandedAxes, mask_of
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Name
+from finlab.interaction.jets import Jets
+from finlab.interaction.learned import Learned
 from finlab.layout.body import Body
 
 MAX_ACTUATORS = 64
@@ -39,6 +41,8 @@ class Layout(Checked):
     """Hull, mass and hydrodynamics, where known."""
     axes: CommandedAxes = AXES
     """Axes of the wrench that the robot commands; the others take what the cheapest answer gives them."""
+    interaction: Jets | Learned | None = None
+    """What the actuators do to each other; None where that does not count."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -58,7 +62,7 @@ class Layout(Checked):
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.actuators, self.description, self.body, self.axes))
+        return hash((self.name, self.actuators, self.description, self.body, self.axes, self.interaction))
 
     def __hash__(self) -> int:
         # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
@@ -90,7 +94,8 @@ class Layout(Checked):
 
     @cached_property
     def _files(self) -> tuple[str, ...]:
-        return tuple(part.reads for part in self.actuators if part.reads)
+        own = (self.interaction.path,) if isinstance(self.interaction, Learned) else ()
+        return (*own, *(part.reads for part in self.actuators if part.reads))
 
     @property
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:

@@ -22,6 +22,7 @@ from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
+from finlab.layout.places import places_of
 
 
 class Plant:
@@ -43,8 +44,13 @@ class Plant:
         laws = laws_of(layout.actuators)
         # A robot of one law is spared the copies of fancy indexing.
         self._laws: list[tuple[Any, ActuatorLaw]] = [(slice(None), laws[0][1])] if len(laws) == 1 else laws
-        self.feels_flow = any(law.feels_flow for _, law in self._laws)
-        """Whether forces depend on the flow."""
+        own = layout.interaction
+        self.interaction = None if own is None else own.of(places_of(layout))
+        """What the actuators do to each other; None where that does not count."""
+        self.counts: NDArray[np.bool_] = np.ones(6, bool)
+        """Axes (6,) of the wrench that count, the others being 0."""
+        self.feels_flow = own is not None or any(law.feels_flow for _, law in self._laws)
+        """Whether forces, or wrenches, depend on the flow."""
         self.flow: Array | None = None
         """The flow (..., 6) where a call names none."""
         self._inflow: Array | None = None
@@ -65,7 +71,7 @@ class Plant:
         if axes.all():
             return self
         other = copy(self)
-        other.effectiveness = np.where(axes, self.effectiveness, 0.0)
+        other.effectiveness, other.counts = np.where(axes, self.effectiveness, 0.0), axes
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
@@ -75,10 +81,13 @@ class Plant:
             return self._inflow
         if not self.feels_flow:
             return None
-        water = np.asarray(flow, np.float64)[..., None, :]
-        moved = water[..., :3] + np.cross(water[..., 3:], self.layout.position)
-        met: Array = np.einsum("...nb,nab->...na", moved, self.layout.frames)
+        met: Array = np.einsum("...nb,nab->...na", self._moved(flow), self.layout.frames)
         return met
+
+    def _moved(self, flow: Array) -> Array:
+        """Velocity (..., n, 3) of each actuator's place through the water, body frame [m/s]."""
+        water = np.asarray(flow, np.float64)[..., None, :]
+        return np.asarray(water[..., :3] + np.cross(water[..., 3:], self.layout.position))
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the wrench that a command causes. Raises CommandError: the shape does not fit the layout,
@@ -91,8 +100,34 @@ class Plant:
         Returns:
             (..., 6) [N, N m], body frame.
         """
-        wrench: Array = wrench_of_forces(self.forces(command, flow=flow), self.effectiveness)
-        return wrench
+        return self.wrench_of(self.forces(command, flow=flow), flow=flow)
+
+    def wrench_of(self, force: Array, *, flow: Array | None = None) -> Array:
+        """Returns the wrench (..., 6) [N, N m] of forces (..., n, 3) [N] in own frames."""
+        wrench: Array = wrench_of_forces(force, self.effectiveness)
+        return wrench if self.interaction is None else wrench + self.offset(force, flow=flow)
+
+    def offset(self, force: Array, *, flow: Array | None = None) -> Array:
+        """Returns the part of it (..., 6) that comes of what the actuators do to each other."""
+        known = self.interaction
+        if known is None:
+            return np.zeros((*force.shape[:-2], 6))
+        change = known(body_force(force, self.layout.frames), self._met_by_all(flow))
+        return known.wrench(change) * self.counts
+
+    def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
+        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted, near
+        forces."""
+        known, frames = self.interaction, self.layout.frames
+        if known is None:
+            return self.offset(force), self.effectiveness
+        change, slope = known.slope(body_force(force, frames), self._met_by_all(flow))
+        more = frames @ np.einsum("...naib,ibw->...naw", slope, known.lever)
+        return known.wrench(change) * self.counts, self.effectiveness + more * self.counts
+
+    def _met_by_all(self, flow: Array | None) -> Array | None:
+        flow = self.flow if flow is None else flow
+        return None if flow is None else self._moved(flow)
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
@@ -131,8 +166,9 @@ class Plant:
         """Returns wrenches (..., 6) of commands (..., n, 3) without failed ones, and their derivatives
         (..., 6, 3 n), one actuator after the other."""
         force, jacobian = self.force_and_jacobian(command, flow=flow)
-        jacobian = (jacobian @ self.effectiveness).reshape(*force.shape[:-2], 3 * self.n, 6)
-        wrench: Array = wrench_of_forces(force, self.effectiveness)
+        offset, effectiveness = self.effect(force, flow=flow)
+        jacobian = (jacobian @ effectiveness).reshape(*force.shape[:-2], 3 * self.n, 6)
+        wrench: Array = wrench_of_forces(force, self.effectiveness) + offset
         return wrench, jacobian.swapaxes(-1, -2)
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:

@@ -291,7 +291,7 @@ class ClosedLoop:
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         force[list(self.layout.indices(self.damage.lost))] = 0.0
-        before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
+        before, self._gave = self._gave, self._plant.wrench_of(force, flow=self._flow)
         return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
@@ -337,8 +337,9 @@ class ClosedLoop:
                 share[self.layout.index(fault.name)] = fault.share
         mean, power = np.zeros((n, 6)), np.zeros((2, n))
         for k in range(n_steps):
-            push = self._forces.step(moved, dt, self.vehicle.velocity_in_water(self.state), share)
-            wrenches = np.einsum("nk,nkw->nw", push.force, self._forces.effectiveness)
+            water = self.vehicle.velocity_in_water(self.state)
+            push = self._forces.step(moved, dt, water, share)
+            wrenches = self._forces.wrenches(push.force, water)
             self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.sample(time + (k + 1) * dt, self.state)

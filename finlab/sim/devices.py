@@ -179,7 +179,7 @@ class ActuatorForce:
     def __init__(self, layout: Layout, fins: FinMotion) -> None:
         """Takes the true robot and how its fins move."""
         self.motion, self._beat = ActuatorMotion(layout, fins), fins
-        of_fins, of_others = self.motion.of_fins, self.motion.of_others
+        of_fins, of_others, self._plant = self.motion.of_fins, self.motion.of_others, plant_of(layout)
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
         if len(of_fins):
@@ -211,6 +211,12 @@ class ActuatorForce:
             spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
             watts = np.array([0.0 * spent, spent])
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
+
+    def wrenches(self, force: Array, water: Array) -> Array:
+        """Returns the wrench (n, 6) [N, N m] of each actuator's force (n, 3) [N], with an equal share of what
+        they do to each other; `water` as in `step`."""
+        offset = self._plant.offset(force, flow=water) / len(force)
+        return np.asarray(np.einsum("nk,nkw->nw", force, self.effectiveness) + offset)
 
     def of_fins(self, dt: float) -> Array:
         """Force (n, 3) of each fin in its own frame [N], the mean over the step `dt` [s] that has just been

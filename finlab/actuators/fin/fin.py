@@ -17,6 +17,7 @@ from finlab.actuators.actuator import (
     Actuator,
     Box,
     Command,
+    Diameter,
     Faults,
     Places,
     Uncertainty,
@@ -122,7 +123,7 @@ def _box(law: str, key: str, rule: Parameter) -> Box:
 class Fin(Actuator):
     """One fin on the hull, its shaft horizontal or in any direction. Checked on construction."""
 
-    KEYS: ClassVar[Mapping[str, str]] = {"position": "position_m"}
+    KEYS: ClassVar[Mapping[str, str]] = {"position": "position_m", "diameter": "diameter_m"}
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
         "mounting_angle": ("mounting_angle_deg", Annotated[float, Meta(ge=-360.0, le=360.0)])
     }
@@ -161,6 +162,8 @@ class Fin(Actuator):
     `mounting_angle` is given; zero is e_z x shaft then."""
     uncertainty: Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
+    diameter: Diameter | None = None
+    """Of a disc as large as the area that it sweeps [m], for its jet; None where its blade is as large."""
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -242,6 +245,14 @@ class Fin(Actuator):
     def takes(self) -> tuple[str, ...]:
         """See `Actuator`: the thrust of a table cannot be scaled."""
         return tuple(fault for fault in self.FAULTS if fault != "torn" or self.reads is None)
+
+    @property
+    def jet(self) -> float:
+        """See `Actuator`. A blade that beats by half a radian sweeps about its own area."""
+        known = self.model.values()
+        area = known.get("area", 0.02 if self.model.type != "lighthill" else known.get("length", 0.0))
+        area = float(area) * float(known.get("width", 1.0))
+        return self.diameter or math.sqrt(4.0 * area / math.pi)
 
     @property
     def delay_s(self) -> float:

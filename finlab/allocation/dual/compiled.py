@@ -1,11 +1,13 @@
 """A layout compiled for the dual: the answers of its actuators, and the commands for the forces found."""
 
 from copy import copy
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Plane, with_square
+from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
@@ -21,7 +23,7 @@ class Compiled:
     def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
         """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
         beside its power is `doubt`, see `price_of_doubt`. Errors as for `FinGroup`."""
-        self.count = layout.n
+        self.count, self._actuators = layout.n, layout.actuators
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -55,6 +57,32 @@ class Compiled:
             (places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups
         ]
         other._prepare()
+        return other
+
+    @cached_property
+    def _directions(self) -> tuple[NDArray[np.intp], Array]:
+        """The actuator (k,) of each of the robot's directions, and that direction (k, 3) in its own axes."""
+        groups, order = groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))), self.robot.order
+        responses = {place: one for places, group in groups for place, one in zip(places, group.responses, strict=True)}
+        lines = [i for i in order if isinstance(responses[i], Line)]
+        planes = [i for i in order if isinstance(responses[i], Plane)]
+        dragging = [i for i in lines if responses[i].drag is not None]
+        rows = [responses[i].effectiveness for i in lines]
+        rows += [responses[i].effectiveness[k] for k in range(2) for i in planes]
+        rows += [responses[i].drag for i in dragging]
+        return np.array([*lines, *planes, *planes, *dragging]), np.array(rows)[:, :3]
+
+    def forces_along(self, force: Array) -> Array:
+        """Forces (k, 1) [N] along the robot's directions of forces (n, 3) [N] in own axes."""
+        places, directions = self._directions
+        return np.einsum("ka,ka->k", directions, force[places])[:, None]
+
+    def tilted(self, effectiveness: Array, beside: Array) -> "Compiled":
+        """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench
+        `beside`."""
+        other, (places, directions) = copy(self), self._directions
+        other.robot = self.robot.tilted(np.einsum("ka,kaw->kw", directions, effectiveness[places]))
+        other.beside = beside
         return other
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:

@@ -66,7 +66,7 @@ class Search(NamedTuple):
         """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) is the
         cheapest, nearly: what a change of it adds to the wrench is worth the power that it adds."""
         problem = self.problem
-        jacobian = problem.forces.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
+        jacobian = problem.slope(command[None])[1][0]
         low, high = problem.edges
         free = (command > low) & (command < high)
         width = problem.width[free]
@@ -105,7 +105,7 @@ class Search(NamedTuple):
         problem = self.problem
         width = np.maximum(problem.width, NOTHING)
         tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
-        jacobian = width[:, :, None] * (problem.forces.force_and_jacobian(tried)[1] @ problem.effectiveness)
+        jacobian = width[:, :, None] * problem.slope(tried)[1]
         slope = width * self.slope(tried)
         low, high = problem.edges
         free = (command > low) & (command < high)

@@ -7,6 +7,7 @@ the previous ones (`rates`).
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
@@ -20,6 +21,7 @@ from finlab.allocation.dual.drag import EXACT, Search
 from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, Rates, nearest, within_tick
 from finlab.allocation.dual.sets import Sets
+from finlab.allocation.dual.turns import WORTH_TRYING, Linear, Turn, in_turns, power, turned_aside
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
@@ -126,10 +128,11 @@ class Dual(Method):
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
     ) -> Solution:
-        robot, resting = self.compiled.robot, self.compiled.beside
-        begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
-        deadline = Deadline(len(targets))
-        forces = self._forces(targets - resting, policy, deadline, begin)
+        if self.plant.interaction is not None:
+            rows = [self._in_turns(target[None], policy, previous, prices) for target in targets]
+            return _stacked(rows)
+        resting, deadline = self.compiled.beside, Deadline(len(targets))
+        forces = self._forces(targets - resting, policy, deadline, self._begin(prices))
         aim = targets if forces.within.all() else forces.aim + resting
         command = self._commands(aim, forces, previous)
         notes = set()
@@ -143,6 +146,67 @@ class Dual(Method):
         return Solution(
             command, None if self._unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
         )
+
+    def _begin(self, prices: Array | None) -> Array | None:
+        """Prices (6,) [W/N, W/(N m)] in the robot's basis (r, 1)."""
+        robot = self.compiled.robot
+        return None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
+
+    def _in_turns(
+        self, target: Array, policy: Policy, previous: Array | None, prices: Array | None
+    ) -> Solution:
+        """The answer for one target (1, 6) of actuators that act on each other."""
+        deadline = Deadline(1)
+        forces = self._forces(target - self.compiled.beside, policy, deadline, self._begin(prices))
+        def answer(model: Linear, price: Array) -> Turn:
+            linear = self._linear(model)
+            own = linear._forces(target - linear.compiled.beside, policy, deadline, linear._begin(price))
+            worth = float(np.linalg.norm(own.price[0] * self.scale))
+            return Turn(own.force, own.price[0], worth, (linear, own))
+
+        def settled(begin: Array) -> tuple[Array, Array, Forces]:
+            turn = in_turns(
+                begin,
+                forces.price[0],
+                exact,
+                self.compiled.forces_along,
+                answer,
+                self.plant,
+                lambda command: float(self._error(command, target)[0]),
+            )
+            linear, own = turn.answer
+            own = own._replace(force=self.compiled.forces_along(self.plant.force(turn.command)[0]))
+            aim = target if own.within.all() else own.aim + linear.compiled.beside
+            return aim, linear._commands(aim, own, previous), own
+
+        def exact(force: Array) -> Array:
+            command = self.compiled.commands(force, previous)
+            return refine(self._search.problem, target / self.scale, command, 4, 1e-7).command
+
+        aim, command, own = settled(forces.force)
+        answers, planes = self.compiled.robot.answers, self.compiled.robot.answers.planes
+        least = power(self.plant, self.compiled.commands(forces.force))
+        if planes and previous is None and power(self.plant, command) > WORTH_TRYING * least:
+            for begin in turned_aside(forces.force, answers.lines, planes):
+                other = settled(begin)
+                if self._better(other, (aim, command, own), target):
+                    aim, command, own = other
+        forces = own
+        bound = partial(self._bound, aim, forces.price, 0.0 * forces.value)
+        return Solution(command, bound, prices=forces.price)
+
+    def _better(self, one: Any, other: Any, target: Array) -> bool:
+        """Whether one answer comes nearer to a target, or as near at less power."""
+        errors = [float(self._error(answer[1], target)[0]) for answer in (one, other)]
+        watts = [power(self.plant, answer[1]) for answer in (one, other)]
+        return errors[0] < errors[1] - NEARLY or (errors[0] <= errors[1] + NEARLY and watts[0] < watts[1])
+
+    def _linear(self, model: Linear) -> Self:
+        """The same on a linear model; its search, in commands, is that of the whole one."""
+        other = copy(self)
+        other.compiled = self.compiled.tilted(model.effectiveness, model.beside)
+        other.__dict__["_search"], other.__dict__["_rates"] = self._search, self._rates
+        return other
 
     def _kept_on_the_ray(
         self, target: Array, row: int, aim: Array, forces: Forces, command: Array, deadline: Deadline
@@ -350,7 +414,7 @@ class Dual(Method):
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
-        return self._missing(wrench_of_forces(self.plant.force(command), self.plant.effectiveness), aim)
+        return self._missing(self.plant.wrench_of(self.plant.force(command)), aim)
 
     def _missing(self, wrench: Array, aim: Array) -> Array:
         missing = (wrench - aim) / self.scale
@@ -370,3 +434,13 @@ class Dual(Method):
             command = self.plant.feasible(box.clipped(command))
         rested = self.plant.rested(command)
         return np.where(box.clipped(rested) == rested, rested, command)
+
+
+def _stacked(rows: Sequence[Solution]) -> Solution:
+    """The answers to single targets as one."""
+    def bound(command: Array) -> Array:
+        return np.concatenate([row.bound(own[None]) for row, own in zip(rows, command, strict=True)])
+
+    command, prices = (np.concatenate([getattr(row, name) for row in rows]) for name in ("command", "prices"))
+    notes = sorted({note for row in rows for note in row.notes})
+    return Solution(command, bound, prices=prices, notes=tuple(notes))

@@ -1,6 +1,7 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -43,12 +44,15 @@ class DualRobot:
         rows = [line.effectiveness for line in lines]
         rows += [plane.effectiveness[k] for k in range(2) for plane in planes]
         rows += [line.drag for line in lines if line.drag is not None]
-        self.effectiveness = np.array(rows)
-        """Wrench (k, 6) per newton along each direction, lines, first directions, second directions, drag."""
-        sizes = np.abs(self.ends).max(axis=1, keepdims=True)
         self.most_drag = self.answers.drag(self.most) + 1e-12
         """Drag (f, 1) [N] of the largest forces of the lines that drag."""
-        largest = np.concatenate([sizes, sizes[len(lines) :], self.answers.drag(sizes) + 1e-12])
+        self._span(np.array(rows))
+
+    def _span(self, effectiveness: Array) -> None:
+        self.effectiveness = effectiveness
+        """Wrench (k, 6) per newton along each direction, lines, first directions, second directions, drag."""
+        sizes = np.abs(self.ends).max(axis=1, keepdims=True)
+        largest = np.concatenate([sizes, sizes[self.answers.lines :], self.answers.drag(sizes) + 1e-12])
         scaled = self.effectiveness * largest
         size = np.sqrt((scaled**2).sum(axis=0))
         self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
@@ -58,6 +62,14 @@ class DualRobot:
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
         self.matrix = (self.effectiveness / self.scale) @ self.basis
         """Effectiveness (k, r) in that basis."""
+
+    def tilted(self, effectiveness: Array) -> "DualRobot":
+        """The same actuators with another effectiveness (k, 6)."""
+        other = copy(self)
+        for name in ("outer", "squares", "first_force", "trace", "least_trace", "metric"):
+            other.__dict__.pop(name, None)
+        other._span(effectiveness)
+        return other
 
     @cached_property
     def outer(self) -> Array:

@@ -1,0 +1,1 @@
+"""What actuators do to each other, to the hull, and what speed through the water takes from their thrust."""

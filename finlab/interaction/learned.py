@@ -1,0 +1,167 @@
+"""Jets by networks over pairs of actuators, learned from forward data of other robots.
+
+A network turns the features of a pair, or of an actuator and the hull, into one number for each vector of the
+message; a receiver adds its messages up (Battaglia et al., 2018). Three networks, trained apart, tell by how
+much they differ what they do not know.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from finlab.actuators.fin.fin_laws import file_stamp
+from finlab.arrays import AnyArray, Array
+from finlab.errors import CheckpointError
+from finlab.files.guarded import read_file
+from finlab.files.schema import Checked
+from finlab.interaction.interaction import Interaction, Places, complex_slope, with_own
+from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
+
+MEMBERS = 3
+"""Networks that are trained apart."""
+LAYERS = 3
+MAX_BYTES = 5_000_000
+
+Weights = Mapping[str, AnyArray]
+"""Arrays by name, `pair.0.weight` (MEMBERS, in, out) and `pair.0.bias` (MEMBERS, 1, out) to layer 2, and the
+same for `hull`."""
+
+
+@dataclass(frozen=True)
+class Learned(Checked):
+    """What the jets of a robot's actuators take, by a network. Checked on construction."""
+
+    type: ClassVar[str] = "learned"
+
+    path: Annotated[str, Meta(min_length=1, max_length=4096)]
+    """File of the network, as `finlab train interaction` writes it; absolute once loaded from a layout
+    file."""
+
+    def of(self, places: Places) -> "LearnedInteraction":
+        """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no such
+        network."""
+        return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), places)
+
+
+class LearnedInteraction(Interaction):
+    """The networks for one robot."""
+
+    def __init__(self, weights: Weights, trust: float, places: Places) -> None:
+        """Takes the weights, and the ratio of the networks' own error to how much they differ."""
+        super().__init__(places)
+        self._weights, self._trust = weights, trust
+        self._pairs = pairs = Pairs(places)
+        self._among = np.eye(len(places.position))[:, pairs.receiver]
+        """Which pairs (n, p) each actuator receives from."""
+        self._has_hull = bool(places.hull[1].all())
+
+    def at_rest(self, force: Array) -> Array:
+        return np.asarray(self._each(force).mean(axis=0))
+
+    def deviation(self, force: Array) -> Array:
+        each = np.einsum("m...ib,ibw->m...w", self._each(force), self.lever)
+        return np.asarray(self._trust * each.std(axis=0, ddof=1))
+
+    def _each(self, force: Array) -> Array:
+        """Changes (MEMBERS, ..., n, 3) [N] by each network."""
+        pairs = self._pairs
+        change = self._among @ self._messages("pair", pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :]))
+        return change + self._messages("hull", hull_rows(self.places, force)) if self._has_hull else change
+
+    def _messages(self, name: str, rows: Array) -> Array:
+        features, vectors = unpacked(name, rows)
+        return np.asarray((numbers(self._weights, name, features)[..., None] * vectors).sum(axis=-2))
+
+    def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
+        n, pairs = force.shape[-2], self._pairs
+        source, receiver = force[..., pairs.source, :], force[..., pairs.receiver, :]
+        sent, by_source, by_receiver = self._slopes(
+            "pair", (lambda some: pairs.rows(some, receiver), source), (lambda some: pairs.rows(source, some), receiver)
+        )
+        change = self._among @ sent
+        own = np.einsum("np,...pab->...nab", self._among, by_receiver)
+        if self._has_hull:
+            more, by_own = self._slopes("hull", (lambda some: hull_rows(self.places, some), force))
+            change, own = change + more, own + by_own
+        slope = np.zeros((*force.shape[:-2], n * n, 3, 3))
+        slope[..., pairs.source * n + pairs.receiver, :, :] = by_source
+        slope = slope.reshape(*force.shape[:-2], n, n, 3, 3).swapaxes(-3, -2)
+        return change, with_own(slope, own)
+
+    def _slopes(self, name: str, *ways: tuple[Callable[[AnyArray], Any], Array]) -> list[Array]:
+        """Messages (..., p, 3) [N], and their derivatives (..., p, 3, 3) by each of some forces (..., p, 3),
+        given with the function that makes rows of them."""
+        each = [complex_slope(*way) for way in ways]
+        features, vectors = unpacked(name, each[0][0])
+        number, steep = numbers_and_slopes(self._weights, name, features)
+        results = [(number[..., None] * vectors).sum(axis=-2)]
+        for _, rows in each:
+            by_features, by_vectors = unpacked(name, rows)
+            part = (by_features @ steep.swapaxes(-1, -2)) @ vectors
+            results.append(part + (number[..., None, :, None] * by_vectors).sum(axis=-2))
+        return results
+
+
+def numbers(weights: Weights, name: str, features: AnyArray) -> AnyArray:
+    """Returns what the networks give (MEMBERS, ..., k) for features (..., m)."""
+    x: Any = features
+    flat = x.reshape(-1, x.shape[-1])
+    for layer in range(LAYERS):
+        flat = flat @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"]
+        if layer + 1 < LAYERS:
+            flat = np.tanh(flat)
+    return np.asarray(flat.reshape(MEMBERS, *x.shape[:-1], -1))
+
+
+def numbers_and_slopes(weights: Weights, name: str, features: Array) -> tuple[Array, Array]:
+    """Returns the mean (..., k) of the same over the networks, and its derivatives (..., k, m)."""
+    flat, bends = features.reshape(-1, features.shape[-1])[None], []
+    for layer in range(LAYERS - 1):
+        flat = np.tanh(flat @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"])
+        bends.append(1.0 - flat * flat)
+    last = weights[f"{name}.{LAYERS - 1}.weight"]
+    number = (flat @ last + weights[f"{name}.{LAYERS - 1}.bias"]).mean(axis=0)
+    slope = last.swapaxes(1, 2)[:, None]  # (MEMBERS, rows, k, width)
+    for layer in reversed(range(LAYERS - 1)):
+        slope = slope * bends[layer][:, :, None, :]
+        rows, k = slope.shape[1], slope.shape[2]
+        slope = slope.reshape(MEMBERS, rows * k, -1) @ weights[f"{name}.{layer}.weight"].swapaxes(1, 2)
+        slope = slope.reshape(MEMBERS, rows, k, -1)
+    shape = features.shape[:-1]
+    return number.reshape(*shape, -1), slope.mean(axis=0).reshape(*shape, number.shape[-1], -1)
+
+
+@lru_cache(maxsize=16)
+def _kept(path: str, stamp: object) -> tuple[Weights, float]:
+    """A network as it is read from its file; once for all robots that name it."""
+    return read_network(path)
+
+
+def read_network(path: str) -> tuple[Weights, float]:
+    """Returns weights, and what `LearnedInteraction` is told to trust, of a file. Raises CheckpointError: it
+    is missing, damaged or of another kind."""
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    content = read_file(path, MAX_BYTES, "a learned interaction (.safetensors)", CheckpointError)
+    try:
+        weights = {name: array.astype(np.float64) for name, array in load(content).items()}
+        trust = float(weights.pop("trust")[0])
+        for name, form in FORMS.items():
+            for layer in range(LAYERS):
+                into = form.features if layer == 0 else weights[f"{name}.{layer - 1}.weight"].shape[2]
+                weight, bias = (weights[f"{name}.{layer}.{kind}"] for kind in ("weight", "bias"))
+                if weight.shape[:2] != (MEMBERS, into) or bias.shape != (MEMBERS, 1, weight.shape[2]):
+                    raise ValueError(f"{name}.{layer} has another shape")
+            if weight.shape[2] != form.vectors:
+                raise ValueError(f"{name} gives another number of vectors")
+        if len(weights) != 2 * LAYERS * len(FORMS) or not all(np.isfinite(w).all() for w in weights.values()):
+            raise ValueError("it holds what no network has")
+    except (SafetensorError, KeyError, IndexError, ValueError) as error:
+        reason = str(error).splitlines()[0][:100]
+        raise CheckpointError(f"{path}: no learned interaction ({reason}); see `finlab train interaction`") from None
+    return weights, trust
