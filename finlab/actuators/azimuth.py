@@ -13,7 +13,15 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
-from finlab.actuators.propeller import T200, ForceRate, OpenWater, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.propeller import (
+    T200,
+    ForceRate,
+    OpenWater,
+    Propeller,
+    PropellerLaw,
+    Threshold,
+    force_words,
+)
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table

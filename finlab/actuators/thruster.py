@@ -11,7 +11,15 @@ from typing import ClassVar, Self
 import numpy as np
 
 from finlab.actuators.actuator import Box, Command, Diameter, Faults, Metres, Place, Seconds, Uncertainty
-from finlab.actuators.propeller import T200, ForceRate, OpenWater, Propeller, PropellerLaw, Threshold, force_words
+from finlab.actuators.propeller import (
+    T200,
+    ForceRate,
+    OpenWater,
+    Propeller,
+    PropellerLaw,
+    Threshold,
+    force_words,
+)
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table

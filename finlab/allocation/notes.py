@@ -71,6 +71,10 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         names, one = ", ".join(part.name for part in foils), len(foils) == 1
         them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
         return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
+    if layout.interaction is not None:
+        guessed = [part.name for part in layout.actuators if part.jet and part.advance is None]
+        taken = f"what speed takes from {', '.join(guessed)} is guessed: no open_water is known of them"
+        return (*notes, taken) if guessed else notes
     if not foils:
         kind = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
         return (

@@ -69,7 +69,9 @@ class LearnedInteraction(Interaction):
     def _each(self, force: Array) -> Array:
         """Changes (MEMBERS, ..., n, 3) [N] by each network."""
         pairs = self._pairs
-        change = self._among @ self._messages("pair", pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :]))
+        change = self._among @ self._messages(
+            "pair", pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :])
+        )
         return change + self._messages("hull", hull_rows(self.places, force)) if self._has_hull else change
 
     def _messages(self, name: str, rows: Array) -> Array:
@@ -80,7 +82,9 @@ class LearnedInteraction(Interaction):
         n, pairs = force.shape[-2], self._pairs
         source, receiver = force[..., pairs.source, :], force[..., pairs.receiver, :]
         sent, by_source, by_receiver = self._slopes(
-            "pair", (lambda some: pairs.rows(some, receiver), source), (lambda some: pairs.rows(source, some), receiver)
+            "pair",
+            (lambda some: pairs.rows(some, receiver), source),
+            (lambda some: pairs.rows(source, some), receiver),
         )
         change = self._among @ sent
         own = np.einsum("np,...pab->...nab", self._among, by_receiver)
@@ -163,5 +167,7 @@ def read_network(path: str) -> tuple[Weights, float]:
             raise ValueError("it holds what no network has")
     except (SafetensorError, KeyError, IndexError, ValueError) as error:
         reason = str(error).splitlines()[0][:100]
-        raise CheckpointError(f"{path}: no learned interaction ({reason}); see `finlab train interaction`") from None
+        raise CheckpointError(
+            f"{path}: no learned interaction ({reason}); see `finlab train interaction`"
+        ) from None
     return weights, trust

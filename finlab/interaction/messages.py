@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray
 from finlab.interaction.interaction import Places, jets_of
 
 LEAST = 1e-3
@@ -31,7 +31,9 @@ class Pairs:
 
     def __init__(self, places: Places) -> None:
         size = np.maximum(places.diameter, LEAST)
-        self.source, self.receiver = np.nonzero(~np.eye(len(size), dtype=bool) & (places.diameter > 0.0)[:, None])
+        self.source, self.receiver = np.nonzero(
+            ~np.eye(len(size), dtype=bool) & (places.diameter > 0.0)[:, None]
+        )
         """Places (p,) of the two."""
         self._size, self._own = size[self.source], size[self.receiver]
         self._way = (places.position[self.receiver] - places.position[self.source]) / self._size[:, None]

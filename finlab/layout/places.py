@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.propeller import Propeller
 from finlab.interaction.interaction import Places
 from finlab.layout.layout import Layout
 
@@ -21,6 +23,6 @@ def places_of(layout: Layout) -> Places:
     return Places(layout.position, np.array(diameter), np.array(advance), np.stack([np.array(center), half]))
 
 
-def _advance(part: object) -> float:
-    known = getattr(part, "advance", None)
-    return known if known is not None else USUAL_ADVANCE if hasattr(part, "open_water") else 0.0
+def _advance(part: Actuator) -> float:
+    guess = USUAL_ADVANCE if isinstance(part, Propeller) else 0.0
+    return guess if part.advance is None else part.advance

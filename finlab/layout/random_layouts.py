@@ -6,6 +6,7 @@ else.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from finlab.actuators.thruster import Thruster
 from finlab.arrays import Array
 from finlab.axes import wrapped
 from finlab.errors import DataError
+from finlab.layout.body import Body, Hull
 from finlab.layout.layout import Layout
 
 TRAINING_BOX = (0.3, 0.3, 0.1)
@@ -143,6 +145,9 @@ WIDE: dict[str, Numbers] = {
 }
 """Families of fins to learn from: wider than any fin that is evaluated."""
 
+HULL, DIAMETER = (0.3, 0.2, 0.15), (0.05, 0.12)
+"""Half axes of the hull of a robot with jets, and its propellers [m]."""
+
 FinKind = tuple[FinModelSpec, Limits]
 """A fin, wherever it is mounted."""
 
@@ -167,6 +172,23 @@ def random_robot(
     if each:
         chosen[: len(kinds)] = kinds
     return Layout(name, tuple(make(rng, f"a{i + 1}", size) for i, make in enumerate(chosen)))
+
+
+def random_jet_robot(
+    rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw] | None = None
+) -> Layout:
+    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most actuators on or near
+    it, of one of several kinds or of all of them (`kinds` when given)."""
+    mixed: list[Draw] = [random_thruster, random_azimuth, random_shaft_fin]
+    chosen = kinds or ([mixed[k]] if (k := int(rng.integers(4))) < 3 else mixed)
+    robot = random_robot(rng, name, count, chosen)
+    half = np.array(HULL) * rng.uniform(0.7, 1.4)
+    parts = []
+    for part in robot.actuators:
+        place = _vector(rng.uniform(1.0, 1.8) * half * _unit(rng))
+        jet = {} if isinstance(part, Fin) else {"diameter": log_uniform(rng, *DIAMETER)}
+        parts.append(replace(part, position=place, **jet))
+    return replace(robot, actuators=tuple(parts), body=Body(hull=Hull("ellipsoid", _vector(2.0 * half))))
 
 
 def random_thruster(rng: np.random.Generator, name: str, size: float) -> Thruster:

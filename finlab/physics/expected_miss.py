@@ -21,6 +21,7 @@ from finlab.actuators.fin.fin import Fin
 from finlab.actuators.fin.fin_laws import TableLaw, make_law
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
+from finlab.layout.effectiveness import body_force
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 from finlab.physics.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
@@ -106,7 +107,7 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
     """Returns what adds to it, as `expected_miss`."""
     layout = plant.layout
     known = uncertainties(layout)
-    if not any(known):
+    if not any(known) and plant.interaction is None:
         return []
     forces = plant.forces(command)
     groups: dict[object, list[int]] = {}
@@ -124,6 +125,9 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
             alone += (1.0 - own.correlation) * (wrench**2).sum(axis=1)
         names = tuple(layout.names[i] for i in places)
         sources.append(Source(names, (together**2).sum(axis=1) + alone))
+    if plant.interaction is not None:
+        deviation = plant.interaction.deviation(body_force(forces, layout.frames))
+        sources.append(Source(("what the jets take",), deviation**2))
     return sources
 
 

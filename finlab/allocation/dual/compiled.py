@@ -62,8 +62,13 @@ class Compiled:
     @cached_property
     def _directions(self) -> tuple[NDArray[np.intp], Array]:
         """The actuator (k,) of each of the robot's directions, and that direction (k, 3) in its own axes."""
-        groups, order = groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))), self.robot.order
-        responses = {place: one for places, group in groups for place, one in zip(places, group.responses, strict=True)}
+        groups, order = (
+            groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))),
+            self.robot.order,
+        )
+        responses = {
+            place: one for places, group in groups for place, one in zip(places, group.responses, strict=True)
+        }
         lines = [i for i in order if isinstance(responses[i], Line)]
         planes = [i for i in order if isinstance(responses[i], Plane)]
         dragging = [i for i in lines if responses[i].drag is not None]

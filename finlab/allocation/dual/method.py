@@ -158,6 +158,7 @@ class Dual(Method):
         """The answer for one target (1, 6) of actuators that act on each other."""
         deadline = Deadline(1)
         forces = self._forces(target - self.compiled.beside, policy, deadline, self._begin(prices))
+
         def answer(model: Linear, price: Array) -> Turn:
             linear = self._linear(model)
             own = linear._forces(target - linear.compiled.beside, policy, deadline, linear._begin(price))
@@ -438,6 +439,7 @@ class Dual(Method):
 
 def _stacked(rows: Sequence[Solution]) -> Solution:
     """The answers to single targets as one."""
+
     def bound(command: Array) -> Array:
         return np.concatenate([row.bound(own[None]) for row, own in zip(rows, command, strict=True)])
 

@@ -1,0 +1,1 @@
+"""Interactions learned from forward data: samples, constants of the formula, networks."""

@@ -1,0 +1,91 @@
+"""Constants of the formula of jets, fitted to samples of one robot by least squares on their logarithms.
+
+Few samples leave some of the constants open; a normal prior about the usual values, in which a factor of two is
+one standard deviation, holds those.
+"""
+
+from dataclasses import asdict, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.interaction.samples import Samples
+from finlab.interaction.jets import Jets
+from finlab.layout.effectiveness import body_force
+from finlab.layout.places import places_of
+from finlab.physics import Plant
+from finlab.physics.objective import yardstick
+
+FITTED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
+PRIOR = float(np.log(2.0))
+"""Standard deviation of the logarithm of a constant before anything is measured."""
+LEAST_SAMPLES = 5
+LEAST, MOST = 2e-3, 9.0
+"""Smallest and largest constant, over the usual one."""
+NOISE = 0.01
+"""Error of a sample, on the yardstick, that least counts as noise."""
+
+
+class Fitted(NamedTuple):
+    """What samples say."""
+
+    jets: Jets
+    laws: float
+    """Root mean square of what the laws alone miss of the samples, on the yardstick."""
+    left: float
+    """The same of what the fitted jets miss."""
+
+
+def fit_constants(samples: Samples) -> Fitted:
+    """Returns the constants that fit samples best. Raises DataError: there are fewer than five."""
+    if len(samples.wrench) < LEAST_SAMPLES:
+        raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
+    layout = replace(samples.layout, interaction=None)
+    plant, places, scale = Plant(layout), places_of(layout), yardstick(layout)
+    own = plant.force(samples.command)
+    force, missed = body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale
+    start = np.log([getattr(Jets(), name) for name in FITTED])
+
+    def jets_at(logarithms: Array) -> Jets:
+        values = np.exp(start + np.clip(logarithms - start, *np.log([LEAST, MOST])))
+        return Jets(**dict(zip(FITTED, values.tolist(), strict=True)))
+
+    def left(logarithms: Array) -> Array:
+        known = jets_at(logarithms).of(places)
+        return np.asarray(missed - known.wrench(known.at_rest(force)) / scale)
+
+    noise = NOISE
+    for _ in range(2):  # the noise is what the first fit leaves
+        fit = least_squares(
+            lambda x, noise=noise: np.concatenate([(left(x) / noise).ravel(), (x - start) / PRIOR]), start
+        )
+        rest = left(fit.x)
+        noise = max(NOISE, float(np.sqrt((rest**2).mean())))
+    each = replace(jets_at(fit.x), uncertain=1.0).of(places).deviation(force) / scale
+    size = np.sqrt(((samples.wrench / scale) ** 2).mean(axis=0))
+    share, floor = _parts(rest, each, size)
+    by_constants = noise * fit.jac[: rest.size]
+    measured = (floor * size) ** 2 + (share * each) ** 2 + 1e-12
+    known = (by_constants / measured.reshape(-1, 1)).T @ by_constants + np.eye(len(start)) / PRIOR**2
+    spread = ((by_constants @ np.linalg.inv(known)) * by_constants).sum()
+    uncertain = np.sqrt(share**2 + spread / max((each**2).sum(), 1e-12))
+    jets = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
+    made = Jets(**{**jets, "uncertain": float(f"{min(uncertain, 10.0):.3g}")})
+    return Fitted(made, _size(missed), _size(rest))
+
+
+def _parts(rest: Array, each: Array, size: Array) -> tuple[float, float]:
+    """The share of what the jets take (N, 6), and of the size (6,) of the wrenches, whose squares together are
+    most likely the variances of normal errors (N, 6): what the formula lacks, and noise."""
+    shares = np.concatenate([[0.0], np.geomspace(3e-3, 1.0, 40)])
+    variance = (shares[:, None, None, None] * each) ** 2 + (np.geomspace(1e-4, 0.3, 40)[:, None, None] * size) ** 2
+    cost = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
+    i, k = np.unravel_index(cost.argmin(), cost.shape)
+    return float(shares[i]), float(np.geomspace(1e-4, 0.3, 40)[k])
+
+
+def _size(rows: Array) -> float:
+    return float(np.sqrt((rows**2).sum(axis=1).mean()))

@@ -1,0 +1,142 @@
+"""Forward data of what actuators do to each other: robots, commands, and the wrenches that these caused.
+
+An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI units, NaN where
+a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame, NaN where it was not
+measured. A CSV file holds the samples of one robot: `NAME.number` for each actuator, such as `bow.force`, or
+`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A folder holds a CSV file for each robot, beside its
+layout file of the same name.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.axes import AXES
+from finlab.errors import DataError
+from finlab.files.guarded import check_shapes, json_of, read_arrays
+from finlab.fit.columns import read_columns
+from finlab.interaction.jets import Jets
+from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
+from finlab.layout.random_layouts import random_jet_robot
+from finlab.physics import Plant
+from finlab.whole_file import write_whole
+
+MAX_BYTES = 1_000_000_000
+"""Largest file of samples that is read [bytes]."""
+WHAT = "samples of wrenches (.npz)"
+
+Judge = Callable[[Layout, Array], Array]
+"""Gives the wrenches (K, 6) [N, N m] of commands (K, n, 3) of a robot, such as a CFD code does."""
+
+
+class Samples(NamedTuple):
+    """Samples of one robot."""
+
+    layout: Layout
+    command: Array
+    """(K, n, 3), of fins [rad, Hz, rad]."""
+    wrench: Array
+    """(K, 6) [N, N m]."""
+
+
+def with_jets(layout: Layout, command: Array) -> Array:
+    """Returns wrenches by the formula of jets with its usual constants; a `Judge`."""
+    return Plant(layout if layout.interaction else replace(layout, interaction=Jets())).wrench(command)
+
+
+def drawn(
+    judge: Judge, layouts: int, commands: int, seed: int, noise: float, count: tuple[int, int]
+) -> list[Samples]:
+    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches with
+    normal noise, a share of each axis' root mean square. They depend on the seed and the number alone."""
+    result = []
+    for k in range(layouts):
+        rng = np.random.default_rng([31_000, seed, k])
+        layout = random_jet_robot(rng, f"robot_{k + 1}", count)
+        command = Plant(layout).sample(rng, (commands,))
+        wrench = np.asarray(judge(layout, command), np.float64)
+        if wrench.shape != (commands, 6):
+            raise DataError(f"the plant gave an array of shape {wrench.shape}, expected ({commands}, 6)")
+        size = np.sqrt((wrench**2).mean(axis=0))
+        result.append(Samples(layout, command, wrench + noise * size * rng.normal(size=wrench.shape)))
+    return result
+
+
+def write_samples(path: Path, samples: Sequence[Samples]) -> None:
+    """Writes an NPZ file; a `DataError` where it cannot be written."""
+    from io import BytesIO
+
+    n, most = max(one.layout.n for one in samples), max(len(one.command) for one in samples)
+    command, wrench = np.full((len(samples), most, n, 3), np.nan), np.full((len(samples), most, 6), np.nan)
+    for k, one in enumerate(samples):
+        command[k, : len(one.command), : one.layout.n], wrench[k, : len(one.wrench)] = one.command, one.wrench
+    text = json.dumps([layout_to_dict(one.layout) for one in samples])
+    content = BytesIO()
+    np.savez_compressed(content, layouts=np.array(text), command=command, wrench=wrench)
+    write_whole(path, content.getvalue(), DataError)
+
+
+def read_samples(path: Path) -> list[Samples]:
+    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do not fit the
+    robots; LayoutError: a robot is none."""
+    if path.is_dir():
+        tables = sorted(path.glob("*.csv"))
+        robots = [
+            next((f for s in (".yaml", ".yml", ".json") if (f := t.with_suffix(s)).exists()), None)
+            for t in tables
+        ]
+        if not tables or None in robots:
+            lone = next(
+                (t.name for t, robot in zip(tables, robots, strict=True) if robot is None), "no CSV file"
+            )
+            raise DataError(
+                f"{path}: expected for each robot a layout file and a CSV file of one name, got {lone}"
+            )
+        return [read_table(load_layout(robot), table) for table, robot in zip(tables, robots, strict=True)]  # type: ignore[arg-type]
+    arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, WHAT)
+    values = json_of(arrays["layouts"], f"{path}: layouts")
+    if not isinstance(values, list) or not values:
+        raise DataError(f"{path}: layouts: expected JSON text of a list of layout files")
+    robots = [
+        parse_layout(value, f"{path}: layouts[{k}]", path.parent, may_open=False)
+        for k, value in enumerate(values)
+    ]
+    shape = arrays["command"].shape
+    n = max(robot.n for robot in robots)
+    count = shape[1] if len(shape) == 4 else 0
+    check_shapes(
+        arrays,
+        {
+            "command": (len(robots), count, max(n, shape[2] if len(shape) == 4 else 0), 3),
+            "wrench": (len(robots), count, 6),
+        },
+        str(path),
+    )
+    result = []
+    for layout, command, wrench in zip(robots, arrays["command"], arrays["wrench"], strict=True):
+        known = np.isfinite(wrench).all(axis=1)
+        own = command[known][:, : layout.n].astype(np.float64)
+        if not np.isfinite(own).all():
+            raise DataError(
+                f"{path}: command: NaN or infinity for an actuator of {layout.name}, expected numbers"
+            )
+        result.append(Samples(layout, own, wrench[known].astype(np.float64)))
+    return result
+
+
+def read_table(layout: Layout, path: Path) -> Samples:
+    """Returns the samples of one robot in a CSV file; errors as for `read_samples`."""
+    columns = [f"{part.name}.{name}" for part in layout.actuators for name, _ in part.NUMBERS]
+    wanted = [*columns, *AXES]
+    units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": float(np.pi / 180.0)}
+    table = read_columns(path, {name: name for name in wanted}, wanted, ", ".join(wanted), units).values
+    command = np.zeros((len(table["Fx"]), layout.n, 3))
+    for i, part in enumerate(layout.actuators):
+        for k, (name, _) in enumerate(part.NUMBERS):
+            command[:, i, k] = table[f"{part.name}.{name}"]
+    return Samples(layout, command, np.stack([table[axis] for axis in AXES], axis=-1))
