@@ -21,7 +21,7 @@ from finlab.allocation.dual.drag import EXACT, Search
 from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, Rates, nearest, within_tick
 from finlab.allocation.dual.sets import Sets
-from finlab.allocation.dual.turns import WORTH_TRYING, Linear, Turn, in_turns, power, turned_aside
+from finlab.allocation.dual.turns import Linear, settled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
@@ -91,11 +91,11 @@ class Dual(Method):
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
-    def _search(self) -> Search:
+    def search(self) -> Search:
         return Search(CommandProblem.of(self.plant, self.scale), self.compiled.weight)
 
     @cached_property
-    def _rates(self) -> Rates:
+    def rates(self) -> Rates:
         return Rates(self.plant, self.layout.rates * self.settings.period_s)
 
     def at(self, flow: Array | None) -> Self:
@@ -129,84 +129,33 @@ class Dual(Method):
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
     ) -> Solution:
         if self.plant.interaction is not None:
-            rows = [self._in_turns(target[None], policy, previous, prices) for target in targets]
-            return _stacked(rows)
+            return settled(self, targets, policy, previous, prices)
         resting, deadline = self.compiled.beside, Deadline(len(targets))
-        forces = self._forces(targets - resting, policy, deadline, self._begin(prices))
+        forces = self.forces(targets - resting, policy, deadline, self.begin(prices))
         aim = targets if forces.within.all() else forces.aim + resting
-        command = self._commands(aim, forces, previous)
+        command = self.commands(aim, forces, previous)
         notes = set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~forces.within):
                 notes.add(self._kept_on_the_ray(targets[row], int(row), aim, forces, command, deadline))
-        if previous is not None and not self._rates.allow(previous, command[0]):
-            command = self._in_a_tick(aim, forces, previous)
-        bound: Callable[[Array], Array] = partial(self._bound, aim, forces.price, forces.value)
-        notes |= self._not_held(targets[~forces.within]) | deadline.notes
+        if previous is not None and not self.rates.allow(previous, command[0]):
+            command = self.in_a_tick(aim, forces, previous)
+        bound: Callable[[Array], Array] = partial(self.bound, aim, forces.price, forces.value)
+        notes |= self.not_held(targets[~forces.within]) | deadline.notes
         return Solution(
-            command, None if self._unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
+            command, None if self.unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
         )
 
-    def _begin(self, prices: Array | None) -> Array | None:
+    def begin(self, prices: Array | None) -> Array | None:
         """Prices (6,) [W/N, W/(N m)] in the robot's basis (r, 1)."""
         robot = self.compiled.robot
         return None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
 
-    def _in_turns(
-        self, target: Array, policy: Policy, previous: Array | None, prices: Array | None
-    ) -> Solution:
-        """The answer for one target (1, 6) of actuators that act on each other."""
-        deadline = Deadline(1)
-        forces = self._forces(target - self.compiled.beside, policy, deadline, self._begin(prices))
-
-        def answer(model: Linear, price: Array) -> Turn:
-            linear = self._linear(model)
-            own = linear._forces(target - linear.compiled.beside, policy, deadline, linear._begin(price))
-            worth = float(np.linalg.norm(own.price[0] * self.scale))
-            return Turn(own.force, own.price[0], worth, (linear, own))
-
-        def settled(begin: Array) -> tuple[Array, Array, Forces]:
-            turn = in_turns(
-                begin,
-                forces.price[0],
-                exact,
-                self.compiled.forces_along,
-                answer,
-                self.plant,
-                lambda command: float(self._error(command, target)[0]),
-            )
-            linear, own = turn.answer
-            own = own._replace(force=self.compiled.forces_along(self.plant.force(turn.command)[0]))
-            aim = target if own.within.all() else own.aim + linear.compiled.beside
-            return aim, linear._commands(aim, own, previous), own
-
-        def exact(force: Array) -> Array:
-            command = self.compiled.commands(force, previous)
-            return refine(self._search.problem, target / self.scale, command, 4, 1e-7).command
-
-        aim, command, own = settled(forces.force)
-        answers, planes = self.compiled.robot.answers, self.compiled.robot.answers.planes
-        least = power(self.plant, self.compiled.commands(forces.force))
-        if planes and previous is None and power(self.plant, command) > WORTH_TRYING * least:
-            for begin in turned_aside(forces.force, answers.lines, planes):
-                other = settled(begin)
-                if self._better(other, (aim, command, own), target):
-                    aim, command, own = other
-        forces = own
-        bound = partial(self._bound, aim, forces.price, 0.0 * forces.value)
-        return Solution(command, bound, prices=forces.price)
-
-    def _better(self, one: Any, other: Any, target: Array) -> bool:
-        """Whether one answer comes nearer to a target, or as near at less power."""
-        errors = [float(self._error(answer[1], target)[0]) for answer in (one, other)]
-        watts = [power(self.plant, answer[1]) for answer in (one, other)]
-        return errors[0] < errors[1] - NEARLY or (errors[0] <= errors[1] + NEARLY and watts[0] < watts[1])
-
-    def _linear(self, model: Linear) -> Self:
+    def linear(self, model: Linear) -> Self:
         """The same on a linear model; its search, in commands, is that of the whole one."""
         other = copy(self)
         other.compiled = self.compiled.tilted(model.effectiveness, model.beside)
-        other.__dict__["_search"], other.__dict__["_rates"] = self._search, self._rates
+        other.__dict__["search"], other.__dict__["rates"] = self.search, self.rates
         return other
 
     def _kept_on_the_ray(
@@ -216,15 +165,15 @@ class Dual(Method):
         not, by the largest share that does; the sentence where there is none."""
         along = target / self.scale
         low, high, size = 0.0, float(aim[row] / self.scale @ along), max(float(along @ along), 1e-300)
-        if self._error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
+        if self.error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
             return ""
         kept = False
         while high > low + CLOSE * size and not deadline.passed():
             share = 0.5 * (low + high)
             tried = share / size * target[None]
-            one = self._forces(tried - self.compiled.beside, None, deadline)
-            its = self._commands(tried, one)
-            if self._error(its, tried)[0] <= NEARLY:
+            one = self.forces(tried - self.compiled.beside, None, deadline)
+            its = self.commands(tried, one)
+            if self.error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
                 forces.price[row], forces.value[row] = one.price[0], one.value[0]
             else:
@@ -241,10 +190,10 @@ class Dual(Method):
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
         start = lower + share * (upper - lower)
-        best = self._search.exact(np.zeros(6), start)
+        best = self.search.exact(np.zeros(6), start)
         return None if best is None else best.command
 
-    def _not_held(self, targets: Array) -> set[str]:
+    def not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
         robot = self.compiled.robot
         if not len(targets):
@@ -265,7 +214,7 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return axes_in(size <= NOTHING * size.max())
 
-    def _bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
+    def bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
         wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
         bound = proved_power(self.compiled, wrench, price)
@@ -275,20 +224,20 @@ class Dual(Method):
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
     @cached_property
-    def _unproved(self) -> bool:
+    def unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: with what doubt
         costs, or of the smooth shape that stands for a measured table."""
         measured = any(part.reads for part in self.layout.actuators)
         return measured or self.compiled.doubt is not None
 
-    def _forces(
+    def forces(
         self, targets: Array, policy: Policy | None, deadline: Deadline, prices: Array | None = None
     ) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place."""
         robot, sets = self.compiled.robot, self.compiled.robot.sets
         target, drags = robot.target(targets), len(robot.answers.dragging) > 0
         if drags and len(targets) > 1:
-            return Forces.joined([self._forces(one[None], policy, deadline) for one in targets])
+            return Forces.joined([self.forces(one[None], policy, deadline) for one in targets])
         if not len(target):  # nothing pushes, such as foils at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
@@ -299,7 +248,7 @@ class Dual(Method):
             first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
-                prices = self._search.prices(near, self._directions)
+                prices = self.search.prices(near, self._directions)
         root = solve(robot, target, sets, prices, steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -330,9 +279,9 @@ class Dual(Method):
     ) -> tuple[Array, Array]:
         """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
         there is none; and its prices (r, 1)."""
-        robot, search = self.compiled.robot, self._search
+        robot, search = self.compiled.robot, self.search
         aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
-        if root.solved[0] and self._error(begin, aim[None])[0] <= EXACT:
+        if root.solved[0] and self.error(begin, aim[None])[0] <= EXACT:
             return begin, prices
         value, best_of = root.value, partial(search.cheapest, aim / self.scale)
         best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
@@ -389,12 +338,12 @@ class Dual(Method):
         value[rows] = np.where(cut.met, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
-    def _commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
+    def commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
         if previous is None and forces.command is not None and not np.isnan(forces.command).any():
             return self.plant.rested(forces.command)
         command = self.compiled.commands(forces.force, previous)
-        error = self._error(command, aim)
+        error = self.error(command, aim)
         rough = np.flatnonzero(error > EXACT)
         if not len(rough):
             return self.plant.rested(command)
@@ -403,46 +352,35 @@ class Dual(Method):
             command[rough] = np.where(np.isnan(own), command[rough], own)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
         for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
-            ends = refine(self._search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+            ends = refine(self.search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
             for row in rows[(ends.error > NEARLY) & forces.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
-                starts = command[row] + shares * draw * self._search.problem.width
-                other = self._search.exact(aim[row] / self.scale, starts)
+                starts = command[row] + shares * draw * self.search.problem.width
+                other = self.search.exact(aim[row] / self.scale, starts)
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
-    def _error(self, command: Array, aim: Array) -> Array:
+    def error(self, command: Array, aim: Array) -> Array:
         return self._missing(self.plant.wrench_of(self.plant.force(command)), aim)
 
     def _missing(self, wrench: Array, aim: Array) -> Array:
         missing = (wrench - aim) / self.scale
         return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
 
-    def _in_a_tick(self, aim: Array, forces: Forces, previous: Array) -> Array:
+    def in_a_tick(self, aim: Array, forces: Forces, previous: Array) -> Array:
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
         a previous one (n, 3); `forces` is the answer without limits of that kind."""
-        box = self._rates.box(previous)
+        box = self.rates.box(previous)
         sets, full = self.compiled.within(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
-        problem = replace(self._search.problem, lower=box.lower, upper=box.upper, full_turn=full)
+        problem = replace(self.search.problem, lower=box.lower, upper=box.upper, full_turn=full)
         wrench = aim - self.compiled.beside
         force = within_tick(self.compiled.robot, sets, wrench, forces.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
-        if self._error(command, aim)[0] > EXACT:
+        if self.error(command, aim)[0] > EXACT:
             command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
             command = self.plant.feasible(box.clipped(command))
         rested = self.plant.rested(command)
         return np.where(box.clipped(rested) == rested, rested, command)
-
-
-def _stacked(rows: Sequence[Solution]) -> Solution:
-    """The answers to single targets as one."""
-
-    def bound(command: Array) -> Array:
-        return np.concatenate([row.bound(own[None]) for row, own in zip(rows, command, strict=True)])
-
-    command, prices = (np.concatenate([getattr(row, name) for row in rows]) for name in ("command", "prices"))
-    notes = sorted({note for row in rows for note in row.notes})
-    return Solution(command, bound, prices=prices, notes=tuple(notes))

@@ -1,23 +1,35 @@
 """Answers where actuators act on each other, in turns: the dual of the model made linear at the last answer.
 
 With y the forces and o(y) what the actuators do to each other, a turn takes o(y) for its value and slope at
-the last forces. Its answer is exact and cheapest on that linear model, so that where the turns settle, the
+the last forces. Its answer is exact and cheapest on that linear model; Levenberg-Marquardt steps make it
+exact on the whole one, and shorter steps are taken where it is no cheaper. Where the turns settle, the
 gradient of the power lies in the range of the slope of the whole model: the conditions of Karush, Kuhn and
 Tucker hold there (sequential convex programming).
 """
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from finlab.allocation.dual.newton import Deadline
+from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.policy import Policy
+from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
+from finlab.precision import CLOSE, NEARLY, ROUNDS
 
-TURNS, HALVINGS, ASIDE, WORTH_TRYING = 12, 4, 0.38, 1.005
-"""Most turns of an answer."""
+STEPS = 4
+"""Steps that make a command exact, nearly."""
+HALVINGS, SHORTER = 4, 0.3
+"""Most times that a step is made shorter, and by how much."""
 SETTLED = 1e-3
 """Gain of a turn, as a share of the power, below which an answer has settled."""
+ASIDE = 0.38
+"""Angle [rad] by which jets are turned aside where an answer begins anew."""
+DEARER = 1.005
+"""Power over that of the laws alone from which on other beginnings are tried."""
 
 
 class Linear(NamedTuple):
@@ -36,80 +48,153 @@ def linear_at(plant: Plant, force: Array) -> Linear:
     return Linear(offset - np.einsum("na,naw->w", force, change), effectiveness)
 
 
-class Turn(NamedTuple):
-    """An answer on a linear model."""
+class Settled(NamedTuple):
+    """What turns end with."""
 
-    force: Array
-    """Forces (k, 1) [N] of the dual."""
+    command: Array
+    """(1, n, 3)."""
+    aim: Array
+    """Wrench (1, 6) [N, N m] that it gives."""
     price: Array
-    """Price (6,) of the wrench [W/N, W/(N m)]."""
-    worth: float
-    """What an error as large as the yardstick is worth at its prices [W]."""
-    answer: Any
-    command: Any = None
-    """The command (1, n, 3) at which turns settled."""
+    """(1, 6) [W/N, W/(N m)]."""
+    power: float
+    """[W]."""
+    error: float
+    """Distance of the wrench from the target, on the yardstick."""
+
+    def beats(self, other: "Settled") -> bool:
+        """Whether it comes nearer to the target, or as near at less power."""
+        nearer = other.error - self.error
+        return nearer > NEARLY or (nearer >= -NEARLY and self.power < other.power)
 
 
-def in_turns(
-    begin: Array,
-    price: Array,
-    exact: Callable[[Array], Array],
-    directions: Callable[[Array], Array],
-    answer: Callable[[Linear, Array], Turn],
-    plant: Plant,
-    error: Callable[[Array], float],
-) -> Turn:
-    """Returns the answer at which turns settle.
+def settled(
+    dual: Any, targets: Array, policy: Policy, previous: Array | None, prices: Array | None
+) -> Solution:
+    """Returns the answers of method `dual` to targets (N, 6); arguments as for `Dual.solve`."""
+    deadline = Deadline(len(targets))
+    each = [Turns(dual, target[None], policy, previous, deadline).settled(prices) for target in targets]
+    command, aim, price = (np.concatenate(parts) for parts in list(zip(*each, strict=True))[:3])
+    missed = np.array([one.error > NEARLY for one in each])
+    notes = dual.not_held(targets[missed]) | deadline.notes
+    bound = None if dual.unproved else partial(dual.bound, aim, price, np.zeros(len(aim)))
+    return Solution(command, bound, prices=price, notes=tuple(sorted(notes - {""})))
 
-    Args:
-        begin: forces (k, 1) [N] of the dual to begin at.
-        price: that of the wrench (6,) there.
-        exact: gives commands (1, n, 3) near to such forces that give the wrench, nearly.
-        directions: gives such forces of forces (n, 3) in own axes.
-        answer: answers a linear model, from a price on.
-        plant: of the robot.
-        error: gives the error of a command (1, n, 3) on the yardstick.
-    """
-    worth, best, merit = 0.0, None, np.inf
-    command = exact(begin)
-    for turn in range(TURNS):
-        force = plant.force(command)
-        result = answer(linear_at(plant, force[0]), price)
-        worth, price = max(worth, 2.0 * result.worth), result.price
-        if best is None:
-            best, merit = result, power(plant, command) + worth * error(command)
-        here, size = directions(force[0]), 1.0
-        step = result.force - here
-        for _ in range(HALVINGS):
-            tried = exact(here + size * step)
-            new = power(plant, tried) + worth * error(tried)
-            if new < merit:
+
+class Turns:
+    """The turns for one target."""
+
+    def __init__(
+        self, dual: Any, target: Array, policy: Policy, previous: Array | None, deadline: Deadline
+    ) -> None:
+        """Takes a method `Dual` and a target (1, 6); the rest as for `Dual.solve`."""
+        self.dual, self.target, self.policy = dual, target, policy
+        self.previous, self.deadline = previous, deadline
+
+    def settled(self, prices: Array | None) -> Settled:
+        """Returns the best answer that turns from the previous command, or from several beginnings, come
+        to."""
+        dual = self.dual
+        if self.previous is not None:
+            return self._from(self.previous[None], prices)
+        laws = dual.forces(self.target - dual.compiled.beside, self.policy, self.deadline, dual.begin(prices))
+        best = self._from(self._exact(laws.force), laws.price[0])
+        if best.power > DEARER * self._power(dual.compiled.commands(laws.force)):
+            for force in _turned_aside(laws.force, dual.compiled.robot.answers):
+                other = self._from(self._exact(force), laws.price[0])
+                best = other if other.beats(best) else best
+        return best
+
+    def _from(self, command: Array, price: Array | None) -> Settled:
+        dual, worth, merit, last = self.dual, 0.0, np.inf, None
+        for _ in range(ROUNDS):
+            force = dual.plant.force(command)
+            linear = dual.linear(linear_at(dual.plant, force[0]))
+            start = None if price is None else linear.begin(price)
+            own = linear.forces(self.target - linear.compiled.beside, self.policy, self.deadline, start)
+            price = own.price[0]
+            # Twice what an error is worth at these prices: an exact penalty.
+            worth = max(worth, 2.0 * float(np.linalg.norm(price * dual.scale)))
+            before = self._merit(command, worth) if last is None else merit
+            last = last or (linear, own)
+            command, merit = self._shorter(command, force[0], own.force, before, worth)
+            if merit < before:
+                last = linear, own
+            if before - merit <= SETTLED * before or self.deadline.passed():
                 break
-            size *= 0.3
+        return self._ended(command, *last)
+
+    def _shorter(
+        self, command: Array, force: Array, there: Array, merit: float, worth: float
+    ) -> tuple[Array, float]:
+        """A command on the way from forces (n, 3) to forces (k, 1) that has less merit, and that; the old
+        ones where none is found."""
+        here, size = self.dual.compiled.forces_along(force), 1.0
+        for _ in range(HALVINGS):
+            tried = self._exact(here + size * (there - here))
+            new = self._merit(tried, worth)
+            if new < merit:
+                return tried, new
+            size *= SHORTER
+        return command, merit
+
+    def _ended(self, command: Array, linear: Any, own: Any) -> Settled:
+        dual, previous, target = self.dual, self.previous, self.target
+        aim = target if own.within.all() else own.aim + linear.compiled.beside
+        force = dual.compiled.forces_along(dual.plant.force(command)[0])
+        command = linear.commands(aim, own._replace(force=force, command=None), previous)
+        if self.policy.kind == "direction" and not own.within.all():
+            command, aim = _on_the_ray(dual, target, command)
+        if previous is not None and not dual.rates.allow(previous, command[0]):
+            command = linear.in_a_tick(aim, own, previous)
+        return Settled(command, aim, own.price, self._power(command), self._error(command))
+
+    def _exact(self, force: Array) -> Array:
+        """Commands (1, n, 3) near to forces (k, 1) that give the target, nearly."""
+        command = self.dual.compiled.commands(force, self.previous)
+        wanted = self.target / self.dual.scale
+        return np.asarray(refine(self.dual.search.problem, wanted, command, STEPS, 0.1 * NEARLY).command)
+
+    def _merit(self, command: Array, worth: float) -> float:
+        return self._power(command) + worth * self._error(command)
+
+    def _power(self, command: Array) -> float:
+        return float(self.dual.plant.power(command).sum())
+
+    def _error(self, command: Array) -> float:
+        return float(self.dual.error(command, self.target)[0])
+
+
+def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]:
+    """The command (1, n, 3) near to another one that gives the largest share of a target (1, 6) that steps
+    come to, and that wrench."""
+    along = target / dual.scale
+    share = float(
+        (dual.plant.wrench(command) / dual.scale * along).sum() / max((along * along).sum(), 1e-300)
+    )
+    low, high, best = 0.0, min(max(share * (1.0 + CLOSE), 0.0), 1.0), command
+    for k in range(ROUNDS):
+        tried = high if k == 0 else 0.5 * (low + high)
+        ends = refine(dual.search.problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
+        if ends.error[0] <= NEARLY:
+            low, best = tried, ends.command
         else:
+            high = tried
+        if high - low <= CLOSE * high:
             break
-        gain, merit, command, best = merit - new, new, tried, result
-        if gain <= SETTLED * merit:
-            break
-    return best._replace(command=command)
+    return best, low * target
 
 
-def turned_aside(force: Array, lines: int, planes: int) -> list[Array]:
-    """Returns other forces (k, 1) to begin at: those of planes turned one way, the other way, and by turns. A
-    jet that meets a neighbor in a symmetric robot has no slope that would turn it aside."""
-    first, second = force[lines : lines + planes], force[lines + planes : lines + 2 * planes]
-    signs = (1.0, -1.0, (-1.0) ** np.arange(planes)[:, None])
+def _turned_aside(force: Array, answers: Any) -> list[Array]:
+    """Other forces (k, 1) to begin at: those of planes turned one way, the other way, and by turns. A jet
+    that meets a neighbour in a symmetric robot has no slope that would turn it aside."""
+    lines, planes = answers.lines, answers.planes
+    first, second = answers.pair(force)
+    signs = np.array([np.ones(planes), -np.ones(planes), (-1.0) ** np.arange(planes)])[: min(planes, 2) + 1]
     turned = []
-    for sign in signs[: 3 if planes > 1 else 2]:
-        c, s = np.cos(ASIDE), sign * np.sin(ASIDE)
+    for sign in signs[:, :, None] if planes else ():
         other = force.copy()
-        other[lines : lines + planes], other[lines + planes : lines + 2 * planes] = (
-            c * first - s * second,
-            s * first + c * second,
-        )
+        other[lines : lines + planes] = np.cos(ASIDE) * first - sign * np.sin(ASIDE) * second
+        other[lines + planes : lines + 2 * planes] = sign * np.sin(ASIDE) * first + np.cos(ASIDE) * second
         turned.append(other)
     return turned
-
-
-def power(plant: Plant, command: Array) -> float:
-    return float(plant.power(command).sum())

@@ -81,7 +81,9 @@ def _parts(rest: Array, each: Array, size: Array) -> tuple[float, float]:
     """The share of what the jets take (N, 6), and of the size (6,) of the wrenches, whose squares together are
     most likely the variances of normal errors (N, 6): what the formula lacks, and noise."""
     shares = np.concatenate([[0.0], np.geomspace(3e-3, 1.0, 40)])
-    variance = (shares[:, None, None, None] * each) ** 2 + (np.geomspace(1e-4, 0.3, 40)[:, None, None] * size) ** 2
+    variance = (shares[:, None, None, None] * each) ** 2 + (
+        np.geomspace(1e-4, 0.3, 40)[:, None, None] * size
+    ) ** 2
     cost = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
     i, k = np.unravel_index(cost.argmin(), cost.shape)
     return float(shares[i]), float(np.geomspace(1e-4, 0.3, 40)[k])
