@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from finlab.errors import DataError
+from finlab.errors import DataError, FinlabError
 from finlab.files.guarded import is_regular, read_file, unpacked
 from finlab.files.plain_values import parse_json
 
@@ -23,7 +23,8 @@ ROBOT, ABOUT = "robot.json", "bundle.json"
 NETWORKS = "checkpoint/"
 """Folder of a checkpoint that does not come with finlab."""
 TABLES = "tables/"
-"""Folder of the fins' force tables, each named by the SHA-256 of its content."""
+"""Folder of the fins' force tables, and of a learned interaction, each named by the SHA-256 of its
+content."""
 README, CHECKSUMS = "README.md", "SHA256SUMS"
 LARGEST = {
     ROBOT: 1_000_000,
@@ -43,7 +44,7 @@ REQUIRED = (ROBOT, ABOUT, CHECKSUMS)
 Files = Mapping[str, bytes]
 """Contents by name."""
 
-_TABLE = re.compile(TABLES + r"[0-9a-f]{64}\.csv")
+_TABLE = re.compile(TABLES + r"[0-9a-f]{64}\.(csv|safetensors)")
 
 
 def largest(name: str) -> int:
@@ -51,9 +52,9 @@ def largest(name: str) -> int:
     return LARGEST_TABLE if _TABLE.fullmatch(name) else LARGEST.get(name, -1)
 
 
-def table_name(content: bytes) -> str:
+def table_name(content: bytes, suffix: str = ".csv") -> str:
     """The name of a force table in a bundle."""
-    return f"{TABLES}{hashlib.sha256(content).hexdigest()}.csv"
+    return f"{TABLES}{hashlib.sha256(content).hexdigest()}{suffix}"
 
 
 def is_bundle(path: str | os.PathLike[str]) -> bool:
@@ -73,6 +74,20 @@ def archive_around(path: str | os.PathLike[str]) -> str | None:
     return archive if within and os.path.isfile(archive) else None
 
 
+def named_content(
+    path: str | os.PathLike[str], most: int, what: str, error: type[FinlabError] = DataError
+) -> bytes:
+    """The content of a file that a layout names, which may lie in the zip archive of a bundle. Raises
+    FinlabError of the kind `error`: there is no such file, or it is too large; it says `what` is expected."""
+    archive = archive_around(path)
+    if archive is None:
+        return read_file(path, most, what, error)
+    content = read_bundle_files(archive).get(TABLES + os.path.basename(path))
+    if content is None:
+        raise error(f"{path}: no such file, expected {what}")
+    return content
+
+
 def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
     """The files of a bundle by name, with checksums that fit. Raises DataError: it cannot be read, is of
     another version, was changed, or holds what no bundle holds."""
@@ -81,7 +96,7 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
         return bundle_files_of(content, source)
     folder = Path(path)
-    names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.csv")))]
+    names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.*")))]
     there = [name for name in names if largest(name) > 0 and (folder / name).exists()]
     files = {name: read_file(folder / name, largest(name), "a bundle's file") for name in there}
     check_bundle_files(files, source)

@@ -1,4 +1,4 @@
-"""`finlab fit actuator|fin|robot`: from measurements to actuators that layouts name, from swims to robots."""
+"""`finlab fit actuator|fin|interaction|robot`: from measurements and swims to what layouts say."""
 
 import sys
 from pathlib import Path
@@ -70,6 +70,42 @@ def actuator(
     write_whole(output, thruster_csv(fit, output), DataError)
     print("\n".join(summary(fit)))
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
+
+
+@verbs.command
+def interaction(
+    layout: Robot,
+    samples: Annotated[Positional[Path], arg(metavar="SAMPLES.csv")],
+    output: Annotated[Path | None, arg(metavar="LAYOUT2", aliases=["-o"])] = None,
+) -> None:
+    """Fit the formula of jets to samples of one robot: what its actuators do to each other and to its hull.
+
+    The file has a column for each number of a command, NAME.A, NAME.f, NAME.phi of a fin, NAME.force of a
+    thruster, NAME.angle and NAME.force of an azimuth, and the wrench Fx, Fy, Fz, Tx, Ty, Tz [N, N m], body
+    frame, measured with the robot held. Twenty samples at random commands do.
+
+    Args:
+        layout: layout file or the name of a shipped layout.
+        samples: the CSV file.
+        output: the layout with the fitted interaction.
+    """
+    from dataclasses import replace
+
+    from finlab.files.worker import in_worker
+    from finlab.fit.interaction.constants import fit_constants
+    from finlab.fit.interaction.samples import read_table
+    from finlab.layout.file import save_layout
+    from finlab.layout.file_form import plain
+
+    robot = open_robot(layout)[0]
+    fit = fit_constants(in_worker(read_table, robot, samples))
+    print(
+        f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets {fit.left:.3g} is left"
+    )
+    print(f"interaction: {plain(fit.jets)}".replace("'", ""))
+    if output is not None:
+        save_layout(replace(robot, interaction=fit.jets), output)
+        print(f"{output}: the robot with these jets")
 
 
 @verbs.command

@@ -1,4 +1,4 @@
-"""`finlab data generate`, and `finlab train mdn|surrogate|allocator`: methods' networks and their data."""
+"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: networks, their data."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import OmitArgPrefixes, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.shared_options import Cluster, Count, check_positive
@@ -99,6 +99,36 @@ def allocator(
     _report(options.output, train_allocator(Options(**vars(options)), surrogate))
 
 
+@verbs.command
+def interaction(
+    data: Annotated[Positional[Path], arg(metavar="DATA")],
+    output: _Output,
+    seed: Count = 0,
+    steps: Count = 1800,
+    minutes: _Count = None,
+    resume: bool = False,
+) -> None:
+    """Learn what actuators do to each other from forward data of many robots, for robots never seen.
+
+    A layout names the network: interaction: {type: learned, path: FILE}.
+
+    Args:
+        data: NPZ file of `finlab data interaction`, or a folder with a layout file and a CSV file of the same
+            name for each robot (docs/interaction.md).
+        output: folder for the network, log, curves and state.
+        seed: of the first weights and the order of the data.
+        steps: optimizer steps.
+        minutes: time after which the run ends.
+        resume: go on from the last state in the folder.
+    """
+    from finlab.fit.interaction.samples import read_samples
+    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+
+    check_positive(steps=steps, minutes=minutes)
+    error = train(read_samples(data), output, Recipe(steps=steps, minutes=minutes), seed, resume)
+    print(f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise included")
+
+
 def _report(output: Path, made: TrainedWeights) -> None:
     if os.environ.get("RANK", "0") != "0":  # of several processes the first one speaks
         return
@@ -143,3 +173,34 @@ def generate(
     with on_cluster(cluster):
         generate(output, DataSettings(layouts, commands, seed, varied_limits, model))
     print(f"{output}: {layouts} layouts with {commands} commands each, seed {seed}")
+
+
+@data_verbs.command(name="interaction")
+def interaction_data(
+    output: Annotated[Path, arg(metavar="FILE.npz", aliases=["-o"])],
+    layouts: Count = 4000,
+    commands: Count = 20,
+    seed: Count = 0,
+    noise: Annotated[float, arg(metavar="SHARE")] = 0.02,
+    actuators: tuple[Count, Count] = (4, 8),
+    plant: Annotated[str | None, arg(metavar="FILE.py:NAME")] = None,
+) -> None:
+    """Draw robots whose jets meet, and write commands with the wrenches that a plant says they cause.
+
+    Args:
+        output: the NPZ file.
+        layouts: random robots.
+        commands: random commands on each of them.
+        seed: of all draws.
+        noise: standard deviation of the wrenches' noise, as a share of their size.
+        actuators: least and most of a robot.
+        plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula of jets when
+            left out.
+    """
+    from finlab.evaluation.method_specs import own_function
+    from finlab.fit.interaction.samples import drawn, with_jets, write_samples
+
+    check_positive(layouts=layouts, commands=commands, actuators=actuators[0])
+    judge = with_jets if plant is None else own_function(plant)
+    write_samples(output, drawn(judge, layouts, commands, seed, noise, actuators))
+    print(f"{output}: {layouts} robots with {commands} commands each, seed {seed}")

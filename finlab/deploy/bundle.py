@@ -24,9 +24,12 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
 from finlab.assets import NAME, shipped_checkpoints
 from finlab.axes import AXES
+from finlab.bundle_files import named_content
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.guarded import packed
+from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
+from finlab.interaction.learned import NETWORK_SUFFIX, WHAT, Learned
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.file import FORMAT as LAYOUT_FORMAT
 from finlab.layout.file import layout_to_dict
@@ -132,8 +135,8 @@ def _about(allocator: Allocator) -> bytes:
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
-    """A layout whose force tables have the names that they have in a bundle, and their contents by name;
-    `DataError`: a table cannot be read, or is too large to travel."""
+    """A layout whose force tables, and the network of whose interaction, have the names that they have in a
+    bundle, and their contents by name; `DataError`: one cannot be read, or is too large to travel."""
     tables: dict[str, bytes] = {}
     parts = []
     for part in layout.actuators:
@@ -146,7 +149,12 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
             tables[bundle_files.table_name(content)] = content
             part = part.reading(bundle_files.table_name(content))
         parts.append(part)
-    return replace(layout, actuators=tuple(parts)), tables
+    interaction = layout.interaction
+    if isinstance(interaction, Learned):
+        content = named_content(interaction.path, LARGEST_NETWORK, WHAT)
+        name = bundle_files.table_name(content, NETWORK_SUFFIX)
+        tables[name], interaction = content, Learned(name)
+    return replace(layout, actuators=tuple(parts), interaction=interaction), tables
 
 
 def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:

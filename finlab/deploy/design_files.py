@@ -17,6 +17,7 @@ from finlab.errors import DataError, LayoutError
 from finlab.exchange import Exchange, read_robot
 from finlab.files.guarded import decoded, read_file, unpacked
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
+from finlab.interaction.learned import NETWORK_SUFFIX, Learned
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.file_form import under
@@ -122,6 +123,19 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
                 )
             part = replace(part, model=stored_table(parts[path], folder / TABLE_FOLDER))
         actuators.append(part)
+    interaction = layout.interaction
+    if isinstance(interaction, Learned):
+        path = interaction.path
+        path = path if path in parts else by_name.get(Path(path).name, path)
+        if path not in parts:
+            raise LayoutError(
+                f"names the learned interaction {Path(path).name!r:.60}, which did not come along; put both "
+                "into one ZIP archive, and open that",
+                source=source,
+            )
+        kept = folder / TABLE_FOLDER / f"{hashlib.sha256(parts[path]).hexdigest()}{NETWORK_SUFFIX}"
+        _keep(kept, parts[path])
+        interaction = Learned(str(kept))
     body = layout.body
     if body is not None and body.hull is not None and body.hull.mesh is not None:
         mesh = body.hull.mesh
@@ -132,7 +146,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         else:
             missing.append(Path(mesh).name[-60:])
             body = replace(body, hull=None)
-    return Opened(replace(layout, actuators=tuple(actuators), body=body), tuple(missing))
+    layout = replace(layout, actuators=tuple(actuators), body=body, interaction=interaction)
+    return Opened(layout, tuple(missing))
 
 
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
@@ -159,7 +174,7 @@ def _keep(path: Path, content: bytes) -> None:
 def _largest(source: str, name: str) -> int:
     """Largest size [bytes] of a file; refuses names that lead out of the folder, or that no layout needs."""
     path = PurePosixPath(name)
-    known = path.suffix.lower() in (".csv", *MESH_SUFFIXES, *LAYOUTS)
+    known = path.suffix.lower() in (".csv", NETWORK_SUFFIX, *MESH_SUFFIXES, *LAYOUTS)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or not known:
         raise LayoutError(f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source)
     return MAX_BYTES if name.endswith(LAYOUTS) else LARGEST_TABLE

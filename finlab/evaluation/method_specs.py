@@ -99,7 +99,7 @@ def load_method_spec(
 def own_method(name: str) -> type[Method]:
     """The method of a function, given as `module:function` or `file.py:function`. DataError: there is no
     such function, or one of its parameters is none of `KNOWN`."""
-    function = _function(name)
+    function = own_function(name)
     try:
         wanted = inspect.signature(function).parameters
     except ValueError:
@@ -143,7 +143,8 @@ class _OwnMethod(Method):
         return Solution(within)
 
 
-def _function(name: str) -> Callable[..., Any]:
+def own_function(name: str) -> Callable[..., Any]:
+    """Returns the function of `module:function` or `file.py:function`; a DataError where there is none."""
     place, _, attribute = name.rpartition(":")
     try:
         if place.endswith(".py"):

@@ -90,9 +90,15 @@ class Interaction(ABC):
             change, slope = change + lost, with_own(slope, own)
         return change, slope
 
-    def wrench(self, change: Array) -> Array:
-        """Returns the wrench (..., 6) [N, N m] of changes (..., n, 3) [N]."""
-        return np.asarray(np.einsum("...ib,ibw->...w", change, self.lever))
+    def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        """Returns the wrench (..., 6) [N, N m] of what comes beside the forces; arguments as for a call."""
+        return np.asarray(np.einsum("...ib,ibw->...w", self(force, inflow), self.lever))
+
+    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """Returns `offset`, and its derivatives (..., n, 3, 6) by the forces."""
+        change, slope = self.slope(force, inflow)
+        by_force = np.einsum("...jaib,ibw->...jaw", slope, self.lever)
+        return np.asarray(np.einsum("...ib,ibw->...w", change, self.lever)), np.asarray(by_force)
 
     def _lost(self, force: AnyArray, inflow: Array) -> Any:
         _, ahead, speed = jets_of(force, self.places.diameter)

@@ -15,8 +15,8 @@ from msgspec import Meta
 
 from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.arrays import AnyArray, Array
+from finlab.bundle_files import named_content
 from finlab.errors import CheckpointError
-from finlab.files.guarded import read_file
 from finlab.files.schema import Checked
 from finlab.interaction.interaction import Interaction, Places, complex_slope, with_own
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
@@ -24,7 +24,9 @@ from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
 MEMBERS = 3
 """Networks that are trained apart."""
 LAYERS = 3
-MAX_BYTES = 5_000_000
+NETWORK_SUFFIX = ".safetensors"
+MAX_BYTES, WHAT = 5_000_000, "a learned interaction (.safetensors)"
+"""Largest file of a network, and what it is."""
 
 Weights = Mapping[str, AnyArray]
 """Arrays by name, `pair.0.weight` (MEMBERS, in, out) and `pair.0.bias` (MEMBERS, 1, out) to layer 2, and the
@@ -151,7 +153,7 @@ def read_network(path: str) -> tuple[Weights, float]:
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    content = read_file(path, MAX_BYTES, "a learned interaction (.safetensors)", CheckpointError)
+    content = named_content(path, MAX_BYTES, WHAT, CheckpointError)
     try:
         weights = {name: array.astype(np.float64) for name, array in load(content).items()}
         trust = float(weights.pop("trust")[0])

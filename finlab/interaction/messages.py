@@ -94,8 +94,8 @@ def unpacked(name: str, rows: AnyArray) -> tuple[AnyArray, AnyArray]:
 
 def _packed(features: list[Any], vectors: list[Any], strength: Any) -> Any:
     vectors = [vector * strength[..., None] for vector in vectors]
-    features = np.broadcast_arrays(*features, strength)[:-1]
-    return np.concatenate([np.stack(features, axis=-1), *vectors], axis=-1)
+    alike = np.broadcast_arrays(*features, strength)[:-1]
+    return np.concatenate([np.stack(alike, axis=-1), *vectors], axis=-1)
 
 
 def _cross(a: AnyArray, b: AnyArray) -> Any:

@@ -71,8 +71,8 @@ def layout_form() -> Any:
 def _layout_form(kinds: tuple[type[Actuator], ...]) -> Any:
     kind: Any = list[actuator_form(kinds)]  # type: ignore[misc]
     parts = Annotated[kind, _COUNT]
-    kinds = {"actuators": parts, "interaction": INTERACTION, **_OF_A_LAYOUT}
-    return LAYOUT_OF_FINS | form(Layout, {}, tag=("version", 2), **kinds)
+    keys = {"actuators": parts, "interaction": INTERACTION, **_OF_A_LAYOUT}
+    return LAYOUT_OF_FINS | form(Layout, {}, tag=("version", 2), **keys)
 
 
 def parse_layout(

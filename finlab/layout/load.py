@@ -13,6 +13,7 @@ from finlab.errors import LayoutError
 from finlab.files.guarded import decoded, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.files.schema import Name, checked
+from finlab.interaction.learned import Learned
 from finlab.layout.file import layout_to_dict, parse_layout
 from finlab.layout.file_form import under
 from finlab.layout.layout import MAX_ACTUATORS, Layout
@@ -133,6 +134,9 @@ def robot_of(files: Files, source: str) -> Robot:
             if fin.model.values().get("path", "") not in {"", *tables}:
                 problem = "names a force table that is not in the bundle; export it again"
                 raise LayoutError(problem, f"layout, fin {fin.name!r}, model.path")
+        if isinstance(own := layout.interaction, Learned) and own.path not in tables:
+            problem = "names a network that is not in the bundle; export it again"
+            raise LayoutError(problem, "layout, interaction.path")
         for i, case in enumerate(robot.self_test):
             if len(case.command) != layout.n:
                 problem = f"expected {layout.n} rows, one for each actuator, got {len(case.command)}"

@@ -177,8 +177,8 @@ def random_robot(
 def random_jet_robot(
     rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw] | None = None
 ) -> Layout:
-    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most actuators on or near
-    it, of one of several kinds or of all of them (`kinds` when given)."""
+    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most actuators on or
+    near it, of one of several kinds or of all of them (`kinds` when given)."""
     mixed: list[Draw] = [random_thruster, random_azimuth, random_shaft_fin]
     chosen = kinds or ([mixed[k]] if (k := int(rng.integers(4))) < 3 else mixed)
     robot = random_robot(rng, name, count, chosen)

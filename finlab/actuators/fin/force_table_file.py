@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
 from finlab.axes import FILE_TURN_TOLERANCE, TURN
-from finlab.bundle_files import TABLES, archive_around, read_bundle_files
+from finlab.bundle_files import named_content
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable
-from finlab.files.guarded import read_file
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""
@@ -97,13 +96,7 @@ def table_text(notes: Iterable[str], header: Sequence[str], rows: Iterable[Any],
 def table_bytes(path: str | os.PathLike[str]) -> bytes:
     """Returns the contents of a table's file, which may lie in the zip archive of a bundle. Raises DataError:
     there is no such file, or it is too large."""
-    archive = archive_around(path)
-    if archive is None:
-        return read_file(path, MAX_BYTES, "a CSV table of fin forces")
-    content = read_bundle_files(archive).get(TABLES + os.path.basename(path))
-    if content is None:
-        raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
-    return content
+    return named_content(path, MAX_BYTES, "a CSV table of fin forces")
 
 
 def _read_rows(content: bytes, source: str) -> tuple[Array, Array, NDArray[np.intp], tuple[str, ...]]:

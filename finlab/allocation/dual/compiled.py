@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Line, Plane, with_square
+from finlab.actuators.response import Group, Line, Plane, Response, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
@@ -62,25 +62,22 @@ class Compiled:
     @cached_property
     def _directions(self) -> tuple[NDArray[np.intp], Array]:
         """The actuator (k,) of each of the robot's directions, and that direction (k, 3) in its own axes."""
-        groups, order = (
-            groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))),
-            self.robot.order,
-        )
-        responses = {
-            place: one for places, group in groups for place, one in zip(places, group.responses, strict=True)
-        }
-        lines = [i for i in order if isinstance(responses[i], Line)]
-        planes = [i for i in order if isinstance(responses[i], Plane)]
-        dragging = [i for i in lines if responses[i].drag is not None]
-        rows = [responses[i].effectiveness for i in lines]
-        rows += [responses[i].effectiveness[k] for k in range(2) for i in planes]
-        rows += [responses[i].drag for i in dragging]
-        return np.array([*lines, *planes, *planes, *dragging]), np.array(rows)[:, :3]
+        own: list[Response | None] = [None] * self.count
+        for places, group in groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))):
+            for place, response in zip(places, group.responses, strict=True):
+                own[place] = response
+        ordered = [(place, own[place]) for place in self.robot.order]
+        lines = [(place, each) for place, each in ordered if isinstance(each, Line)]
+        planes = [(place, each) for place, each in ordered if isinstance(each, Plane)]
+        rows = [(place, line.effectiveness) for place, line in lines]
+        rows += [(place, plane.effectiveness[k]) for k in range(2) for place, plane in planes]
+        rows += [(place, line.drag) for place, line in lines if line.drag is not None]
+        return np.array([place for place, _ in rows]), np.array([row for _, row in rows])[:, :3]
 
     def forces_along(self, force: Array) -> Array:
         """Forces (k, 1) [N] along the robot's directions of forces (n, 3) [N] in own axes."""
         places, directions = self._directions
-        return np.einsum("ka,ka->k", directions, force[places])[:, None]
+        return np.asarray(np.einsum("ka,ka->k", directions, force[places])[:, None])
 
     def tilted(self, effectiveness: Array, beside: Array) -> "Compiled":
         """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench

@@ -11,12 +11,14 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import hadamard
 
 from finlab.allocation.dual.newton import Deadline
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, ROUNDS
 
@@ -24,10 +26,14 @@ STEPS = 4
 """Steps that make a command exact, nearly."""
 HALVINGS, SHORTER = 4, 0.3
 """Most times that a step is made shorter, and by how much."""
-SETTLED = 1e-3
+SETTLED = 3e-4
 """Gain of a turn, as a share of the power, below which an answer has settled."""
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""
+PATTERNS, RANDOM, FOLLOWED = 8, 3, 2
+"""Other beginnings, and how many of them are followed."""
+PROMISING = 1.2
+"""Power of such a beginning, over that of the answer, up to which it is followed."""
 DEARER = 1.005
 """Power over that of the laws alone from which on other beginnings are tried."""
 
@@ -59,6 +65,8 @@ class Settled(NamedTuple):
     """(1, 6) [W/N, W/(N m)]."""
     power: float
     """[W]."""
+    worth: float
+    """What an error as large as the yardstick counts [W]."""
     error: float
     """Distance of the wrench from the target, on the yardstick."""
 
@@ -100,9 +108,12 @@ class Turns:
         laws = dual.forces(self.target - dual.compiled.beside, self.policy, self.deadline, dual.begin(prices))
         best = self._from(self._exact(laws.force), laws.price[0])
         if best.power > DEARER * self._power(dual.compiled.commands(laws.force)):
-            for force in _turned_aside(laws.force, dual.compiled.robot.answers):
-                other = self._from(self._exact(force), laws.price[0])
-                best = other if other.beats(best) else best
+            tried = self._exact(_turned_aside(laws.force, dual.compiled.robot.answers))
+            merits = np.array([self._merit(one[None], best.worth) for one in tried])
+            for k in np.argsort(merits)[:FOLLOWED]:
+                if merits[k] < PROMISING * best.power:
+                    other = self._from(tried[k : k + 1], laws.price[0])
+                    best = other if other.beats(best) else best
         return best
 
     def _from(self, command: Array, price: Array | None) -> Settled:
@@ -122,7 +133,9 @@ class Turns:
                 last = linear, own
             if before - merit <= SETTLED * before or self.deadline.passed():
                 break
-        return self._ended(command, *last)
+        assert last is not None
+        linear, own = last
+        return self._ended(command, linear, own, worth)
 
     def _shorter(
         self, command: Array, force: Array, there: Array, merit: float, worth: float
@@ -138,7 +151,7 @@ class Turns:
             size *= SHORTER
         return command, merit
 
-    def _ended(self, command: Array, linear: Any, own: Any) -> Settled:
+    def _ended(self, command: Array, linear: Any, own: Any, worth: float) -> Settled:
         dual, previous, target = self.dual, self.previous, self.target
         aim = target if own.within.all() else own.aim + linear.compiled.beside
         force = dual.compiled.forces_along(dual.plant.force(command)[0])
@@ -147,7 +160,7 @@ class Turns:
             command, aim = _on_the_ray(dual, target, command)
         if previous is not None and not dual.rates.allow(previous, command[0]):
             command = linear.in_a_tick(aim, own, previous)
-        return Settled(command, aim, own.price, self._power(command), self._error(command))
+        return Settled(command, aim, own.price, self._power(command), worth, self._error(command))
 
     def _exact(self, force: Array) -> Array:
         """Commands (1, n, 3) near to forces (k, 1) that give the target, nearly."""
@@ -185,16 +198,20 @@ def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]
     return best, low * target
 
 
-def _turned_aside(force: Array, answers: Any) -> list[Array]:
-    """Other forces (k, 1) to begin at: those of planes turned one way, the other way, and by turns. A jet
-    that meets a neighbour in a symmetric robot has no slope that would turn it aside."""
-    lines, planes = answers.lines, answers.planes
+def _turned_aside(force: Array, answers: Any) -> Array:
+    """Other forces (k, 12) to begin at: those of planes turned one way or the other, in the patterns of
+    Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a symmetric robot
+    has no slope that would turn it aside, and which of two jets gives way is a choice between minima."""
+    lines, planes, rng = answers.lines, answers.planes, np.random.default_rng(0)
+    signs = hadamard(MAX_ACTUATORS)[:planes, :PATTERNS]
+    angle = ASIDE * np.concatenate([signs, -signs[:, :1], rng.normal(size=(planes, RANDOM))], axis=1)
+    size = rng.uniform(0.0, 2.0, (lines + planes, angle.shape[1]))
+    size[lines:, : PATTERNS + 1] = 1.0
+    turned = np.repeat(force, angle.shape[1], axis=1)
     first, second = answers.pair(force)
-    signs = np.array([np.ones(planes), -np.ones(planes), (-1.0) ** np.arange(planes)])[: min(planes, 2) + 1]
-    turned = []
-    for sign in signs[:, :, None] if planes else ():
-        other = force.copy()
-        other[lines : lines + planes] = np.cos(ASIDE) * first - sign * np.sin(ASIDE) * second
-        other[lines + planes : lines + 2 * planes] = sign * np.sin(ASIDE) * first + np.cos(ASIDE) * second
-        turned.append(other)
+    turned[:lines] *= size[:lines]
+    turned[lines : lines + planes] = size[lines:] * (np.cos(angle) * first - np.sin(angle) * second)
+    turned[lines + planes : lines + 2 * planes] = size[lines:] * (
+        np.sin(angle) * first + np.cos(angle) * second
+    )
     return turned

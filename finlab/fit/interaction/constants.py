@@ -1,11 +1,11 @@
 """Constants of the formula of jets, fitted to samples of one robot by least squares on their logarithms.
 
-Few samples leave some of the constants open; a normal prior about the usual values, in which a factor of two is
-one standard deviation, holds those.
+Few samples leave some of the constants open; a normal prior about the usual values, in which a factor of two
+is one standard deviation, holds those.
 """
 
 from dataclasses import asdict, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -55,18 +55,19 @@ def fit_constants(samples: Samples) -> Fitted:
 
     def left(logarithms: Array) -> Array:
         known = jets_at(logarithms).of(places)
-        return np.asarray(missed - known.wrench(known.at_rest(force)) / scale)
+        return np.asarray(missed - known.offset(force) / scale)
+
+    def with_prior(logarithms: Array) -> Array:
+        return np.concatenate([(left(logarithms) / noise).ravel(), (logarithms - start) / PRIOR])
 
     noise = NOISE
     for _ in range(2):  # the noise is what the first fit leaves
-        fit = least_squares(
-            lambda x, noise=noise: np.concatenate([(left(x) / noise).ravel(), (x - start) / PRIOR]), start
-        )
+        fit: Any = least_squares(with_prior, start)
         rest = left(fit.x)
         noise = max(NOISE, float(np.sqrt((rest**2).mean())))
     each = replace(jets_at(fit.x), uncertain=1.0).of(places).deviation(force) / scale
     size = np.sqrt(((samples.wrench / scale) ** 2).mean(axis=0))
-    share, floor = _parts(rest, each, size)
+    share, floor = parts_of_error(rest, each, size)
     by_constants = noise * fit.jac[: rest.size]
     measured = (floor * size) ** 2 + (share * each) ** 2 + 1e-12
     known = (by_constants / measured.reshape(-1, 1)).T @ by_constants + np.eye(len(start)) / PRIOR**2
@@ -77,16 +78,16 @@ def fit_constants(samples: Samples) -> Fitted:
     return Fitted(made, _size(missed), _size(rest))
 
 
-def _parts(rest: Array, each: Array, size: Array) -> tuple[float, float]:
-    """The share of what the jets take (N, 6), and of the size (6,) of the wrenches, whose squares together are
-    most likely the variances of normal errors (N, 6): what the formula lacks, and noise."""
-    shares = np.concatenate([[0.0], np.geomspace(3e-3, 1.0, 40)])
-    variance = (shares[:, None, None, None] * each) ** 2 + (
-        np.geomspace(1e-4, 0.3, 40)[:, None, None] * size
-    ) ** 2
-    cost = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
-    i, k = np.unravel_index(cost.argmin(), cost.shape)
-    return float(shares[i]), float(np.geomspace(1e-4, 0.3, 40)[k])
+def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]:
+    """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares together are
+    most likely the variances of normal errors (N, 6): what a model lacks, and noise."""
+    shares, floors = np.concatenate([[0.0], np.geomspace(3e-3, 10.0, 60)]), np.geomspace(1e-4, 0.3, 40)
+    costs = np.empty((len(shares), len(floors)))
+    for i, share in enumerate(shares):
+        variance = (share * each) ** 2 + (floors[:, None, None] * size) ** 2 + 1e-18
+        costs[i] = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
+    row, column = divmod(int(costs.argmin()), len(floors))
+    return float(shares[row]), float(floors[column])
 
 
 def _size(rows: Array) -> float:

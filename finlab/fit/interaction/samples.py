@@ -1,10 +1,10 @@
 """Forward data of what actuators do to each other: robots, commands, and the wrenches that these caused.
 
-An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI units, NaN where
-a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame, NaN where it was not
+An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI units, NaN
+where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame, NaN where it was not
 measured. A CSV file holds the samples of one robot: `NAME.number` for each actuator, such as `bow.force`, or
-`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A folder holds a CSV file for each robot, beside its
-layout file of the same name.
+`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A folder holds a CSV file for each robot, beside
+its layout file of the same name.
 """
 
 import json
@@ -52,8 +52,9 @@ def with_jets(layout: Layout, command: Array) -> Array:
 def drawn(
     judge: Judge, layouts: int, commands: int, seed: int, noise: float, count: tuple[int, int]
 ) -> list[Samples]:
-    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches with
-    normal noise, a share of each axis' root mean square. They depend on the seed and the number alone."""
+    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches
+    with normal noise, a share of each axis' root mean square. They depend on the seed and the number
+    alone."""
     result = []
     for k in range(layouts):
         rng = np.random.default_rng([31_000, seed, k])
@@ -82,41 +83,21 @@ def write_samples(path: Path, samples: Sequence[Samples]) -> None:
 
 
 def read_samples(path: Path) -> list[Samples]:
-    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do not fit the
-    robots; LayoutError: a robot is none."""
+    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do not fit
+    the robots; LayoutError: a robot is none."""
     if path.is_dir():
-        tables = sorted(path.glob("*.csv"))
-        robots = [
-            next((f for s in (".yaml", ".yml", ".json") if (f := t.with_suffix(s)).exists()), None)
-            for t in tables
-        ]
-        if not tables or None in robots:
-            lone = next(
-                (t.name for t, robot in zip(tables, robots, strict=True) if robot is None), "no CSV file"
-            )
-            raise DataError(
-                f"{path}: expected for each robot a layout file and a CSV file of one name, got {lone}"
-            )
-        return [read_table(load_layout(robot), table) for table, robot in zip(tables, robots, strict=True)]  # type: ignore[arg-type]
+        return [_beside(table) for table in sorted(path.glob("*.csv"))] or _no_tables(path)
     arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, WHAT)
     values = json_of(arrays["layouts"], f"{path}: layouts")
     if not isinstance(values, list) or not values:
         raise DataError(f"{path}: layouts: expected JSON text of a list of layout files")
     robots = [
-        parse_layout(value, f"{path}: layouts[{k}]", path.parent, may_open=False)
-        for k, value in enumerate(values)
+        parse_layout(v, f"{path}: layouts[{k}]", path.parent, may_open=False) for k, v in enumerate(values)
     ]
-    shape = arrays["command"].shape
-    n = max(robot.n for robot in robots)
-    count = shape[1] if len(shape) == 4 else 0
-    check_shapes(
-        arrays,
-        {
-            "command": (len(robots), count, max(n, shape[2] if len(shape) == 4 else 0), 3),
-            "wrench": (len(robots), count, 6),
-        },
-        str(path),
-    )
+    count, n = (arrays["command"].shape + (0, 0, 0))[1:3]
+    most = max(n, max(robot.n for robot in robots))
+    shapes = {"command": (len(robots), count, most, 3), "wrench": (len(robots), count, 6)}
+    check_shapes(arrays, shapes, str(path))
     result = []
     for layout, command, wrench in zip(robots, arrays["command"], arrays["wrench"], strict=True):
         known = np.isfinite(wrench).all(axis=1)
@@ -127,6 +108,19 @@ def read_samples(path: Path) -> list[Samples]:
             )
         result.append(Samples(layout, own, wrench[known].astype(np.float64)))
     return result
+
+
+def _beside(table: Path) -> Samples:
+    for suffix in (".yaml", ".yml", ".json"):
+        if (robot := table.with_suffix(suffix)).exists():
+            return read_table(load_layout(robot), table)
+    raise DataError(f"{table}: expected a layout file of the same name beside it, such as {table.stem}.yaml")
+
+
+def _no_tables(path: Path) -> list[Samples]:
+    raise DataError(
+        f"{path}: expected for each robot a layout file and a CSV file of one name, got no CSV file"
+    )
 
 
 def read_table(layout: Layout, path: Path) -> Samples:

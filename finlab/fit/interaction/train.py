@@ -1,8 +1,8 @@
 """Training of the networks of a learned interaction, from forward data of many robots.
 
 What the laws of the actuators leave of each measured wrench, on the robot's yardstick, is the sum of the
-messages. Their features and vectors do not depend on the weights, so they are made once; a step of training is
-two small networks on the rows of some samples.
+messages. Their features and vectors do not depend on the weights, so they are made once; a step of training
+is two small networks on the rows of some samples.
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ from torch import Tensor
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
+from finlab.fit.interaction.constants import parts_of_error
 from finlab.fit.interaction.samples import Samples
 from finlab.interaction.interaction import Places
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
@@ -74,20 +75,23 @@ class DataSet(NamedTuple):
     """Of `pair` and `hull`."""
     left: Tensor
     """What the laws leave of the wrenches (N, 6), on the yardsticks."""
+    size: Tensor
+    """Root mean squares (N, 6) of the wrenches of their robots, on the yardsticks."""
     robot: Tensor
     """The robot (N,) of each sample."""
 
 
 def data_set(samples: Sequence[Samples]) -> DataSet:
-    """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots or none with
-    a jet."""
+    """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots, or none
+    with a jet."""
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
-    left, robot = [], []
+    left, size, robot = [], [], []
     for k, one in enumerate(samples):
         plant, scale = Plant(one.layout), yardstick(one.layout)
         own = plant.force(one.command)
         law = np.einsum("kna,naw->kw", own, plant.effectiveness)
         left.append((one.wrench - law) / scale)
+        size.append(np.broadcast_to(np.sqrt((one.wrench**2).mean(axis=0)) / scale, law.shape))
         robot.append(np.full(len(law), k))
         places, force = places_of(one.layout), body_force(own, one.layout.frames)
         for name, made in messages_of(places, force, scale).items():
@@ -97,16 +101,17 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
             f"expected samples of at least 10 robots with jets that meet others, got {len(samples)}"
         )
     rows = {}
-    for name, made in parts.items():
-        features, vectors, counts = (np.concatenate(each) for each in zip(*made, strict=True))
+    for name, several in parts.items():
+        features, vectors, counts = (np.concatenate(each) for each in zip(*several, strict=True))
         starts = torch.from_numpy(np.concatenate([[0], np.cumsum(counts)]))
         rows[name] = Rows(_tensor(features), _tensor(vectors), starts)
-    return DataSet(rows, _tensor(np.concatenate(left)), torch.from_numpy(np.concatenate(robot)))
+    missed, sizes = (_tensor(np.concatenate(part)) for part in (left, size))
+    return DataSet(rows, missed, sizes, torch.from_numpy(np.concatenate(robot)))
 
 
 def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
-    """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R, k, 6), and
-    how many rows each of forces (K, n, 3) [N] has (K,)."""
+    """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R, k, 6),
+    and how many rows each of forces (K, n, 3) [N] has (K,)."""
     pairs, lever = Pairs(places), LearnedInteraction({}, 1.0, places).lever / scale
     source, receiver = force[:, pairs.source], force[:, pairs.receiver]
     rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
@@ -157,10 +162,10 @@ def train(
     with torch.no_grad():
         shipped = {name: torch.from_numpy(np.asarray(value)) for name, value in run.shipped.items()}
         each = torch.stack([told(shipped, member, data, unknown) for member in range(MEMBERS)])
-        error = each.mean(dim=0) - data.left[unknown]
-        trust = float((error**2).mean().sqrt() / (each.var(dim=0).mean().sqrt() + 1e-12))
+    error = (each.mean(dim=0) - data.left[unknown]).double().numpy()
+    trust, _ = parts_of_error(error, each.std(dim=0).double().numpy(), data.size[unknown].double().numpy())
     write_network(folder / WEIGHTS_FILE, run.shipped, trust)
-    return float((error**2).sum(dim=1).mean().sqrt())
+    return float(np.sqrt((error**2).sum(axis=1).mean()))
 
 
 def told(weights: dict[str, Any], member: int, data: DataSet, samples: Tensor) -> Tensor:
