@@ -99,9 +99,7 @@ def interaction(
 
     robot = open_robot(layout)[0]
     fit = fit_constants(in_worker(read_table, robot, samples))
-    print(
-        f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets {fit.left:.3g} is left"
-    )
+    print(f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets {fit.left:.3g}")
     print(f"interaction: {plain(fit.jets)}".replace("'", ""))
     if output is not None:
         save_layout(replace(robot, interaction=fit.jets), output)

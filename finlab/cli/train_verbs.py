@@ -1,4 +1,4 @@
-"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: networks, their data."""
+"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: data, networks."""
 
 from __future__ import annotations
 
@@ -194,8 +194,8 @@ def interaction_data(
         seed: of all draws.
         noise: standard deviation of the wrenches' noise, as a share of their size.
         actuators: least and most of a robot.
-        plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula of jets when
-            left out.
+        plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula of jets
+            when left out.
     """
     from finlab.evaluation.method_specs import own_function
     from finlab.fit.interaction.samples import drawn, with_jets, write_samples

@@ -24,7 +24,7 @@ from finlab.evaluation.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
     *("wrench", "thrusters", "latency", "ablation", "temperature"),
-    *("trajectory", "faults", "velocity", "swims"),
+    *("trajectory", "faults", "velocity", "swims", "interaction"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
 MOST, MOST_SEED = 1_000_000, 2**63 - 1  # largest whole number of an option, and of a seed

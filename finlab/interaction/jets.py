@@ -23,6 +23,8 @@ Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
 Share = Annotated[float, Meta(ge=0.0, le=10.0)]
 BEHIND = 0.2
 """Distance, in diameters, over which a jet begins."""
+MISSED = 0.1
+"""Share of an actuator's force that counts as taken where the formula says that nothing is."""
 GRAZING = 0.3
 """Width of a jet's rim on the hull, as a share of its distance from the centre squared."""
 
@@ -83,8 +85,10 @@ class JetInteraction(Interaction):
         return change, with_own(np.einsum("...jaiu,...iub->...jaib", turned, by_water), own)
 
     def deviation(self, force: Array) -> Array:
-        each = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever)
-        return np.asarray(self.constants.uncertain * np.sqrt((each * each).sum(axis=-2)))
+        each = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever) ** 2
+        # A jet that the formula has pass by may be met.
+        missed = (MISSED**2 / 3.0) * np.einsum("...ib,icw->...iw", force**2, self.lever**2)
+        return np.asarray(self.constants.uncertain * np.sqrt((each + missed).sum(axis=-2)))
 
     def _water(self, force: AnyArray) -> Any:
         """Velocity (..., n, n, 3) [m/s] that the jet of each actuator gives to the water at each other

@@ -22,20 +22,12 @@ from finlab.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, ROUNDS
 
-STEPS = 4
-"""Steps that make a command exact, nearly."""
 HALVINGS, SHORTER = 4, 0.3
 """Most times that a step is made shorter, and by how much."""
-SETTLED = 3e-4
-"""Gain of a turn, as a share of the power, below which an answer has settled."""
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""
 PATTERNS, RANDOM, FOLLOWED = 8, 3, 2
 """Other beginnings, and how many of them are followed."""
-PROMISING = 1.2
-"""Power of such a beginning, over that of the answer, up to which it is followed."""
-DEARER = 1.005
-"""Power over that of the laws alone from which on other beginnings are tried."""
 
 
 class Linear(NamedTuple):
@@ -107,13 +99,12 @@ class Turns:
             return self._from(self.previous[None], prices)
         laws = dual.forces(self.target - dual.compiled.beside, self.policy, self.deadline, dual.begin(prices))
         best = self._from(self._exact(laws.force), laws.price[0])
-        if best.power > DEARER * self._power(dual.compiled.commands(laws.force)):
+        if best.power > (1.0 + 10.0 * CLOSE) * self._power(dual.compiled.commands(laws.force)):
             tried = self._exact(_turned_aside(laws.force, dual.compiled.robot.answers))
             merits = np.array([self._merit(one[None], best.worth) for one in tried])
             for k in np.argsort(merits)[:FOLLOWED]:
-                if merits[k] < PROMISING * best.power:
-                    other = self._from(tried[k : k + 1], laws.price[0])
-                    best = other if other.beats(best) else best
+                other = self._from(tried[k : k + 1], laws.price[0])
+                best = other if other.beats(best) else best
         return best
 
     def _from(self, command: Array, price: Array | None) -> Settled:
@@ -131,7 +122,7 @@ class Turns:
             command, merit = self._shorter(command, force[0], own.force, before, worth)
             if merit < before:
                 last = linear, own
-            if before - merit <= SETTLED * before or self.deadline.passed():
+            if before - merit <= 2.0 * CLOSE * before or self.deadline.passed():
                 break
         assert last is not None
         linear, own = last
@@ -166,7 +157,9 @@ class Turns:
         """Commands (1, n, 3) near to forces (k, 1) that give the target, nearly."""
         command = self.dual.compiled.commands(force, self.previous)
         wanted = self.target / self.dual.scale
-        return np.asarray(refine(self.dual.search.problem, wanted, command, STEPS, 0.1 * NEARLY).command)
+        return np.asarray(
+            refine(self.dual.search.problem, wanted, command, ROUNDS // 3, 0.1 * NEARLY).command
+        )
 
     def _merit(self, command: Array, worth: float) -> float:
         return self._power(command) + worth * self._error(command)
@@ -200,8 +193,9 @@ def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]
 
 def _turned_aside(force: Array, answers: Any) -> Array:
     """Other forces (k, 12) to begin at: those of planes turned one way or the other, in the patterns of
-    Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a symmetric robot
-    has no slope that would turn it aside, and which of two jets gives way is a choice between minima."""
+    Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a symmetric
+    robot has no slope that would turn it aside, and which of two jets gives way is a choice between
+    minima."""
     lines, planes, rng = answers.lines, answers.planes, np.random.default_rng(0)
     signs = hadamard(MAX_ACTUATORS)[:planes, :PATTERNS]
     angle = ASIDE * np.concatenate([signs, -signs[:, :1], rng.normal(size=(planes, RANDOM))], axis=1)

@@ -80,14 +80,16 @@ def fit_constants(samples: Samples) -> Fitted:
 
 def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]:
     """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares together are
-    most likely the variances of normal errors (N, 6): what a model lacks, and noise."""
-    shares, floors = np.concatenate([[0.0], np.geomspace(3e-3, 10.0, 60)]), np.geomspace(1e-4, 0.3, 40)
+    the variances of normal errors (N, 6), what a model lacks and noise: root mean squares over all shares,
+    each as likely as it makes the errors."""
+    shares, floors = np.geomspace(3e-3, 10.0, 60), np.geomspace(1e-4, 0.3, 40)
     costs = np.empty((len(shares), len(floors)))
     for i, share in enumerate(shares):
         variance = (share * each) ** 2 + (floors[:, None, None] * size) ** 2 + 1e-18
         costs[i] = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
-    row, column = divmod(int(costs.argmin()), len(floors))
-    return float(shares[row]), float(floors[column])
+    likely = np.exp(-0.5 * (costs - costs.min()))
+    likely /= likely.sum()
+    return float(np.sqrt(likely.sum(axis=1) @ shares**2)), float(np.sqrt(likely.sum(axis=0) @ floors**2))
 
 
 def _size(rows: Array) -> float:

@@ -1,0 +1,327 @@
+"""Robots whose jets hit each other and the hull: what answers miss by a plant that no method was told."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finlab.allocation.dual.method import Dual, DualSettings
+from finlab.allocation.policy import CLOSEST
+from finlab.arrays import Array
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, progress
+from finlab.evaluation.method_specs import own_function
+from finlab.fit.interaction.constants import fit_constants
+from finlab.fit.interaction.samples import Judge, Samples, drawn
+from finlab.interaction.interaction import Interaction, Places
+from finlab.interaction.jets import Jets
+from finlab.interaction.learned import Learned
+from finlab.layout import Layout
+from finlab.layout.effectiveness import body_force
+from finlab.layout.places import places_of
+from finlab.layout.random_layouts import random_jet_robot, random_shaft_fin
+from finlab.physics import Plant
+from finlab.physics.objective import yardstick
+from finlab.precision import NEARLY, ROUNDS
+
+GROUPS = {
+    "unseen robots": ((4, 8), None),
+    "6 to 8 fins": ((6, 8), [random_shaft_fin]),
+    "9 and 10 actuators": ((9, 10), None),
+}
+"""Robots that no training has seen: their actuators, least to most, and kinds."""
+OTHER = Jets(2.2, 2.6, 30.0, 0.75, 0.95, 0.22, 0.12, 0.48)
+"""Constants of the plant where none is given; those of no method."""
+FITTED = 20
+"""Own samples that the formula is fitted to."""
+
+
+def run(
+    plant: str | None = None,
+    robots: int = 20,
+    targets: int = 6,
+    layouts: int = 4000,
+    network: str | None = None,
+    own: tuple[int, ...] = (30, 100, 300, 1000),
+    seed: int = 0,
+) -> Iterator[Row]:
+    """One row for each group of robots and each model of what actuators do to each other.
+
+    Args:
+        plant: judge and teacher, as file.py:function or module:function of a layout and commands (K, n, 3)
+            that gives wrenches (K, 6); the formula of jets with other constants when left out.
+        robots: of each group.
+        targets: on each robot, wrenches of random commands by the plant.
+        layouts: that the networks learn from, 20 samples each with 2 % noise.
+        network: file of `finlab train interaction` in place of one that is trained now.
+        own: samples of each robot that a ridge regression is given.
+        seed: of all draws.
+    """
+    judge = _other_jets if plant is None else own_function(plant)
+    with tempfile.TemporaryDirectory() as folder:
+        models = _models(judge, layouts, network, own, seed, Path(folder))
+        for group, (count, kinds) in GROUPS.items():
+            cases = []
+            for k in range(robots):
+                rng = np.random.default_rng([32_000, seed, k])
+                layout = random_jet_robot(rng, f"robot_{k + 1}", count, kinds)
+                wrench = judge(layout, Plant(layout).sample(rng, (targets,)))
+                command = Plant(layout).sample(rng, (max(own, default=0) + 1 or 1,))
+                noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
+                measured = judge(layout, command) + noise * rng.normal(size=(len(command), 6))
+                cases.append((layout, wrench, Samples(layout, command, measured)))
+            for name, model in models.items():
+                yield {"robots": group, "model": name} | _row(judge, model, cases, name)
+
+
+Model = Callable[[Samples], Interaction | None]
+"""From own samples of a robot to what answers are told of it."""
+
+
+def _models(
+    judge: Judge, layouts: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
+) -> dict[str, Model]:
+    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+
+    samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
+    if network is None:
+        train(samples, folder, Recipe(), seed)
+    file = network or str(folder / WEIGHTS_FILE)
+    node = trained_nodes(samples, seed)
+    models: dict[str, Model] = {
+        "laws alone": lambda _: None,
+        f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
+            places_of(own.layout)
+        ),
+        "network, no own samples": lambda own: Learned(file).of(places_of(own.layout)),
+        "the paper's surrogate form": node,
+    }
+    for count in own:
+        models[f"ridge, {count} own samples"] = partial(_ridge, count)
+    return models | {"oracle": lambda own: Learned(file).of(places_of(own.layout))}
+
+
+def _ridge(count: int, samples: Samples) -> "Ridge":
+    return Ridge(_some(samples, count))
+
+
+def _some(samples: Samples, count: int) -> Samples:
+    return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
+
+
+class _Case(NamedTuple):
+    error: float
+    power: float
+    expected: float
+
+
+def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str) -> Row:
+    each = []
+    for layout, wrenches, samples in progress(cases, "robot", name):
+        scale = yardstick(layout)
+        method = Dual(layout, DualSettings(), scale)
+        told: Any = model(samples)
+        method.plant = copy(method.plant)
+        method.plant.interaction = told
+        command = method.solve(wrenches, policy=CLOSEST).command
+        if name == "oracle":
+            command = np.array([_exact(judge, method, w, u) for w, u in zip(wrenches, command, strict=True)])
+        missed = (judge(layout, command) - wrenches) / scale
+        force = body_force(method.plant.force(command), layout.frames)
+        deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
+        watts = method.plant.power(command).sum(axis=1)
+        each += [_Case(*case) for case in zip(*(map(_size, (missed, deviation))), watts, strict=True)]
+    error, expected, power = (np.array(column) for column in zip(*each, strict=True))
+    known = float(np.sqrt((expected**2).mean()))
+    return {
+        "n": len(each),
+        "error_mean": float(error.mean()),
+        "error_median": float(np.median(error)),
+        "error_p95": float(np.percentile(error, 95)),
+        "expected_over_true": known / float(np.sqrt((error**2).mean())) if known else None,
+        "power_mean": float(power.mean()),
+    }
+
+
+def _size(rows: Array) -> Array:
+    return np.asarray(np.linalg.norm(rows, axis=-1))
+
+
+def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
+    """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton steps."""
+    plant, width = method.plant, np.maximum(method.plant.width, NEARLY)
+    best, least = command, np.inf
+    for _ in range(ROUNDS):
+        steps = 1e-4 * np.eye(command.size).reshape(-1, *command.shape) * width
+        given = judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
+        error = float(np.linalg.norm(given[0] - wrench / method.scale))
+        if error < least:
+            best, least = command, error
+        if error <= NEARLY:
+            break
+        slope = ((given[1:] - given[0]) / 1e-4).T
+        change = np.linalg.lstsq(slope, wrench / method.scale - given[0], rcond=1e-6)[0]
+        command = plant.feasible(command + np.clip(change, -0.2, 0.2).reshape(command.shape) * width)
+    return best
+
+
+def _other_jets(layout: Layout, command: Array) -> Array:
+    return Plant(replace(layout, interaction=OTHER)).wrench(command)
+
+
+class _ByDifferences(Interaction):
+    """An interaction by a function of all forces, with derivatives by differences."""
+
+    def __init__(self, places: Places, function: Callable[[Array], Array]) -> None:
+        """Takes a function from forces (K, n, 3) [N] to wrenches (K, 6) [N, N m]."""
+        super().__init__(places)
+        self._function = function
+
+    def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        return self._function(force.reshape(-1, *force.shape[-2:])).reshape(*force.shape[:-2], 6)
+
+    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        flat = force.reshape(-1, *force.shape[-2:])
+        count, step = flat[0].size, 1e-4
+        moved = flat[:, None] + step * np.eye(count).reshape(count, *flat.shape[1:])
+        here = self._function(flat)
+        slope = (
+            self._function(moved.reshape(-1, *flat.shape[1:])).reshape(len(flat), count, 6) - here[:, None]
+        ) / step
+        return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
+
+    def at_rest(self, force: Array) -> Array:
+        raise NotImplementedError
+
+    def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def deviation(self, force: Array) -> Array:
+        return np.zeros((*force.shape[:-2], 6))
+
+
+class Ridge(_ByDifferences):
+    """What the laws leave of own samples, by ridge regression on forces, their sizes and products of these,
+    with the penalty that leaves least of samples left out one by one."""
+
+    def __init__(self, samples: Samples) -> None:
+        plant, scale = Plant(samples.layout), yardstick(samples.layout)
+        own = plant.force(samples.command)
+        force, left = body_force(own, samples.layout.frames), (samples.wrench - plant.wrench_of(own)) / scale
+        unit = float(np.abs(force).max())
+
+        def features(force: Array) -> Array:
+            scaled = force / unit
+            size = np.linalg.norm(scaled, axis=-1)
+            flat = scaled.reshape(len(force), -1)
+            pairs = flat[:, :, None] * size[:, None, :]
+            return np.concatenate(
+                [np.ones((len(force), 1)), flat, size, pairs.reshape(len(force), -1)], axis=1
+            )
+
+        known = features(force)
+        left_u, values, right = np.linalg.svd(known, full_matrices=False)
+        best, weights = np.inf, np.zeros((known.shape[1], 6))
+        for penalty in np.geomspace(1e-4, 10.0, 12) * values[0]:
+            kept = values**2 / (values**2 + penalty**2)
+            leverage = np.minimum(((left_u**2) * kept).sum(axis=1), 0.999)
+            alone = (left - (left_u * kept) @ (left_u.T @ left)) / (1.0 - leverage)[:, None]
+            if (alone**2).sum() < best:
+                best = float((alone**2).sum())
+                weights = right.T @ ((values / (values**2 + penalty**2))[:, None] * (left_u.T @ left))
+        super().__init__(places_of(samples.layout), lambda force: features(force) @ weights * scale)
+
+
+def trained_nodes(samples: list[Samples], seed: int, steps: int = 1500, batch: int = 512) -> Model:
+    """Trains the form of the paper's surrogate on what the laws leave: a perceptron gives each actuator's
+    share of [x_i, u_i], place and force in the body frame, and a descriptor of all stretches and shifts the
+    sum (Eq. 4)."""
+    import torch
+    from torch import nn
+
+    torch.manual_seed(seed)
+    net, describe, affine = (
+        nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3)),
+        nn.Sequential(nn.Linear(7, 64), nn.GELU()),
+        nn.Linear(64, 12),
+    )
+    most = max(one.layout.n for one in samples)
+
+    def rows(layout: Layout, force: Array, scale: Array, n: int) -> tuple[Array, Array]:
+        x = np.zeros((len(force), n, 7))
+        x[:, : layout.n, :3], x[:, : layout.n, 3:6] = layout.position / 0.3, force / scale[0]
+        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
+        return x, np.broadcast_to(np.arange(n) < layout.n, x.shape[:2])
+
+    def wrench(x: torch.Tensor, mask: torch.Tensor, ratio: torch.Tensor) -> torch.Tensor:
+        share = net(x) * mask[..., None]
+        torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * ratio[:, None, None]
+        total = torch.cat([share, torque], dim=-1).sum(dim=1)
+        pooled = (describe(x) * mask[..., None]).sum(dim=1) / mask.sum(dim=1, keepdim=True)
+        stretch, shift = affine(pooled).chunk(2, dim=-1)
+        result: torch.Tensor = total * (1.0 + stretch) + shift
+        return result
+
+    made = []
+    for one in samples:
+        plant, scale = Plant(one.layout), yardstick(one.layout)
+        own = plant.force(one.command)
+        x, mask = rows(one.layout, body_force(own, one.layout.frames), scale, most)
+        ratio = np.full(len(x), scale[0] / scale[3])
+        made.append((x, mask, ratio, (one.wrench - plant.wrench_of(own)) / scale))
+    known, alive, arm, left = (
+        torch.tensor(np.concatenate(part), dtype=torch.float32) for part in zip(*made, strict=True)
+    )
+    weights = [*net.parameters(), *describe.parameters(), *affine.parameters()]
+    optimizer = torch.optim.Adam(weights, lr=2e-3)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+    for _ in progress(range(steps), "step", "surrogate form"):
+        some = torch.randint(len(known), (batch,))
+        loss = ((wrench(known[some], alive[some], arm[some]) - left[some]) ** 2).mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+
+    def model(own: Samples) -> Interaction:
+        layout, scale = own.layout, yardstick(own.layout)
+
+        def function(force: Array) -> Array:
+            values = (*rows(layout, force, scale, layout.n), np.full(len(force), scale[0] / scale[3]))
+            with torch.no_grad():
+                return (
+                    wrench(*(torch.tensor(part, dtype=torch.float32) for part in values)).double().numpy()
+                    * scale
+                )
+
+        return _ByDifferences(places_of(layout), function)
+
+    return model
+
+
+experiment = Experiment(
+    name="interaction",
+    question="Where jets hit each other and the hull: what do answers miss that know the laws alone, a "
+    "formula, a network, or the robot's own samples?",
+    columns=(
+        Column("robots", "robots", "text"),
+        Column("model", "told", "text"),
+        Column("n", "targets", "count"),
+        Column("error_mean", "error, mean", "error"),
+        Column("error_median", "median", "error"),
+        Column("error_p95", "95 %", "error"),
+        Column("expected_over_true", "expected / true", "three"),
+        Column("power_mean", "power [W]", "three"),
+    ),
+    run=run,
+    note=(
+        "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets are wrenches "
+        "of random commands by the plant. The oracle goes on from the network's answer by the plant itself."
+    ),
+    quick={"robots": 3, "targets": 2, "layouts": 60, "own": (30,)},
+)
