@@ -85,6 +85,9 @@ def doubts(result: Allocation) -> tuple[str, ...]:
     if result.bound is None or result.power <= (1.0 + PLAIN_GAP) * result.bound:
         return doubt
     gap = 100.0 * (1.0 - result.bound / result.power)
+    if result.layout.interaction is not None:
+        laws = "the bound is that of the actuators' laws for what they push; what the jets take is not in it"
+        return (*doubt, f"of its power, {gap:.2g} % may be more than needed: {laws}")
     return (
         *doubt,
         f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "

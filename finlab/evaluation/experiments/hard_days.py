@@ -14,6 +14,7 @@ from finlab.assets import PAPER_LAYOUTS
 from finlab.control import FaultMonitor, steers
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
+from finlab.interaction.jets import Jets
 from finlab.layout import Body, Layout, load_layout
 from finlab.sim import ClosedLoop, Fault, SensorSettings, Trajectory, make_trajectory, perturbed
 
@@ -53,7 +54,8 @@ class HardDay:
     `finlab.sim.perturbed`, and `current` is the velocity of the water in the world [m/s]. `weak` is the share
     of its thrust that one fin gives, each in its turn, without an announcement; `lost` is how many fins are
     lost half-way, each and each pair in its turn, and where this is not `announced`, a `FaultMonitor` has to
-    find it.
+    find it. `jets` are what actuators truly do to each other, which methods are told where they are
+    `jets_known`.
     """
 
     name: str
@@ -70,6 +72,8 @@ class HardDay:
     weak: float | None = None
     lost: int = 0
     announced: bool = True
+    jets: Jets | None = None
+    jets_known: bool = False
 
     def path(self) -> Trajectory:
         """What is followed."""
@@ -87,6 +91,8 @@ class HardDay:
     def robot(self, layout: str, seed: int) -> Layout:
         """The robot that methods believe in; the seed draws mixed fins."""
         robot = load_layout(layout)
+        if self.jets_known:
+            robot = replace(robot, interaction=self.jets)
         if not self.mixed_fins:
             return robot
         cases = make_split("fins-mixed", robot.n_fins, 1, seed)
@@ -111,7 +117,9 @@ class HardDay:
             failures=failures,
             announced=self.announced,
             monitor=None if self.announced else FaultMonitor(robot),
-            truth=perturbed(replace(robot, body=self.body or robot.body), **self.truth),
+            truth=perturbed(
+                replace(robot, body=self.body or robot.body, interaction=self.jets), **self.truth
+            ),
             seed=seed,
         )
         if self.weak is not None:
@@ -163,6 +171,8 @@ HARD_DAYS = (
         lost=1,
         announced=False,
     ),
+    HardDay("heavy-jets", "Jets hit each other and the hull, and nobody knows.", HEAVY, jets=Jets()),
+    HardDay("heavy-jets-known", "The same, and the allocator is told.", HEAVY, jets=Jets(), jets_known=True),
     HardDay("heavy-lost-two", "Two of eight thrusters are lost half-way, announced.", HEAVY, lost=2),
     HardDay(
         "torpedo", "A propeller and tail fins that need speed.", ("torpedo",), "circle", 120.0, scale=25.0

@@ -1,0 +1,107 @@
+"""The formula of jets beside published tests, its derivatives beside differences, and what speed takes."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from finlab import Azimuth, Fin, Layout, PowerLaw, Thruster
+from finlab.arrays import Array
+from finlab.interaction.jets import Jets
+from finlab.layout.places import places_of
+from finlab.layout.random_layouts import random_jet_robot
+from finlab.physics import Plant
+
+D = 0.1
+LAW = PowerLaw(1.0)
+
+
+def tandem(apart: float, turned: float = 0.0, **constants: float) -> Layout:
+    """Two pods in line, `apart` diameters; the front one turned by `turned` degrees."""
+    front, back = (
+        Azimuth(name, (x, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 40.0), LAW, diameter=D)
+        for name, x in (("front", 0.0), ("back", -apart * D))
+    )
+    return Layout("tandem", (front, back), interaction=Jets(**constants))
+
+
+def thrust_left(apart: float, turned: float) -> float:
+    """Share of its thrust that the hind one of two keeps."""
+    plant = Plant(tandem(apart))
+    command = np.array([[math.radians(turned), 10.0, 0.0], [0.0, 10.0, 0.0]])
+    front = np.array([10.0 * math.cos(math.radians(turned)), 10.0 * math.sin(math.radians(turned))])
+    return float((plant.wrench(command)[0] - front[0]) / 10.0)
+
+
+@pytest.mark.parametrize("apart", [2.0, 4.0, 8.0, 16.0])
+def test_two_in_line_as_dang_and_laheij_measured(apart: float) -> None:
+    alone = 1.0 - 0.8 ** (apart ** (2.0 / 3.0))
+    assert abs(thrust_left(apart, 0.0) - alone) < 0.05
+    turned = alone + (1.0 - alone) * 1000.0 / (130.0 / alone**3 + 1000.0)
+    assert abs(thrust_left(apart, 10.0) - turned) < 0.05
+
+
+def test_far_aside_nothing_is_lost() -> None:
+    assert thrust_left(4.0, 60.0) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    known = Jets().of(places_of(random_jet_robot(rng, "robot", (2, 6))))
+    n = len(known.places.position)
+    force, inflow = 8.0 * rng.normal(size=(n, 3)), rng.normal(size=(n, 3))
+    offset, slope = known.effect(force, inflow)
+    assert_allclose(offset, known.offset(force, inflow), atol=1e-12)
+    for j in range(n):
+        for a in range(3):
+            step = np.zeros((n, 3))
+            step[j, a] = 1e-5
+            change = (known.offset(force + step, inflow) - known.offset(force - step, inflow)) / 2e-5
+            assert_allclose(slope[j, a], change, atol=1e-6)
+
+
+def test_what_rests_takes_and_gives_nothing() -> None:
+    plant = Plant(tandem(3.0, housing=0.0))
+    assert_allclose(plant.wrench(np.zeros((2, 3))), 0.0, atol=1e-9)
+
+
+def test_a_jet_on_the_hull_pushes_back() -> None:
+    from finlab import Body
+    from finlab.layout import Hull
+
+    thruster = Thruster("bow", (0.6, 0.0, 0.0), (1.0, 0.0, 0.0), (-30.0, 30.0), LAW, diameter=D)
+    hull = Body(hull=Hull("ellipsoid", (0.6, 0.4, 0.3)))
+    plant = Plant(Layout("one", (thruster,), body=hull, interaction=Jets(hull=0.5)))
+    astern, ahead = (plant.wrench(np.array([[f, 0.0, 0.0]]))[0] for f in (-20.0, 20.0))
+    assert ahead == pytest.approx(10.0, rel=0.02)  # its jet flows astern, onto the hull
+    assert astern == pytest.approx(-20.0, rel=0.02)
+
+
+def open_water(force: float, speed: float, kt: float, none_at: float) -> float:
+    """Thrust at a speed of advance along Kt = Kt0 (1 - J / J0), at the rate that gives `force` at rest."""
+    rate = math.sqrt(force / (1000.0 * kt * D**4))
+    return 1000.0 * rate**2 * D**4 * kt * (1.0 - speed / (rate * D * none_at))
+
+
+@pytest.mark.parametrize("force", [10.0, 20.0, 40.0])
+@pytest.mark.parametrize(("kt", "none_at"), [(0.4, 0.8), (0.3, 1.1), (0.5, 0.6)])
+def test_speed_takes_what_the_open_water_line_says(force: float, kt: float, none_at: float) -> None:
+    one = Thruster(
+        "stern", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-50.0, 50.0), LAW, diameter=D, open_water=(kt, none_at)
+    )
+    plant = Plant(Layout("one", (one,), interaction=Jets()))
+    got = plant.wrench(np.array([[force, 0.0, 0.0]]), flow=np.array([1.0, 0, 0, 0, 0, 0]))[0]
+    assert got == pytest.approx(open_water(force, 1.0, kt, none_at), rel=0.05, abs=0.05)
+
+
+def test_fins_have_jets_as_wide_as_they_sweep(fins: Array = np.array([0.02, 0.01])) -> None:
+    sizes = [Fin("fin", (0.0, 0.0, 0.0), 0.0, model=_drag(area)).jet for area in fins]
+    assert_allclose(np.pi / 4.0 * np.square(sizes), fins)
+
+
+def _drag(area: float) -> object:
+    from finlab.layout import FinModelSpec
+
+    return FinModelSpec("drag", (("area", area),))
