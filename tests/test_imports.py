@@ -17,6 +17,7 @@ LEVELS = (
     ("axes", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
     ("bundle_files", "executor"),
     ("actuators",),
+    ("interaction",),
     ("layout",),
     ("physics", "exchange"),
     ("vehicle",),

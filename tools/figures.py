@@ -7,7 +7,8 @@ A page holds a table between two marks,
     <!-- end of figures -->
 
 where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, and KEY... are
-the columns to show, by default all. What stands between the marks is replaced.
+the columns to show, by default all; OPTION=VALUE among them is an option in place of that of the quick
+report. What stands between the marks is replaced.
 """
 
 import re
@@ -21,7 +22,7 @@ from finlab.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
-MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.]+)*) -->\n)")
+MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,]+)*) -->\n)")
 END = "<!-- end of figures -->"
 
 
@@ -43,12 +44,21 @@ def table_of(name: str, keys: list[str]) -> str:
     """The command and the table, in Markdown, of an experiment's quick sizes."""
     experiment, began = load_experiment(name), time.monotonic()
     begin(name)
-    table = experiment.table(experiment.rows(**experiment.quick))
+    typed = dict(key.split("=") for key in keys if "=" in key)
+    chosen = {**experiment.quick, **{name: _value(value) for name, value in typed.items()}}
+    keys = [key for key in keys if "=" not in key]
+    table = experiment.table(experiment.rows(**chosen))
     columns = {column.key: replace(column, interval=None) for column in table.columns}
     shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
     made = to_markdown(shown)
-    return f"\n`{experiment.command(experiment.quick)}`:\n\n{made.rstrip()}\n\n"
+    return f"\n`{experiment.command(chosen)}`:\n\n{made.rstrip()}\n\n"
+
+
+def _value(text: str) -> int | str | tuple[int, ...]:
+    if "," in text:
+        return tuple(map(int, text.split(",")))
+    return int(text) if text.isdigit() else text
 
 
 if __name__ == "__main__":

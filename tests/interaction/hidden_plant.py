@@ -1,12 +1,14 @@
-"""A plant of another family than the formula of jets: cones with a flat core, swirl, losses that multiply, hulls
-that are pushed off along their normals, housings that drag. Written apart from the library; loops, no arrays."""
+"""A plant of another family than the formula of jets, written apart from the library; loops, no arrays.
+
+Jets are cones with a flat core and swirl, losses multiply, hulls are pushed off along their normals, housings
+drag.
+"""
 
 import math
 
 import numpy as np
 
 from finlab.layout import Layout
-from finlab.layout.layout import Layout as _Layout
 from finlab.physics import Plant
 
 RHO = 1025.0
@@ -36,7 +38,7 @@ def _velocity(
     profile = 0.5 * (1.0 + math.cos(math.pi * share)) * (1.0 - math.exp(-2.0 * along / diameter))
     axial = 1.15 * speed * core * profile
     around = np.cross(course, aside / max(radius, 1e-9)) * math.sin(math.pi * share)
-    return axial * course + handed * 0.18 * axial * around
+    return axial * course + 0.18 * axial * around
 
 
 def wrenches(layout: Layout, command: np.ndarray) -> np.ndarray:
@@ -45,7 +47,7 @@ def wrenches(layout: Layout, command: np.ndarray) -> np.ndarray:
     return np.array([_wrench(layout, plant, row) for row in np.asarray(command)])
 
 
-def _wrench(layout: _Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
+def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
     own = plant.force(command[None])[0]
     wrench = np.einsum("na,naw->w", own, plant.effectiveness)
     forces = np.einsum("na,nab->nb", own, layout.frames)
@@ -59,8 +61,7 @@ def _wrench(layout: _Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
         for j, (_, other, fast) in enumerate(jets):
             if j == i or fast == 0.0:
                 continue
-            handed = 1.0 if j % 2 else -1.0
-            met = _velocity(place - layout.position[j], other, fast, diameters[j], handed * 0.0 + 1.0)
+            met = _velocity(place - layout.position[j], other, fast, diameters[j])
             water += met
             if speed > 0.0:
                 ratio = float(met @ course) / speed

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from finlab import Azimuth, Fin, Layout, PowerLaw, Thruster
-from finlab.arrays import Array
+from finlab import Azimuth, Body, Fin, Layout, PowerLaw, Thruster
 from finlab.interaction.jets import Jets
+from finlab.layout import FinModelSpec, Hull
 from finlab.layout.places import places_of
 from finlab.layout.random_layouts import random_jet_robot
 from finlab.physics import Plant
@@ -68,9 +68,6 @@ def test_what_rests_takes_and_gives_nothing() -> None:
 
 
 def test_a_jet_on_the_hull_pushes_back() -> None:
-    from finlab import Body
-    from finlab.layout import Hull
-
     thruster = Thruster("bow", (0.6, 0.0, 0.0), (1.0, 0.0, 0.0), (-30.0, 30.0), LAW, diameter=D)
     hull = Body(hull=Hull("ellipsoid", (0.6, 0.4, 0.3)))
     plant = Plant(Layout("one", (thruster,), body=hull, interaction=Jets(hull=0.5)))
@@ -96,12 +93,7 @@ def test_speed_takes_what_the_open_water_line_says(force: float, kt: float, none
     assert got == pytest.approx(open_water(force, 1.0, kt, none_at), rel=0.05, abs=0.05)
 
 
-def test_fins_have_jets_as_wide_as_they_sweep(fins: Array = np.array([0.02, 0.01])) -> None:
-    sizes = [Fin("fin", (0.0, 0.0, 0.0), 0.0, model=_drag(area)).jet for area in fins]
-    assert_allclose(np.pi / 4.0 * np.square(sizes), fins)
-
-
-def _drag(area: float) -> object:
-    from finlab.layout import FinModelSpec
-
-    return FinModelSpec("drag", (("area", area),))
+@pytest.mark.parametrize("area", [0.02, 0.01])
+def test_a_fin_s_jet_is_as_wide_as_it_sweeps(area: float) -> None:
+    fin = Fin("fin", (0.0, 0.0, 0.0), 0.0, model=FinModelSpec("drag", (("area", area),)))
+    assert math.pi / 4.0 * fin.jet**2 == pytest.approx(area)

@@ -11,14 +11,12 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import hadamard
 
 from finlab.allocation.dual.newton import Deadline
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, ROUNDS
 
@@ -26,8 +24,13 @@ HALVINGS, SHORTER = 4, 0.3
 """Most times that a step is made shorter, and by how much."""
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""
-PATTERNS, RANDOM, FOLLOWED = 8, 3, 2
-"""Other beginnings, and how many of them are followed."""
+RANDOM, FOLLOWED = 3, 2
+"""Other beginnings at random, and how many of all are followed."""
+
+
+_PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
+WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
+"""Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
 
 
 class Linear(NamedTuple):
@@ -197,10 +200,10 @@ def _turned_aside(force: Array, answers: Any) -> Array:
     robot has no slope that would turn it aside, and which of two jets gives way is a choice between
     minima."""
     lines, planes, rng = answers.lines, answers.planes, np.random.default_rng(0)
-    signs = hadamard(MAX_ACTUATORS)[:planes, :PATTERNS]
+    signs = WALSH[np.arange(planes) % len(WALSH)]
     angle = ASIDE * np.concatenate([signs, -signs[:, :1], rng.normal(size=(planes, RANDOM))], axis=1)
     size = rng.uniform(0.0, 2.0, (lines + planes, angle.shape[1]))
-    size[lines:, : PATTERNS + 1] = 1.0
+    size[lines:, : len(WALSH) + 1] = 1.0
     turned = np.repeat(force, angle.shape[1], axis=1)
     first, second = answers.pair(force)
     turned[:lines] *= size[:lines]

@@ -46,6 +46,7 @@ def run(
     robots: int = 20,
     targets: int = 6,
     layouts: int = 4000,
+    steps: int = 1800,
     network: str | None = None,
     own: tuple[int, ...] = (30, 100, 300, 1000),
     seed: int = 0,
@@ -58,13 +59,14 @@ def run(
         robots: of each group.
         targets: on each robot, wrenches of random commands by the plant.
         layouts: that the networks learn from, 20 samples each with 2 % noise.
+        steps: of the training of the network.
         network: file of `finlab train interaction` in place of one that is trained now.
         own: samples of each robot that a ridge regression is given.
         seed: of all draws.
     """
     judge = _other_jets if plant is None else own_function(plant)
     with tempfile.TemporaryDirectory() as folder:
-        models = _models(judge, layouts, network, own, seed, Path(folder))
+        models = _models(judge, layouts, steps, network, own, seed, Path(folder))
         for group, (count, kinds) in GROUPS.items():
             cases = []
             for k in range(robots):
@@ -84,22 +86,23 @@ Model = Callable[[Samples], Interaction | None]
 
 
 def _models(
-    judge: Judge, layouts: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
+    judge: Judge, layouts: int, steps: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
 ) -> dict[str, Model]:
+    from finlab.fit.interaction.surrogate_form import trained_surrogate
     from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
 
     samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
     if network is None:
-        train(samples, folder, Recipe(), seed)
+        train(samples, folder, Recipe(steps=steps), seed)
     file = network or str(folder / WEIGHTS_FILE)
-    node = trained_nodes(samples, seed)
+    node = trained_surrogate(samples, seed)
     models: dict[str, Model] = {
         "laws alone": lambda _: None,
         f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
             places_of(own.layout)
         ),
         "network, no own samples": lambda own: Learned(file).of(places_of(own.layout)),
-        "the paper's surrogate form": node,
+        "the paper's surrogate form": lambda own: _ByDifferences(places_of(own.layout), node(own.layout)),
     }
     for count in own:
         models[f"ridge, {count} own samples"] = partial(_ridge, count)
@@ -237,73 +240,6 @@ class Ridge(_ByDifferences):
         super().__init__(places_of(samples.layout), lambda force: features(force) @ weights * scale)
 
 
-def trained_nodes(samples: list[Samples], seed: int, steps: int = 1500, batch: int = 512) -> Model:
-    """Trains the form of the paper's surrogate on what the laws leave: a perceptron gives each actuator's
-    share of [x_i, u_i], place and force in the body frame, and a descriptor of all stretches and shifts the
-    sum (Eq. 4)."""
-    import torch
-    from torch import nn
-
-    torch.manual_seed(seed)
-    net, describe, affine = (
-        nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3)),
-        nn.Sequential(nn.Linear(7, 64), nn.GELU()),
-        nn.Linear(64, 12),
-    )
-    most = max(one.layout.n for one in samples)
-
-    def rows(layout: Layout, force: Array, scale: Array, n: int) -> tuple[Array, Array]:
-        x = np.zeros((len(force), n, 7))
-        x[:, : layout.n, :3], x[:, : layout.n, 3:6] = layout.position / 0.3, force / scale[0]
-        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
-        return x, np.broadcast_to(np.arange(n) < layout.n, x.shape[:2])
-
-    def wrench(x: torch.Tensor, mask: torch.Tensor, ratio: torch.Tensor) -> torch.Tensor:
-        share = net(x) * mask[..., None]
-        torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * ratio[:, None, None]
-        total = torch.cat([share, torque], dim=-1).sum(dim=1)
-        pooled = (describe(x) * mask[..., None]).sum(dim=1) / mask.sum(dim=1, keepdim=True)
-        stretch, shift = affine(pooled).chunk(2, dim=-1)
-        result: torch.Tensor = total * (1.0 + stretch) + shift
-        return result
-
-    made = []
-    for one in samples:
-        plant, scale = Plant(one.layout), yardstick(one.layout)
-        own = plant.force(one.command)
-        x, mask = rows(one.layout, body_force(own, one.layout.frames), scale, most)
-        ratio = np.full(len(x), scale[0] / scale[3])
-        made.append((x, mask, ratio, (one.wrench - plant.wrench_of(own)) / scale))
-    known, alive, arm, left = (
-        torch.tensor(np.concatenate(part), dtype=torch.float32) for part in zip(*made, strict=True)
-    )
-    weights = [*net.parameters(), *describe.parameters(), *affine.parameters()]
-    optimizer = torch.optim.Adam(weights, lr=2e-3)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
-    for _ in progress(range(steps), "step", "surrogate form"):
-        some = torch.randint(len(known), (batch,))
-        loss = ((wrench(known[some], alive[some], arm[some]) - left[some]) ** 2).mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
-
-    def model(own: Samples) -> Interaction:
-        layout, scale = own.layout, yardstick(own.layout)
-
-        def function(force: Array) -> Array:
-            values = (*rows(layout, force, scale, layout.n), np.full(len(force), scale[0] / scale[3]))
-            with torch.no_grad():
-                return (
-                    wrench(*(torch.tensor(part, dtype=torch.float32) for part in values)).double().numpy()
-                    * scale
-                )
-
-        return _ByDifferences(places_of(layout), function)
-
-    return model
-
-
 experiment = Experiment(
     name="interaction",
     question="Where jets hit each other and the hull: what do answers miss that know the laws alone, a "
@@ -323,5 +259,6 @@ experiment = Experiment(
         "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets are wrenches "
         "of random commands by the plant. The oracle goes on from the network's answer by the plant itself."
     ),
-    quick={"robots": 3, "targets": 2, "layouts": 60, "own": (30,)},
+    quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
+    full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},
 )

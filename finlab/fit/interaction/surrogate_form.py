@@ -1,0 +1,82 @@
+"""The form of the paper's surrogate (Eq. 4), trained on what the laws leave, for comparison.
+
+A perceptron gives each actuator's share of [x_i, u_i], place and force in the body frame, and a descriptor of
+all stretches and shifts the sum.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+from torch import nn
+
+from finlab.arrays import Array
+from finlab.fit.interaction.samples import Samples
+from finlab.layout import Layout
+from finlab.layout.effectiveness import body_force
+from finlab.layout.places import places_of
+from finlab.physics import Plant
+from finlab.physics.objective import yardstick
+
+
+def trained_surrogate(
+    samples: Sequence[Samples], seed: int, steps: int = 1500, batch: int = 512
+) -> Callable[[Layout], Callable[[Array], Array]]:
+    """Trains it, and returns what it says of a robot: from forces (K, n, 3) [N] in the body frame to what
+    comes beside their wrenches (K, 6) [N, N m]."""
+    torch.manual_seed(seed)
+    net, describe, affine = (
+        nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3)),
+        nn.Sequential(nn.Linear(7, 64), nn.GELU()),
+        nn.Linear(64, 12),
+    )
+    most = max(one.layout.n for one in samples)
+
+    def rows(layout: Layout, force: Array, scale: Array, n: int) -> tuple[Array, Array]:
+        x = np.zeros((len(force), n, 7))
+        x[:, : layout.n, :3], x[:, : layout.n, 3:6] = layout.position / 0.3, force / scale[0]
+        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
+        return x, np.broadcast_to(np.arange(n) < layout.n, x.shape[:2])
+
+    def wrench(x: torch.Tensor, mask: torch.Tensor, ratio: torch.Tensor) -> torch.Tensor:
+        share = net(x) * mask[..., None]
+        torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * ratio[:, None, None]
+        total = torch.cat([share, torque], dim=-1).sum(dim=1)
+        pooled = (describe(x) * mask[..., None]).sum(dim=1) / mask.sum(dim=1, keepdim=True)
+        stretch, shift = affine(pooled).chunk(2, dim=-1)
+        result: torch.Tensor = total * (1.0 + stretch) + shift
+        return result
+
+    made = []
+    for one in samples:
+        plant, scale = Plant(one.layout), yardstick(one.layout)
+        own = plant.force(one.command)
+        x, mask = rows(one.layout, body_force(own, one.layout.frames), scale, most)
+        ratio = np.full(len(x), scale[0] / scale[3])
+        made.append((x, mask, ratio, (one.wrench - plant.wrench_of(own)) / scale))
+    known, alive, arm, left = (
+        torch.tensor(np.concatenate(part), dtype=torch.float32) for part in zip(*made, strict=True)
+    )
+    weights = [*net.parameters(), *describe.parameters(), *affine.parameters()]
+    optimizer = torch.optim.Adam(weights, lr=2e-3)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+    for _ in range(steps):
+        some = torch.randint(len(known), (batch,))
+        loss = ((wrench(known[some], alive[some], arm[some]) - left[some]) ** 2).mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+
+    def model(layout: Layout) -> Callable[[Array], Array]:
+        scale = yardstick(layout)
+
+        def function(force: Array) -> Array:
+            values = (*rows(layout, force, scale, layout.n), np.full(len(force), scale[0] / scale[3]))
+            with torch.no_grad():
+                told = wrench(*(torch.tensor(part, dtype=torch.float32) for part in values))
+            return np.asarray(told.double().numpy() * scale)
+
+        return function
+
+    return model
