@@ -108,6 +108,8 @@ def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple
         notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
         notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
+    if layout.interaction is not None:
+        notes.append("Reach and power are those of the actuators' laws: what their jets take is not in them.")
     return tuple(notes)
 
 

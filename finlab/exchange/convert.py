@@ -57,6 +57,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
     if form == "layout":
         save_layout(layout, output)
     else:
+        if layout.interaction is not None:
+            exchange.note(f"What the actuators do to each other is left out: {form} has no place for it.")
         write_whole(output, WRITERS[form](layout, exchange, suffix))
     return layout
 

@@ -52,6 +52,8 @@ class Compiled:
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
+        if not any(group.feels_flow for _, group in self.groups):
+            return self
         other = copy(self)
         other.groups = [
             (places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups
