@@ -107,9 +107,10 @@ class Interaction(ABC):
 
 
 def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:
-    """Returns what a smooth function gives for vectors (..., n, 3), an array (..., n, m) each row of which
-    depends on one of them, and its derivatives (..., n, 3, m)."""
-    steps = np.eye(3).reshape(3, *(1,) * (values.ndim - 1), 3) * (1j * STEP)
+    """Returns what a smooth function gives for vectors (..., n, k), an array (..., n, m) each row of which
+    depends on one of them, and its derivatives (..., n, k, m)."""
+    k = values.shape[-1]
+    steps = np.eye(k).reshape(k, *(1,) * (values.ndim - 1), k) * (1j * STEP)
     result = function(values + steps)
     return result[0].real, np.moveaxis(result.imag, 0, -2) / STEP
 

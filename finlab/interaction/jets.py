@@ -80,8 +80,9 @@ class JetInteraction(Interaction):
         shape = (*force.shape, force.shape[-2], 3)
         flat = complex_slope(lambda some: self._water(some).reshape(*some.shape[:-1], -1), force)
         water, turned = flat[0].reshape(*shape[:-3], *shape[-2:]).sum(axis=-3), flat[1].reshape(shape)
-        change, own = complex_slope(lambda some: self._taken(some, water), force)
-        by_water = complex_slope(lambda some: self._taken(force, some), water)[1]
+        both = np.concatenate([force, water], axis=-1)
+        change, slope = complex_slope(lambda some: self._taken(some[..., :3], some[..., 3:]), both)
+        own, by_water = slope[..., :3, :], slope[..., 3:, :]
         return change, with_own(np.einsum("...jaiu,...iub->...jaib", turned, by_water), own)
 
     def deviation(self, force: Array) -> Array:

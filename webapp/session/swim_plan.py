@@ -21,7 +21,7 @@ LOST_IN_CURRENT = HardDay(
 SCENARIOS: dict[str, HardDay] = {
     day.name: day
     for day in (*HARD_DAYS, LOST_IN_CURRENT)
-    if not day.mixed_fins and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
+    if not day.mixed_fins and (day.jets or day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1]))
 }
 CHOICES = {"path": tuple(SHIPPED), "controller": tuple(CONTROLLERS)}
 """Settings that are one of several."""
@@ -69,7 +69,7 @@ class SwimSettings:
             FinlabError: the scenario takes more fins away than the robot has, or the controller is not for
                 this robot.
         """
-        day, layout = self.day, state.able
+        day, layout = self.day, self.day.believed(state.able)
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         make_controller(self.controller, layout)
         affected = _affected(layout, state.failed, day)

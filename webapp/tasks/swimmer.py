@@ -9,7 +9,7 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import FaultMonitor, make_controller
-from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
+from finlab.sim import ClosedLoop, RunLog, Tick
 from finlab.sim.log import lies_over, log_of_ticks
 from webapp.session.swim_plan import Plan
 
@@ -192,7 +192,7 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
         failures=plan.losses,
         announced=plan.announced,
         monitor=FaultMonitor(layout),
-        truth=perturbed(layout, **day.truth),
+        truth=day.true(layout),
     )
     for name in plan.failed:
         swim.fail(name, announced=True)

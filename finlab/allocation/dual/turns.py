@@ -24,8 +24,8 @@ HALVINGS, SHORTER = 4, 0.3
 """Most times that a step is made shorter, and by how much."""
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""
-RANDOM, FOLLOWED = 3, 2
-"""Other beginnings at random, and how many of all are followed."""
+IN_A_TICK, RANDOM, FOLLOWED = 2, 3, 2
+"""Turns of a tick; other beginnings at random, and how many of all are followed."""
 
 
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
@@ -112,7 +112,7 @@ class Turns:
 
     def _from(self, command: Array, price: Array | None) -> Settled:
         dual, worth, merit, last = self.dual, 0.0, np.inf, None
-        for _ in range(ROUNDS):
+        for _ in range(ROUNDS if self.previous is None else IN_A_TICK):
             force = dual.plant.force(command)
             linear = dual.linear(linear_at(dual.plant, force[0]))
             start = None if price is None else linear.begin(price)

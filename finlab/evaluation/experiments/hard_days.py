@@ -90,15 +90,22 @@ class HardDay:
 
     def robot(self, layout: str, seed: int) -> Layout:
         """The robot that methods believe in; the seed draws mixed fins."""
-        robot = load_layout(layout)
-        if self.jets_known:
-            robot = replace(robot, interaction=self.jets)
+        robot = self.believed(load_layout(layout))
         if not self.mixed_fins:
             return robot
         cases = make_split("fins-mixed", robot.n_fins, 1, seed)
         models = islice((fin.model for case in cases for fin in case.layout.fins), robot.n_fins)
         fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
         return replace(robot, actuators=fins)
+
+    def believed(self, robot: Layout) -> Layout:
+        """What methods are told of a robot."""
+        return replace(robot, interaction=self.jets if self.jets_known else None) if self.jets else robot
+
+    def true(self, robot: Layout) -> Layout:
+        """What a believed robot truly is."""
+        own = {"body": self.body or robot.body, "interaction": self.jets or robot.interaction}
+        return perturbed(replace(robot, **own), **self.truth)  # type: ignore[arg-type]
 
     def is_hopeless(self, case: Case) -> bool:
         """Whether what is left of the robot cannot give independently what the controller commands."""
@@ -117,9 +124,7 @@ class HardDay:
             failures=failures,
             announced=self.announced,
             monitor=None if self.announced else FaultMonitor(robot),
-            truth=perturbed(
-                replace(robot, body=self.body or robot.body, interaction=self.jets), **self.truth
-            ),
+            truth=self.true(robot),
             seed=seed,
         )
         if self.weak is not None:
