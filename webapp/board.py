@@ -25,7 +25,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
     """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
     newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
     state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
-    tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
+    tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst, "blind": jobs.blind}
     tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
     known: Facts = {}
     for name, task in tasks.items():

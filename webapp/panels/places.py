@@ -23,6 +23,7 @@ from webapp.panels.cards import (
 from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
+from webapp.panels.jets_tab import add_jets
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
@@ -70,6 +71,7 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
+    Place(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets),
     Place(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
     Place(LEFT, (SIMULATE,), "Scenario", add_scenario),

@@ -19,7 +19,7 @@ from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.jobs import Findings
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, TAKEN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
@@ -58,6 +58,7 @@ def _written(
         return swim_corner(swimmer, moment, pace, scale.newtons)
     size = arrow_size(state.layout)
     drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
+    drawn += JETS if state.layout.interaction is not None else ""
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
     return corner(state, legend(*scale, size, drawn), shown, busy, error, shown is best, in_reach, refined)
 
@@ -107,6 +108,9 @@ def _patch(color: str) -> str:
 def _arrow(color: str, opacity: float) -> str:
     way = "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 10V7H0Z'/></svg>"
     return html(way, opacity, color)
+
+
+JETS = _key(_patch(css(WATER, 0.5)), "jet") + _key(_arrow(css(TAKEN), 1.0), "taken by jets")
 
 
 def corner(

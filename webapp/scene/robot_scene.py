@@ -13,10 +13,12 @@ from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
+from finlab.layout.effectiveness import body_force
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
+from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session.looking import Display
@@ -51,6 +53,7 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
         self._offered = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
+        self._jets = JetNodes(scene)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._fins: list[ActuatorNode] = []
@@ -59,7 +62,7 @@ class RobotScene:
         self._size = view_size(session.state.layout)
         self._flaps = ""
         shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
-        for show in (*shows, self._offer):
+        for show in (*shows, self._blow, self._offer):
             board.act(show)
         self.look_from("3D")
 
@@ -201,6 +204,14 @@ class RobotScene:
             delivered, missing = shown.wrench, missing_part(shown)
         lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
         self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
+
+    def _blow(self, drawn: Layout, shown: Allocation | None, scale: Scale, moment: Moment | None) -> None:
+        robot, force = (drawn, moment.force) if moment is not None else (None, np.zeros(0))
+        if drawn.interaction is not None and moment is None and shown is not None:
+            robot, force = shown.layout, shown.forces
+        if robot is not None and robot.interaction is not None:
+            force = body_force(np.nan_to_num(force), robot.frames)
+        self._jets.refresh(robot, force, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _show_sets(
         self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout

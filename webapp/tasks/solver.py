@@ -185,6 +185,16 @@ class Solver:
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
 
+    def blind(self, state: State) -> Reply:
+        """The answer by the actuators' own laws, without their interaction, judged with it. Fails as
+        `solve`."""
+        known = state.layout.interaction
+        answer = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
+        judge = replace(answer.layout, interaction=known)
+        answer = replace(answer, layout=judge, flow=state.flow, wrench_expected=None)
+        _ = answer.err_norm, answer.power
+        return Reply(state, answer, answer.reachable)
+
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
         milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
