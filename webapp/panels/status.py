@@ -58,9 +58,9 @@ def _written(
         return swim_corner(swimmer, moment, pace, scale.newtons)
     size = arrow_size(state.layout)
     drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
-    drawn += JETS if state.layout.interaction is not None else ""
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
-    return corner(state, legend(*scale, size, drawn), shown, busy, error, shown is best, in_reach, refined)
+    words = legend(*scale, size, drawn) + JETS * (state.layout.interaction is not None)
+    return corner(state, words, shown, busy, error, shown is best, in_reach, refined)
 
 
 @lru_cache(maxsize=32)
@@ -110,7 +110,13 @@ def _arrow(color: str, opacity: float) -> str:
     return html(way, opacity, color)
 
 
-JETS = _key(_patch(css(WATER, 0.5)), "jet") + _key(_arrow(css(TAKEN), 1.0), "taken by jets")
+JETS = html(
+    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by jets</span></div>"
+    "</div>",
+    _patch(css(WATER, 0.5)),
+    _arrow(css(TAKEN), 1.0),
+)
+"""Keys of jets; they stay together."""
 
 
 def corner(
@@ -188,7 +194,8 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
         html("<span>{}</span>", pace),
     ]
     scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout)))
-    return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)
+    jets = JETS * (first.layout.interaction is not None)
+    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), parts)
 
 
 def _cards(legend: str, status: list[str]) -> str:

@@ -11,13 +11,16 @@ from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, tube
-from webapp.scene.stage import Shape
+from webapp.scene.stage import Shape, part_size
 from webapp.theme import TAKEN, WATER
 
 LONGEST = 6.0
 """Length of the fastest jet, in diameters; slower ones are as much shorter."""
 LEAST_SPEED, LEAST_TAKEN = 0.15, 0.01
 """Shares of the fastest jet's speed, and of the largest force, below which nothing is drawn."""
+
+CLEAR = 0.06
+"""How far from its actuator of size 1 an arrow begins [m], so that a duct does not hide it."""
 
 
 class JetNodes:
@@ -29,11 +32,11 @@ class JetNodes:
         self._drawn = 0
         """Actuators whose nodes may show something."""
 
-    def refresh(self, layout: Layout | None, force: Array, scale: float, size: float) -> None:
-        """Show the jets of a layout's forces (n, 3) [N], body frame, and what they take at rest, by the
-        `scale` of arrows [m/N], as thick as `size` says. None, and a layout without interaction, have none."""
+    def refresh(self, layout: Layout | None, force: Array | None, scale: float, size: float) -> None:
+        """Show the jets of forces (n, 3) [N], body frame, and what they take at rest, by the `scale` of
+        arrows [m/N], as thick as `size` says; nothing for None, or for a layout without interaction."""
         known = None if layout is None else plant_of(layout).interaction
-        if layout is None or known is None:
+        if layout is None or known is None or force is None:
             self._hide(0)
             return
         diameter = known.places.diameter
@@ -42,7 +45,7 @@ class JetNodes:
         share = speed / max(float(speed.max()), 1e-9)
         ways = -np.round((LONGEST * diameter * share)[:, None] * jets.ahead, 3)
         blows = (share >= LEAST_SPEED) & (np.linalg.norm(ways, axis=1) > 0.0)
-        counts = np.linalg.norm(taken, axis=1) >= LEAST_TAKEN * np.linalg.norm(force, axis=1).max()
+        counts = np.linalg.norm(taken, axis=1) > LEAST_TAKEN * np.linalg.norm(force, axis=1).max()
         form = layout.interaction if isinstance(layout.interaction, Jets) else Jets()
         for i in range(layout.n):
             jet, arrow = self._node(i)
@@ -51,7 +54,9 @@ class JetNodes:
             if blows[i]:
                 jet.show(cone, ways[i], float(diameter[i]), form.width, form.spread)
             if counts[i]:
-                arrow.show(force_arrow, taken[i] * scale, np.zeros(3), 0.009)
+                way = taken[i] * scale
+                start = CLEAR * part_size(layout) / size * way / np.linalg.norm(way)
+                arrow.show(force_arrow, way, start, 0.009)
         self._hide(layout.n)
 
     def _node(self, index: int) -> tuple[Shape, Shape]:
@@ -69,7 +74,7 @@ class JetNodes:
 
 
 def cone(way: Array, diameter: float, width: float, spread: float) -> Mesh:
-    """A jet along `way` (3,) [m] from the origin, out to where the water has 1/e of the speed of its middle."""
+    """A jet along `way` (3,) [m] from the origin, as wide as its water has 1/e of the speed in its middle."""
     length = float(np.linalg.norm(way))
     if not length:
         return NOTHING

@@ -13,7 +13,6 @@ from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
-from finlab.layout.effectiveness import body_force
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
@@ -206,11 +205,9 @@ class RobotScene:
         self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
 
     def _blow(self, drawn: Layout, shown: Allocation | None, scale: Scale, moment: Moment | None) -> None:
-        robot, force = (drawn, moment.force) if moment is not None else (None, np.zeros(0))
+        robot, force = (drawn, moment.force) if moment is not None else (None, None)
         if drawn.interaction is not None and moment is None and shown is not None:
             robot, force = shown.layout, shown.forces
-        if robot is not None and robot.interaction is not None:
-            force = body_force(np.nan_to_num(force), robot.frames)
         self._jets.refresh(robot, force, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _show_sets(

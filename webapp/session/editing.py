@@ -95,8 +95,8 @@ class Session(Core):
         self._edit("Estimate mass and damping from the hull", estimated(known))
 
     def set_jets(self, on: Any) -> None:
-        """Whether the jets of the actuators count, by the robot's own interaction where it was opened or saved
-        with one, else by the usual constants."""
+        """Whether jets count: by the robot's own interaction where it was opened or saved with one, else by
+        the usual constants."""
         layout, saved = self.state.layout, self.saved
         own = saved.interaction if saved.names == layout.names else None
         interaction = (layout.interaction or own or Jets()) if on else None

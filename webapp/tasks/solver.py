@@ -191,7 +191,8 @@ class Solver:
         known = state.layout.interaction
         answer = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
         judge = replace(answer.layout, interaction=known)
-        answer = replace(answer, layout=judge, flow=state.flow, wrench_expected=None)
+        flow = None if state.flow is None else np.array(state.flow)
+        answer = replace(answer, layout=judge, flow=flow, wrench_expected=None, later=None)
         _ = answer.err_norm, answer.power
         return Reply(state, answer, answer.reachable)
 
