@@ -23,11 +23,10 @@ from webapp.panels.cards import (
 from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
-from webapp.panels.jets_tab import add_jets
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
-from webapp.panels.wrench_tab import add_answer, add_commands, add_target
+from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_target
 from webapp.session.looking import TASKS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS

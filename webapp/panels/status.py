@@ -111,8 +111,8 @@ def _arrow(color: str, opacity: float) -> str:
 
 
 JETS = html(
-    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by jets</span></div>"
-    "</div>",
+    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by jets</span>"
+    "</div></div>",
     _patch(css(WATER, 0.5)),
     _arrow(css(TAKEN), 1.0),
 )

@@ -29,7 +29,7 @@ class JetNodes:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
         self._nodes: list[tuple[Shape, Shape]] = []
-        self._drawn = 0
+        self.drawn = 0
         """Actuators whose nodes may show something."""
 
     def refresh(self, layout: Layout | None, force: Array | None, scale: float, size: float) -> None:
@@ -67,10 +67,10 @@ class JetNodes:
 
     def _hide(self, first: int) -> None:
         """Nothing from a place on."""
-        for pair in self._nodes[first : self._drawn]:
+        for pair in self._nodes[first : self.drawn]:
             for shape in pair:
                 put(shape.node, visible=False)
-        self._drawn = first
+        self.drawn = first
 
 
 def cone(way: Array, diameter: float, width: float, spread: float) -> Mesh:

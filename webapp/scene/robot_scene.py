@@ -208,6 +208,8 @@ class RobotScene:
         robot, force = (drawn, moment.force) if moment is not None else (None, None)
         if drawn.interaction is not None and moment is None and shown is not None:
             robot, force = shown.layout, shown.forces
+        if drawn.interaction is None and not self._jets.drawn:
+            return
         self._jets.refresh(robot, force, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _show_sets(
