@@ -103,7 +103,7 @@ class Tab:
         view, end = self.view, time.monotonic() + 60
         jobs = view.jobs
         while view.busy or any(
-            (jobs.answering.searching, jobs.analyst.busy, jobs.ranging.busy, jobs.blind.busy)
+            (jobs.answering.searching, jobs.analyst.busy, jobs.ranging.busy, jobs.both.busy)
         ):
             assert time.monotonic() < end
             time.sleep(0.01)

@@ -50,16 +50,15 @@ def test_jets_travel_in_files_and_links() -> None:
 def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
     state = State(replace(HEAVY, interaction=Jets()), target=AHEAD, speed=speed)
     solver = Solver()
-    best, blind = solver.solve(state), solver.blind(state)
+    both = solver.both(state)
+    best, blind = both.counted, both.blind
     alone = Allocator(HEAVY).allocate(AHEAD)
     flow = np.array(state.flow) if state.flow else None
     miss = np.subtract(AHEAD, plant_of(state.layout).wrench(alone.command, flow=flow))
-    assert blind.answer.err_norm == pytest.approx(np.linalg.norm(miss / alone.scale), rel=1e-6)
-    assert best.reachable and blind.answer.err_norm > 0.02 and blind.answer.power < best.power
-    told = jets_table(state, best, False, blind)
+    assert blind.err_norm == pytest.approx(np.linalg.norm(miss / alone.scale), rel=1e-6)
+    assert best.reachable and blind.err_norm > 0.02 and blind.power < best.power
+    told = jets_table(both)
     assert f"{abs(miss[0]):.3g} N of surge" in told and f"{best.power:.3g}" in told
-    other = replace(state, target=(1.0, *AHEAD[1:]))
-    assert jets_table(other, best, False, blind) == "", "no figure stands under another question"
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +88,15 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     taken = [nodes[f"/robot/taken/{i}"].visible for i in range(HEAVY.n)]
     assert taken == [True] * 4 + [False] * 4, "jets of the lifting ones meet nothing"
     assert "taken by jets" in " ".join(tab.figures())
-    tab.on_loop(lambda: tab.view.do(partial(session.toggle_failure, "front_left")))
+    view = tab.view
+    assert view.board.facts is not None and view.board.facts["both"] is not None
+
+    def fail() -> object:
+        view.do(partial(session.toggle_failure, "front_left"))
+        view._refresh()
+        return view.board.facts and view.board.facts["both"]
+
+    assert tab.on_loop(fail) is None, "no figure stands under another question"
     tab.settle()
     assert not nodes["/robot/jets/1"].visible
     made = len(nodes)

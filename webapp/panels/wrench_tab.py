@@ -19,7 +19,7 @@ from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
-from webapp.tasks.solver import Reply
+from webapp.tasks.solver import BothWays
 from webapp.viser_internals import put_marks
 
 CLOSE = 0.28
@@ -185,15 +185,15 @@ def add_jets(page: Page) -> None:
     page.add_html(jets_table)
 
 
-def jets_table(state: State, best: Allocation | None, busy: bool, blind: Reply | None) -> str:
+def jets_table(both: BothWays | None) -> str:
     """What the answer misses and takes, and what that of the actuators' laws alone would."""
-    if state.layout.interaction is None or best is None or busy or blind is None or blind.state != state:
+    if both is None:
         return ""
-    both = best, blind.answer
+    answers = both[1:]
     rows = [
-        row("error", *(error_digits(answer.err_norm) for answer in both)),
-        row("power [W]", *(three_digits(answer.power) for answer in both)),
+        row("error", *(error_digits(answer.err_norm) for answer in answers)),
+        row("power [W]", *(three_digits(answer.power) for answer in answers)),
     ]
-    said = rest_sentence(blind.answer)
+    said = rest_sentence(both.blind)
     words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
     return html(words, JETS_HEADER, rows, said[0].lower() + said[1:])

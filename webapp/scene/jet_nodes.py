@@ -32,11 +32,11 @@ class JetNodes:
         self.drawn = 0
         """Actuators whose nodes may show something."""
 
-    def refresh(self, layout: Layout | None, force: Array | None, scale: float, size: float) -> None:
+    def refresh(self, layout: Layout | None, force: Array, scale: float, size: float) -> None:
         """Show the jets of forces (n, 3) [N], body frame, and what they take at rest, by the `scale` of
         arrows [m/N], as thick as `size` says; nothing for None, or for a layout without interaction."""
         known = None if layout is None else plant_of(layout).interaction
-        if layout is None or known is None or force is None:
+        if layout is None or known is None:
             self._hide(0)
             return
         diameter = known.places.diameter

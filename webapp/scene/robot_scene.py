@@ -61,7 +61,7 @@ class RobotScene:
         self._size = view_size(session.state.layout)
         self._flaps = ""
         shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
-        for show in (*shows, self._blow, self._offer):
+        for show in (*shows, self._offer):
             board.act(show)
         self.look_from("3D")
 
@@ -170,6 +170,10 @@ class RobotScene:
             self._moves.append(motion(part, commands[i] if alive else None))
             arrow = forces[i] * (LENGTH / scale.newtons) if alive else np.zeros(3)
             self._fins[i].command(self._moves[i], alive, arrow, frames[i])
+        if drawn.interaction is not None or self._jets.drawn:
+            robot = shown.layout if shown is not None and moment is None else drawn
+            jets = None if drawn.interaction is None else robot
+            self._jets.refresh(jets, forces, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _flap(
         self,
@@ -203,14 +207,6 @@ class RobotScene:
             delivered, missing = shown.wrench, missing_part(shown)
         lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
         self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
-
-    def _blow(self, drawn: Layout, shown: Allocation | None, scale: Scale, moment: Moment | None) -> None:
-        robot, force = (drawn, moment.force) if moment is not None else (None, None)
-        if drawn.interaction is not None and moment is None and shown is not None:
-            robot, force = shown.layout, shown.forces
-        if drawn.interaction is None and not self._jets.drawn:
-            return
-        self._jets.refresh(robot, force, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _show_sets(
         self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout

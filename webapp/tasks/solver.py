@@ -119,6 +119,14 @@ class Reply:
     """Whether any command of the working fins gives what is asked."""
 
 
+class BothWays(NamedTuple):
+    """Answers to a state, with and without jets, both judged with them."""
+
+    state: State
+    counted: Allocation
+    blind: Allocation
+
+
 class Solver:
     """Answers states. Used from one thread only, the worker's."""
 
@@ -185,16 +193,16 @@ class Solver:
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
 
-    def blind(self, state: State) -> Reply:
-        """The answer by the actuators' own laws, without their interaction, judged with it. Fails as
-        `solve`."""
+    def both(self, state: State) -> BothWays:
+        """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as `solve`."""
         known = state.layout.interaction
-        answer = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
-        judge = replace(answer.layout, interaction=known)
+        blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
+        judge = replace(blind.layout, interaction=known)
         flow = None if state.flow is None else np.array(state.flow)
-        answer = replace(answer, layout=judge, flow=flow, wrench_expected=None, later=None)
-        _ = answer.err_norm, answer.power
-        return Reply(state, answer, answer.reachable)
+        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
+        both = BothWays(state, self.solve(state), blind)
+        _ = [(answer.err_norm, answer.power) for answer in both[1:]]  # here, not where the page is written
+        return both
 
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
