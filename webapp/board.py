@@ -28,6 +28,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
     tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
     tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
     known: Facts = {}
+    both = jobs.both.findings
     for name, task in tasks.items():
         known |= {name: task.findings, f"{name}_error": task.error}
     return {
@@ -48,6 +49,8 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         **seen._asdict(),
         "playing": jobs.refining.running,
         **known,
+        # With and without jets, of the present question.
+        "both": both if both is not None and both.state == state else None,
         "finding": jobs.analyst.busy,
         "run": jobs.comparison.run,
         "progress": jobs.improver.progress,

@@ -21,6 +21,8 @@ DELIVERED = GREEN
 MISSING = VERMILLION
 """What is left undone, and every warning."""
 WATER = SKY
+TAKEN = ORANGE
+"""What jets take from the force of an actuator."""
 REACH: Rgb = (176, 142, 84)
 """What could be asked for: attainable sets, and the marks on the sliders of the target."""
 REACH_DARK: Rgb = (214, 180, 120)

@@ -101,7 +101,10 @@ class Tab:
 
     def settle(self) -> None:
         view, end = self.view, time.monotonic() + 60
-        while view.busy or view.jobs.answering.searching or view.jobs.analyst.busy or view.jobs.ranging.busy:
+        jobs = view.jobs
+        while view.busy or any(
+            (jobs.answering.searching, jobs.analyst.busy, jobs.ranging.busy, jobs.both.busy)
+        ):
             assert time.monotonic() < end
             time.sleep(0.01)
         self.on_loop(lambda: None)

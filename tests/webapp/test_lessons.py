@@ -35,6 +35,7 @@ SOLVED: dict[str, Callable[[Session], object]] = {
     "lost-fin": lambda session: session.toggle_failure("front_left"),
     "no-yaw": _turn_a_shaft,
     "out-of-reach": lambda session: session.set_setting("policy", "direction"),
+    "jets": lambda session: session.set_jets(True),
     "learned-physics": lambda session: session.set_setting("method", "paper"),
 }
 """What a student does."""

@@ -26,7 +26,7 @@ from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
-from webapp.panels.wrench_tab import add_answer, add_commands, add_target
+from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_target
 from webapp.session.looking import TASKS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
@@ -70,6 +70,7 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
+    Place(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets),
     Place(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
     Place(LEFT, (SIMULATE,), "Scenario", add_scenario),

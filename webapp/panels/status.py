@@ -19,7 +19,7 @@ from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.jobs import Findings
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, TAKEN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
@@ -59,7 +59,8 @@ def _written(
     size = arrow_size(state.layout)
     drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
-    return corner(state, legend(*scale, size, drawn), shown, busy, error, shown is best, in_reach, refined)
+    words = legend(*scale, size, drawn) + JETS * (state.layout.interaction is not None)
+    return corner(state, words, shown, busy, error, shown is best, in_reach, refined)
 
 
 @lru_cache(maxsize=32)
@@ -107,6 +108,15 @@ def _patch(color: str) -> str:
 def _arrow(color: str, opacity: float) -> str:
     way = "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 10V7H0Z'/></svg>"
     return html(way, opacity, color)
+
+
+JETS = html(
+    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by jets</span>"
+    "</div></div>",
+    _patch(css(WATER, 0.5)),
+    _arrow(css(TAKEN), 1.0),
+)
+"""Keys of jets; they stay together."""
 
 
 def corner(
@@ -184,7 +194,8 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
         html("<span>{}</span>", pace),
     ]
     scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout)))
-    return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)
+    jets = JETS * (first.layout.interaction is not None)
+    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), parts)
 
 
 def _cards(legend: str, status: list[str]) -> str:

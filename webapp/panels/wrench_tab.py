@@ -1,9 +1,10 @@
-"""The question and its answer: the target wrench, bars, failures, and the table of commands."""
+"""The question and its answer: the target wrench, bars, failures, commands, and what jets change."""
 
 from functools import partial
 
 import numpy as np
 import viser
+from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES, KINDS
@@ -12,12 +13,13 @@ from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.handles import add_html, placed, press, put
 from webapp.markup.answer import fin_table, wrench_bars
-from webapp.markup.verdict import answer_sentence
-from webapp.markup.words import html, listed, marker, three_digits
+from webapp.markup.verdict import answer_sentence, rest_sentence
+from webapp.markup.words import error_digits, html, listed, marker, row, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
+from webapp.tasks.solver import BothWays
 from webapp.viser_internals import put_marks
 
 CLOSE = 0.28
@@ -167,3 +169,31 @@ def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, b
 def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
     said = answer_sentence(state, shown, busy, proving or step is not None)
     return html("<div class='fl'><div class='said'>{}</div></div>", said)
+
+
+JETS_HEADER = Markup(
+    "<tr><th></th><th title='the answer, which counts jets'>with jets</th>"
+    "<th title='commands by each own law alone, judged with jets'>without</th></tr>"
+)
+
+
+def add_jets(page: Page) -> None:
+    """The switch that lets jets count, and the answer beside that which leaves them out."""
+    about = "What the jets of thrusters and fins take from each other, and where they meet the hull."
+    switch = page.gui.add_checkbox("Count jets", False, hint=about)
+    page.bind(switch, page.session.set_jets, lambda layout: layout.interaction is not None)
+    page.add_html(jets_table)
+
+
+def jets_table(both: BothWays | None) -> str:
+    """What the answer misses and takes, and what that of the actuators' laws alone would."""
+    if both is None:
+        return ""
+    answers = both[1:]
+    rows = [
+        row("error", *(error_digits(answer.err_norm) for answer in answers)),
+        row("power [W]", *(three_digits(answer.power) for answer in answers)),
+    ]
+    said = rest_sentence(both.blind)
+    words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
+    return html(words, JETS_HEADER, rows, said[0].lower() + said[1:])

@@ -17,6 +17,7 @@ from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
+from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session.looking import Display
@@ -51,6 +52,7 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
         self._offered = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
+        self._jets = JetNodes(scene)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._fins: list[ActuatorNode] = []
@@ -168,6 +170,10 @@ class RobotScene:
             self._moves.append(motion(part, commands[i] if alive else None))
             arrow = forces[i] * (LENGTH / scale.newtons) if alive else np.zeros(3)
             self._fins[i].command(self._moves[i], alive, arrow, frames[i])
+        if drawn.interaction is not None or self._jets.drawn:
+            robot = shown.layout if shown is not None and moment is None else drawn
+            jets = None if drawn.interaction is None else robot
+            self._jets.refresh(jets, forces, LENGTH / scale.newtons, arrow_size(drawn))
 
     def _flap(
         self,

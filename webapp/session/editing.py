@@ -9,6 +9,7 @@ from finlab.actuators.actuator import key_words
 from finlab.axes import Vector
 from finlab.errors import FinlabError
 from finlab.hull import estimated
+from finlab.interaction.jets import Jets
 from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
@@ -92,6 +93,15 @@ class Session(Core):
         layout = self.state.layout
         known = layout_edits.with_dynamics(layout, mass_kg=None) if anew else layout
         self._edit("Estimate mass and damping from the hull", estimated(known))
+
+    def set_jets(self, on: Any) -> None:
+        """Whether jets count: by the robot's own interaction where it was opened or saved with one, else by
+        the usual constants."""
+        layout, saved = self.state.layout, self.saved
+        own = saved.interaction if saved.names == layout.names else None
+        interaction = (layout.interaction or own or Jets()) if on else None
+        changed = self.state.with_layout(replace(layout, interaction=interaction))
+        self._commit("Count jets" if on else "Leave jets out", changed)
 
     # One actuator.
 

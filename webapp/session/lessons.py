@@ -63,6 +63,7 @@ DONE: dict[str, Callable[[Core, Allocation], bool]] = {
     "out-of-reach": lambda session, answer: (
         session.state.policy == "direction" and not answer.reachable and _aligned(answer)
     ),
+    "jets": lambda _, answer: answer.layout.interaction is not None and answer.reachable,
     "learned-physics": lambda session, answer: session.state.method == answer.method == "paper",
 }
 """Whether the exercise of a lesson is done, by a session and what is on its robot."""

@@ -153,6 +153,7 @@ class Jobs:
         self.answering = Answering(context, self._beside)
         self.refining = Refining(context, self.answering)
         self.ranging = Newest(loop, workers.marks, find_ranges, self._beside, REST_S)
+        self.both = Newest(loop, workers.answers, context.solver.both, self._beside, REST_S)
         self.analyst = Newest(loop, workers.cards, find, context.changed, CARD_REST_S)
         self.improver = Improver(context)
         self.fitting = Fitting(context)
@@ -166,19 +167,21 @@ class Jobs:
         if self._robot != robot:
             # What is known of another robot must not stand under this one's name.
             self._robot = robot
-            for task in (self.answering, self.analyst, self.ranging):
+            for task in (self.answering, self.analyst, self.ranging, self.both):
                 task.forget()
         able, drawn = state.able, session.display.drawn
         self.analyst.ask(Question(able, state.failed, session.saved, drawn, state.flow))
         self.ranging.ask(State(able, state.damage, target=state.target, speed=state.speed))
         self.answering.ask()
+        if state.layout.interaction is not None and self._session.desk.task in ("Design", "Allocate"):
+            self.both.ask(state)
 
     def _beside(self) -> None:
         """Marks and candidates come shortly after an answer: the page is written once for both, unless one
         of them takes long."""
         if self._late is None:
             self._late = self._loop.later(TOGETHER_S, self._write)
-        if not (self.ranging.busy or self.answering.searching):
+        if not (self.ranging.busy or self.both.busy or self.answering.searching):
             self._write()
 
     def _write(self) -> None:
@@ -192,5 +195,5 @@ class Jobs:
         self.swimming.stop()
         self.refining.stop()
         tasks: tuple[Any, ...] = self.comparison, self.improver, self.fitting, self.answering, self.analyst
-        for task in (*tasks, self.ranging):
+        for task in (*tasks, self.ranging, self.both):
             task.forget()

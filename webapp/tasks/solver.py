@@ -119,6 +119,14 @@ class Reply:
     """Whether any command of the working fins gives what is asked."""
 
 
+class BothWays(NamedTuple):
+    """Answers to a state, with and without jets, both judged with them."""
+
+    state: State
+    counted: Allocation
+    blind: Allocation
+
+
 class Solver:
     """Answers states. Used from one thread only, the worker's."""
 
@@ -184,6 +192,17 @@ class Solver:
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
+
+    def both(self, state: State) -> BothWays:
+        """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as `solve`."""
+        known = state.layout.interaction
+        blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
+        judge = replace(blind.layout, interaction=known)
+        flow = None if state.flow is None else np.array(state.flow)
+        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
+        both = BothWays(state, self.solve(state), blind)
+        _ = [(answer.err_norm, answer.power) for answer in both[1:]]  # here, not where the page is written
+        return both
 
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
