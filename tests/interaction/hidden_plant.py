@@ -21,9 +21,7 @@ def _jet(force: np.ndarray, diameter: float) -> tuple[float, np.ndarray, float]:
     return thrust, -force / thrust, math.sqrt(2.0 * thrust / (RHO * math.pi * diameter**2 / 4.0))
 
 
-def _velocity(
-    way: np.ndarray, course: np.ndarray, speed: float, diameter: float, handed: float
-) -> np.ndarray:
+def _velocity(way: np.ndarray, course: np.ndarray, speed: float, diameter: float) -> np.ndarray:
     """Velocity at a way from a jet's disc: a cone that widens by 0.11, with a cosine rim, and swirl."""
     along = float(way @ course)
     if along <= 0.0:
