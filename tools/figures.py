@@ -21,7 +21,7 @@ from finlab.evaluation.document import Table, to_markdown
 from finlab.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
+PAGES = {path.stem: path for path in sorted((ROOT / "docs").rglob("*.md"))}
 MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,]+)*) -->\n)")
 END = "<!-- end of figures -->"
 
@@ -36,7 +36,7 @@ def main(names: list[str]) -> int:
             made, text = table_of(name, keys.split()), page.read_text(encoding="utf-8")  # changed meanwhile
             before, _, rest = text.partition(mark)
             page.write_text(before + mark + made + END + rest.partition(END)[2], encoding="utf-8")
-            print(f"docs/{page.name}", flush=True)
+            print(page.relative_to(ROOT), flush=True)
     return 0
 
 
