@@ -32,9 +32,13 @@ A_DESIGN = "a layout, a robot description, parameters, a matrix"
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
     """The model of a force table, which is kept in a folder under a name made from its content. FinlabError:
     it cannot be kept."""
-    path = folder / f"{hashlib.sha256(content).hexdigest()}.csv"
+    return FinModelSpec("table", (("path", _kept(content, folder, ".csv")),))
+
+
+def _kept(content: bytes, folder: Path, suffix: str) -> str:
+    path = folder / f"{hashlib.sha256(content).hexdigest()}{suffix}"
     _keep(path, content)
-    return FinModelSpec("table", (("path", str(path)),))
+    return str(path)
 
 
 def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
@@ -111,10 +115,15 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     the layout, called `source`, names a force table that did not come along; FinlabError: a file cannot be
     kept, or is no hull."""
     by_name = {Path(path).name: path for path in parts}
+
+    def came(path: str) -> str:
+        """The path by which a file came that a layout names."""
+        return path if path in parts else by_name.get(Path(path).name, path)
+
     actuators, missing = [], []
     for part in layout.actuators:
         if path := part.reads:
-            path = path if path in parts else by_name.get(Path(path).name, path)
+            path = came(path)
             if path not in parts:
                 raise LayoutError(
                     f"{part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come along; "
@@ -125,21 +134,17 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         actuators.append(part)
     interaction = layout.interaction
     if isinstance(interaction, Learned):
-        path = interaction.path
-        path = path if path in parts else by_name.get(Path(path).name, path)
+        path = came(interaction.path)
         if path not in parts:
             raise LayoutError(
                 f"names the learned interaction {Path(path).name!r:.60}, which did not come along; put both "
                 "into one ZIP archive, and open that",
                 source=source,
             )
-        kept = folder / TABLE_FOLDER / f"{hashlib.sha256(parts[path]).hexdigest()}{NETWORK_SUFFIX}"
-        _keep(kept, parts[path])
-        interaction = Learned(str(kept))
+        interaction = Learned(_kept(parts[path], folder / TABLE_FOLDER, NETWORK_SUFFIX))
     body = layout.body
     if body is not None and body.hull is not None and body.hull.mesh is not None:
-        mesh = body.hull.mesh
-        mesh = mesh if mesh in parts else by_name.get(Path(mesh).name, mesh)
+        mesh = came(body.hull.mesh)
         if mesh in parts:
             hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
             body = replace(body, hull=hull)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Array, Values, library_of
+from finlab.arrays import AnyArray, Array
 
 DENSITY = 1000.0
 """Of the water [kg/m^3]."""
@@ -37,25 +37,41 @@ class Places(NamedTuple):
 class Jet(NamedTuple):
     """The jets of n actuators; smooth where they end."""
 
-    thrust: Values
+    thrust: AnyArray
     """(..., n) [N]."""
-    ahead: Values
+    ahead: AnyArray
     """Directions (..., n, 3) of the forces, shorter than 1 near rest; the jets flow against them."""
-    speed: Values
+    speed: AnyArray
     """(..., n) [m/s], `sqrt(2 T / (rho A))` of an actuator disc at rest."""
 
 
-def jets_of(force: Values, diameter: Values) -> Jet:
-    """Returns the jets of forces (..., n, 3) [N], arrays of real or complex numbers or tensors."""
-    xp = library_of(force)
+def jets_of(force: AnyArray, diameter: Array) -> Jet:
+    """Returns the jets of forces (..., n, 3) [N], real or complex."""
     area = 0.25 * np.pi * diameter**2 + 1e-12
     least = 0.5 * DENSITY * area * STILL**2
-    thrust = xp.sqrt((force * force).sum(-1) + least * least)
-    return Jet(thrust, force / thrust[..., None], xp.sqrt(2.0 * thrust / (DENSITY * area)))
+    thrust = np.sqrt((force * force).sum(-1) + least * least)
+    return Jet(thrust, force / thrust[..., None], np.sqrt(2.0 * thrust / (DENSITY * area)))
 
 
 class Interaction(ABC):
-    """The interaction of one robot's actuators."""
+    """What a plant asks of an interaction of one robot's actuators."""
+
+    @abstractmethod
+    def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        """Returns the wrench (..., 6) [N, N m] that comes beside forces (..., n, 3) [N]; velocities (..., n,
+        3) [m/s] of the places through the water, body frame, None at rest."""
+
+    @abstractmethod
+    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """Returns `offset`, and its derivatives (..., n, 3, 6) by the forces."""
+
+    @abstractmethod
+    def deviation(self, force: Array) -> Array:
+        """Returns the standard deviation (..., 6) [N, N m] of the wrench by what is uncertain of it."""
+
+
+class AtPlaces(Interaction):
+    """An interaction that is a force at each actuator's place."""
 
     def __init__(self, places: Places) -> None:
         """Takes the places of the n actuators."""
@@ -72,10 +88,6 @@ class Interaction(ABC):
     def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
         """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
 
-    @abstractmethod
-    def deviation(self, force: Array) -> Array:
-        """Returns the standard deviation (..., 6) [N, N m] of the wrench by what is uncertain of it."""
-
     def __call__(self, force: Array, inflow: Array | None = None) -> Array:
         """Returns `at_rest` and what speed takes: velocities (..., n, 3) [m/s] of the places through the
         water, body frame, None at rest."""
@@ -91,11 +103,9 @@ class Interaction(ABC):
         return change, slope
 
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
-        """Returns the wrench (..., 6) [N, N m] of what comes beside the forces; arguments as for a call."""
         return np.asarray(np.einsum("...ib,ibw->...w", self(force, inflow), self.lever))
 
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset`, and its derivatives (..., n, 3, 6) by the forces."""
         change, slope = self.slope(force, inflow)
         by_force = np.einsum("...jaib,ibw->...jaw", slope, self.lever)
         return np.asarray(np.einsum("...ib,ibw->...w", change, self.lever)), np.asarray(by_force)

@@ -17,7 +17,7 @@ from msgspec import Meta
 
 from finlab.arrays import AnyArray, Array
 from finlab.files.schema import Checked
-from finlab.interaction.interaction import DENSITY, Interaction, Places, complex_slope, jets_of, with_own
+from finlab.interaction.interaction import DENSITY, AtPlaces, Places, complex_slope, jets_of, with_own
 
 Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
 Share = Annotated[float, Meta(ge=0.0, le=10.0)]
@@ -59,7 +59,7 @@ class Jets(Checked):
         return JetInteraction(self, places)
 
 
-class JetInteraction(Interaction):
+class JetInteraction(AtPlaces):
     """The formula for one robot."""
 
     def __init__(self, constants: Jets, places: Places) -> None:

@@ -18,7 +18,7 @@ from finlab.arrays import AnyArray, Array
 from finlab.bundle_files import named_content
 from finlab.errors import CheckpointError
 from finlab.files.schema import Checked
-from finlab.interaction.interaction import Interaction, Places, complex_slope, with_own
+from finlab.interaction.interaction import AtPlaces, Places, complex_slope, with_own
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
 
 MEMBERS = 3
@@ -49,7 +49,7 @@ class Learned(Checked):
         return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), places)
 
 
-class LearnedInteraction(Interaction):
+class LearnedInteraction(AtPlaces):
     """The networks for one robot."""
 
     def __init__(self, weights: Weights, trust: float, places: Places) -> None:

@@ -132,8 +132,8 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["fins"] = [{key: value for key, value in part.items() if key != "type"} for part in parts]
     else:
         data["actuators"] = parts
-    parts = {name: getattr(layout, name) for name in ("body", "interaction")}
-    return data | {name: plain(part) for name, part in parts.items() if part is not None}
+    others = {name: getattr(layout, name) for name in ("body", "interaction")}
+    return data | {name: plain(part) for name, part in others.items() if part is not None}
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:

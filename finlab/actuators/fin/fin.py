@@ -37,6 +37,8 @@ Coordinate = Annotated[float, Meta(ge=-10.0, le=10.0)]
 MountingAngle = Annotated[float, Meta(ge=-axes.TURN - 1e-9, le=axes.TURN + 1e-9)]
 SAME_AXIS = 1e-9
 """By how much two unit vectors that are the same may differ, from rounding."""
+UCAT_AREA = 0.02
+"""Area of a blade whose model does not say it: that of U-CAT's [m^2]."""
 FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
 """Models that need no file."""
 
@@ -250,9 +252,9 @@ class Fin(Actuator):
     def jet(self) -> float:
         """See `Actuator`. A blade that beats by half a radian sweeps about its own area."""
         known = self.model.values()
-        area = known.get("area", 0.02 if self.model.type != "lighthill" else known.get("length", 0.0))
-        area = float(area) * float(known.get("width", 1.0))
-        return self.diameter or math.sqrt(4.0 * area / math.pi)
+        blades = {"drag": ("area",), "lighthill": ("length", "width")}
+        sides = [float(known[name]) for name in blades.get(self.model.type, ())]
+        return self.diameter or math.sqrt(4.0 * math.prod(sides or [UCAT_AREA]) / math.pi)
 
     @property
     def delay_s(self) -> float:

@@ -3,7 +3,6 @@
 import tempfile
 from collections.abc import Callable, Iterator
 from copy import copy
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,8 +16,8 @@ from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
 from finlab.evaluation.method_specs import own_function
 from finlab.fit.interaction.constants import fit_constants
-from finlab.fit.interaction.samples import Judge, Samples, drawn
-from finlab.interaction.interaction import Interaction, Places
+from finlab.fit.interaction.samples import Judge, Samples, drawn, left_by_laws, with_jets
+from finlab.interaction.interaction import Interaction
 from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
 from finlab.layout import Layout
@@ -64,7 +63,7 @@ def run(
         own: samples of each robot that a ridge regression is given.
         seed: of all draws.
     """
-    judge = _other_jets if plant is None else own_function(plant)
+    judge = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
     with tempfile.TemporaryDirectory() as folder:
         models = _models(judge, layouts, steps, network, own, seed, Path(folder))
         for group, (count, kinds) in GROUPS.items():
@@ -102,7 +101,7 @@ def _models(
             places_of(own.layout)
         ),
         "network, no own samples": lambda own: Learned(file).of(places_of(own.layout)),
-        "the paper's surrogate form": lambda own: _ByDifferences(places_of(own.layout), node(own.layout)),
+        "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
     }
     for count in own:
         models[f"ridge, {count} own samples"] = partial(_ridge, count)
@@ -173,16 +172,11 @@ def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
     return best
 
 
-def _other_jets(layout: Layout, command: Array) -> Array:
-    return Plant(replace(layout, interaction=OTHER)).wrench(command)
-
-
 class _ByDifferences(Interaction):
     """An interaction by a function of all forces, with derivatives by differences."""
 
-    def __init__(self, places: Places, function: Callable[[Array], Array]) -> None:
+    def __init__(self, function: Callable[[Array], Array]) -> None:
         """Takes a function from forces (K, n, 3) [N] to wrenches (K, 6) [N, N m]."""
-        super().__init__(places)
         self._function = function
 
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
@@ -198,12 +192,6 @@ class _ByDifferences(Interaction):
         ) / step
         return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
 
-    def at_rest(self, force: Array) -> Array:
-        raise NotImplementedError
-
-    def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
-        raise NotImplementedError
-
     def deviation(self, force: Array) -> Array:
         return np.zeros((*force.shape[:-2], 6))
 
@@ -213,9 +201,7 @@ class Ridge(_ByDifferences):
     with the penalty that leaves least of samples left out one by one."""
 
     def __init__(self, samples: Samples) -> None:
-        plant, scale = Plant(samples.layout), yardstick(samples.layout)
-        own = plant.force(samples.command)
-        force, left = body_force(own, samples.layout.frames), (samples.wrench - plant.wrench_of(own)) / scale
+        force, left, scale = left_by_laws(samples)
         unit = float(np.abs(force).max())
 
         def features(force: Array) -> Array:
@@ -237,7 +223,7 @@ class Ridge(_ByDifferences):
             if (alone**2).sum() < best:
                 best = float((alone**2).sum())
                 weights = right.T @ ((values / (values**2 + penalty**2))[:, None] * (left_u.T @ left))
-        super().__init__(places_of(samples.layout), lambda force: features(force) @ weights * scale)
+        super().__init__(lambda force: features(force) @ weights * scale)
 
 
 experiment = Experiment(

@@ -12,12 +12,9 @@ from scipy.optimize import least_squares
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.interaction.samples import Samples
+from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.jets import Jets
-from finlab.layout.effectiveness import body_force
 from finlab.layout.places import places_of
-from finlab.physics import Plant
-from finlab.physics.objective import yardstick
 
 FITTED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
 PRIOR = float(np.log(2.0))
@@ -43,10 +40,7 @@ def fit_constants(samples: Samples) -> Fitted:
     """Returns the constants that fit samples best. Raises DataError: there are fewer than five."""
     if len(samples.wrench) < LEAST_SAMPLES:
         raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
-    layout = replace(samples.layout, interaction=None)
-    plant, places, scale = Plant(layout), places_of(layout), yardstick(layout)
-    own = plant.force(samples.command)
-    force, missed = body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale
+    (force, missed, scale), places = left_by_laws(samples), places_of(samples.layout)
     start = np.log([getattr(Jets(), name) for name in FITTED])
 
     def jets_at(logarithms: Array) -> Jets:

@@ -22,13 +22,16 @@ from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.fit.columns import read_columns
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
+from finlab.layout.effectiveness import body_force
 from finlab.layout.random_layouts import random_jet_robot
 from finlab.physics import Plant
+from finlab.physics.objective import yardstick
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 1_000_000_000
 """Largest file of samples that is read [bytes]."""
 WHAT = "samples of wrenches (.npz)"
+JETS = Jets()
 
 Judge = Callable[[Layout, Array], Array]
 """Gives the wrenches (K, 6) [N, N m] of commands (K, n, 3) of a robot, such as a CFD code does."""
@@ -44,9 +47,28 @@ class Samples(NamedTuple):
     """(K, 6) [N, N m]."""
 
 
-def with_jets(layout: Layout, command: Array) -> Array:
-    """Returns wrenches by the formula of jets with its usual constants; a `Judge`."""
-    return Plant(layout if layout.interaction else replace(layout, interaction=Jets())).wrench(command)
+class Left(NamedTuple):
+    """What the laws of a robot's actuators leave of its samples."""
+
+    force: Array
+    """Forces (K, n, 3) [N] by the laws, body frame."""
+    missed: Array
+    """Measured wrenches (K, 6) less those of these forces, on the yardstick."""
+    scale: Array
+    """The yardstick (6,) [N, N m]."""
+
+
+def left_by_laws(samples: Samples) -> Left:
+    """Returns what the laws leave of samples, whatever interaction their layout names."""
+    layout = replace(samples.layout, interaction=None)
+    plant, scale = Plant(layout), yardstick(layout)
+    own = plant.force(samples.command)
+    return Left(body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale)
+
+
+def with_jets(layout: Layout, command: Array, jets: Jets = JETS) -> Array:
+    """Returns wrenches by the formula of jets, with its usual constants; a `Judge`."""
+    return Plant(replace(layout, interaction=jets)).wrench(command)
 
 
 def drawn(

@@ -11,11 +11,9 @@ import torch
 from torch import nn
 
 from finlab.arrays import Array
-from finlab.fit.interaction.samples import Samples
+from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.layout import Layout
-from finlab.layout.effectiveness import body_force
 from finlab.layout.places import places_of
-from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 
 
@@ -49,11 +47,9 @@ def trained_surrogate(
 
     made = []
     for one in samples:
-        plant, scale = Plant(one.layout), yardstick(one.layout)
-        own = plant.force(one.command)
-        x, mask = rows(one.layout, body_force(own, one.layout.frames), scale, most)
-        ratio = np.full(len(x), scale[0] / scale[3])
-        made.append((x, mask, ratio, (one.wrench - plant.wrench_of(own)) / scale))
+        force, missed, scale = left_by_laws(one)
+        x, mask = rows(one.layout, force, scale, most)
+        made.append((x, mask, np.full(len(x), scale[0] / scale[3]), missed))
     known, alive, arm, left = (
         torch.tensor(np.concatenate(part), dtype=torch.float32) for part in zip(*made, strict=True)
     )

@@ -17,15 +17,12 @@ from torch import Tensor
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.fit.interaction.constants import parts_of_error
-from finlab.fit.interaction.samples import Samples
+from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import Places
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
-from finlab.layout.effectiveness import body_force
 from finlab.layout.places import places_of
 from finlab.networks.trained import State
-from finlab.physics import Plant
-from finlab.physics.objective import yardstick
 from finlab.training.device import workplace
 from finlab.training.loop import LoopSettings, Training, seeded_generator
 from finlab.whole_file import write_whole
@@ -87,13 +84,11 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
     left, size, robot = [], [], []
     for k, one in enumerate(samples):
-        plant, scale = Plant(one.layout), yardstick(one.layout)
-        own = plant.force(one.command)
-        law = np.einsum("kna,naw->kw", own, plant.effectiveness)
-        left.append((one.wrench - law) / scale)
-        size.append(np.broadcast_to(np.sqrt((one.wrench**2).mean(axis=0)) / scale, law.shape))
-        robot.append(np.full(len(law), k))
-        places, force = places_of(one.layout), body_force(own, one.layout.frames)
+        force, missed, scale = left_by_laws(one)
+        left.append(missed)
+        size.append(np.broadcast_to(np.sqrt((one.wrench**2).mean(axis=0)) / scale, missed.shape))
+        robot.append(np.full(len(missed), k))
+        places = places_of(one.layout)
         for name, made in messages_of(places, force, scale).items():
             parts[name].append(made)
     if len(samples) < 10 or not sum(len(part[0]) for part in parts["pair"]):
@@ -105,8 +100,8 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
         features, vectors, counts = (np.concatenate(each) for each in zip(*several, strict=True))
         starts = torch.from_numpy(np.concatenate([[0], np.cumsum(counts)]))
         rows[name] = Rows(_tensor(features), _tensor(vectors), starts)
-    missed, sizes = (_tensor(np.concatenate(part)) for part in (left, size))
-    return DataSet(rows, missed, sizes, torch.from_numpy(np.concatenate(robot)))
+    remains, sizes = (_tensor(np.concatenate(part)) for part in (left, size))
+    return DataSet(rows, remains, sizes, torch.from_numpy(np.concatenate(robot)))
 
 
 def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
