@@ -12,12 +12,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.thrust_model import lower_hull
 from finlab.arrays import Array
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
+
+SAME = 1e-10
+"""Share of the largest force by which a table of fewer intervals may be off."""
 
 POINTS = 512
 """Directions around a circle, and sizes of a force, for which a fin is asked."""
@@ -43,6 +47,8 @@ class RadialTable:
     """Its derivative (CELLS + 1,) [N^2/W] there."""
     rest: float
     """Power [W] at the least force."""
+    base: "tuple[RadialTable, float, float] | None" = None
+    """Another table that this one is scaled of, see `origin`."""
 
     @classmethod
     def of_forces(cls, top: float, force: Array, rest: float) -> "RadialTable":
@@ -70,13 +76,62 @@ class RadialTable:
         """The largest force [N]."""
         return float(self.force[-1])
 
+    @property
+    def origin(self) -> tuple["RadialTable", float, float]:
+        """The table that this one is scaled of, by shares of its force and of its power."""
+        return self.base or (self, 1.0, 1.0)
+
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
-        per = share / cost
-        result = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
-        known = self.polynomials * [share, share, share, share, cost]
-        result.__dict__["polynomials"] = known  # of many tables scaled in each new flow
-        return result
+        per, (base, force, power) = share / cost, self.origin
+        scaled = base, share * force, cost * power
+        return RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost, scaled)
+
+    def cost(self, force: Array) -> Array:
+        """Power (...) [W] of forces (...) [N] within the table."""
+        price = np.interp(force, self.force, price_grid(self.top))
+        return np.asarray(price * force - self.conjugate(price))
+
+    def conjugate(self, price: Array) -> Array:
+        """The most (...) [W] that a force is worth, less its power, at prices (...) [W/N] from 0 to `top`."""
+        cell = np.clip(np.searchsorted(_GRID, price / self.top, side="right") - 1, 0, CELLS - 1)
+        width, share = self.top * np.diff(_GRID), price / self.top - _GRID[cell]
+        t = share / np.diff(_GRID)[cell]
+        first, last, (m0, m1) = self.force[cell], self.force[cell + 1], self._bends[:, cell]
+        rise = last - first
+        part = first + t * (m0 / 2.0 + t * ((3.0 * rise - 2.0 * m0 - m1) / 3.0 + t * (m0 + m1 - 2.0 * rise) / 4.0))
+        return np.asarray(self._starts[cell] + width[cell] * t * part)
+
+    @cached_property
+    def _bends(self) -> Array:
+        """Derivatives (2, CELLS) of the force at both ends of each interval, over its width."""
+        width = self.top * np.diff(_GRID)
+        return np.stack([self.slope[:-1] * width, self.slope[1:] * width])
+
+    @cached_property
+    def _starts(self) -> Array:
+        """Conjugates (CELLS + 1,) [W] at the ends of the intervals."""
+        mean = 0.5 * (self.force[:-1] + self.force[1:]) + (self._bends[0] - self._bends[1]) / 12.0
+        return np.concatenate([[0.0], np.cumsum(self.top * np.diff(_GRID) * mean)]) - self.rest
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The table as the core takes it: `top`, cells, `rest`, then force, its derivative and conjugate at
+        as few of the grid's prices as say the same."""
+        step = CELLS
+        while step > 1 and not self._stands_for_all(step):
+            step //= 2
+        force, slope = self.force[::step], self.slope[::step]
+        width = np.diff(self.top * _GRID[::step])
+        mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
+        start = np.concatenate([[0.0], np.cumsum(width * mean)]) - self.rest
+        knots = np.stack([force, slope, start], axis=-1)
+        return np.concatenate([[self.top, CELLS // step, self.rest], knots.ravel()])
+
+    def _stands_for_all(self, step: int) -> bool:
+        """Whether every `step`-th of the grid's prices says what all do."""
+        spline = CubicHermiteSpline(_GRID[::step], self.force[::step], self.top * self.slope[::step])
+        return bool(np.abs(spline(_GRID) - self.force).max() <= SAME * self.largest)
 
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before
@@ -84,21 +139,6 @@ class RadialTable:
         price = price_grid(self.top) + 2.0 * weight * self.force
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
-
-    @cached_property
-    def polynomials(self) -> Array:
-        """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
-        from each interval's start on, and the conjugate there [W]; the last ones beyond the table."""
-        width = np.diff(price_grid(1.0))
-        first, last = self.force[:-1], self.force[1:]
-        m0, m1 = self.slope[:-1] * self.top * width, self.slope[1:] * self.top * width
-        rise = last - first
-        part = np.stack([first, m0, 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise], axis=1)
-        gain = self.top * width * (part @ (1.0 / np.arange(1.0, 5.0)))
-        start = np.concatenate([[0.0], np.cumsum(gain)]) - self.rest
-        part /= width[:, None] ** np.arange(4)
-        part = np.concatenate([part, [[self.force[-1], 0.0, 0.0, 0.0]]])
-        return np.concatenate([part, start[:, None]], axis=1)
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:
@@ -118,7 +158,7 @@ class Line:
 
     effectiveness: Array
     """Wrench (6,) per newton [-, m], body frame."""
-    forward: RadialTable
+    table: RadialTable
     """Answer to a positive price."""
     reverse: RadialTable | None = None
     """Answer to a negative price, as sizes; None where the force has one sign."""
@@ -134,10 +174,15 @@ class Line:
     """Power per newton of it [m/s]."""
 
     @property
+    def rows(self) -> Array:
+        """Wrench (2, 6) per newton of the force, and of its drag."""
+        return np.stack([self.effectiveness, np.zeros(6) if self.drag is None else self.drag])
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Least and largest force [N]."""
-        low = -self.reverse.largest if self.reverse else float(self.forward.force[0])
-        return max(self.low, low), min(self.high, self.forward.largest)
+        low = -self.reverse.largest if self.reverse else float(self.table.force[0])
+        return max(self.low, low), min(self.high, self.table.largest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +206,11 @@ class Plane:
     """Answer of forces against the directions of the arc, from rest on; None where it pushes one way."""
 
     @property
+    def rows(self) -> Array:
+        """Wrench (2, 6) per newton along its directions."""
+        return self.effectiveness
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Least and largest force [N], below 0 in reverse."""
         return -self.reverse.largest if self.reverse else float(self.table.force[0]), self.table.largest
@@ -175,11 +225,17 @@ def with_square(response: Response, weight: float) -> Response:
     alike all round with the mean over all directions."""
     if isinstance(response, Line):
         reverse = response.reverse and response.reverse.with_square(weight)
-        return replace(response, forward=response.forward.with_square(weight), reverse=reverse)
+        return replace(response, table=response.table.with_square(weight), reverse=reverse)
     if response.gauge is not None:
         weight *= float(np.mean(response.gauge**2))
     reverse = response.reverse and response.reverse.with_square(weight)
     return replace(response, table=response.table.with_square(weight), reverse=reverse)
+
+
+def power_of(response: Response, force: Array) -> Array:
+    """Returns the power (...) [W] of forces (...) [N], of planes sizes, below 0 in reverse."""
+    ahead, astern = (table.cost(np.abs(force)) for table in (response.table, response.reverse or response.table))
+    return np.where(force < 0.0, astern, ahead)
 
 
 class Group(ABC):

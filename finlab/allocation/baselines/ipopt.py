@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.actuators.response import Group, Line, Plane
+from finlab.actuators.response import Group, Line, Plane, power_of
 from finlab.allocation.baselines.pseudo_inverse import (
     SOLVED,
     ModelBased,
@@ -20,7 +20,6 @@ from finlab.allocation.baselines.pseudo_inverse import (
     TimeLimitedSettings,
     pushed_axes,
 )
-from finlab.allocation.dual.answers import Answers
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.assets import install
@@ -97,13 +96,13 @@ class _Line:
 
     def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
         reverse = 0.0 if line.reverse is None else line.reverse.largest
-        low, high = max(line.low, -reverse) / most, min(line.high, line.forward.largest) / most
+        low, high = max(line.low, -reverse) / most, min(line.high, line.table.largest) / most
         self.ends = [(low, high), (0.0, 0.0)]
         """Least and largest value of both variables."""
-        grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.forward.largest])) / most
+        grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.table.largest])) / most
         if grid[0] == grid[-1]:
             grid = np.linspace(-1.0, 1.0, 5)
-        cost = Answers([line], []).marginal(most * grid[None])[1][0]
+        cost = power_of(line, most * grid)
         self.cost, self.full_cost = _spline(casadi, grid, cost)(share[0]), float(cost.max())
         """Power [W] in CasADi, and at full load."""
         force = np.zeros((len(grid), len(group.responses), 2))
@@ -144,7 +143,7 @@ class _Plane:
             gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
             high = _spline(casadi, along, gauge)(turn)
         force = table.largest * (low + (1.0 - low) * LEVELS)
-        watts = Answers([], [plane]).marginal(force[None])[1][0]
+        watts = power_of(plane, force)
         cost = _spline(casadi, LEVELS, watts)
         self.cost, self.full_cost = cost((size / high - low) / max(1.0 - low, 1e-9)), float(watts[-1])
         """See `_Line`."""

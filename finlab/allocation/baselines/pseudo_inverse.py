@@ -88,7 +88,7 @@ class PseudoInverse:
 def _largest(response: Response) -> float:
     if isinstance(response, Line):
         reverse = 0.0 if response.reverse is None else response.reverse.largest
-        return max(response.forward.largest, reverse)
+        return max(response.table.largest, reverse)
     return response.table.largest * (1.0 if response.gauge is None else float(response.gauge.max()))
 
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, Response, with_square
 from finlab.allocation.dual.robot import DualRobot
-from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.expected_miss import uncertainties
@@ -20,10 +19,12 @@ from finlab.precision import ROUNDING
 class Compiled:
     """The actuators of one robot, ready for prices."""
 
-    def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
+    def __init__(
+        self, layout: Layout, plant: Plant, yardstick: Array, doubt: Array | None = None
+    ) -> None:
         """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
         beside its power is `doubt`, see `price_of_doubt`. Errors as for `FinGroup`."""
-        self.count, self._actuators = layout.n, layout.actuators
+        self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -46,7 +47,7 @@ class Compiled:
                     self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
                 weight = float(self.weight[place])
                 responses[place] = with_square(response, weight) if weight else response
-        self.robot: DualRobot = DualRobot(responses)  # type: ignore[arg-type]
+        self.robot: DualRobot = DualRobot(responses, self._yardstick)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
 
@@ -62,59 +63,48 @@ class Compiled:
         return other
 
     @cached_property
-    def _directions(self) -> tuple[NDArray[np.intp], Array]:
-        """The actuator (k,) of each of the robot's directions, and that direction (k, 3) in its own axes."""
-        own: list[Response | None] = [None] * self.count
+    def _directions(self) -> Array:
+        """Directions (n, 2, 3) of each actuator's forces in its own axes."""
+        own = np.zeros((self.count, 2, 6))
         for places, group in groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))):
             for place, response in zip(places, group.responses, strict=True):
-                own[place] = response
-        ordered = [(place, own[place]) for place in self.robot.order]
-        lines = [(place, each) for place, each in ordered if isinstance(each, Line)]
-        planes = [(place, each) for place, each in ordered if isinstance(each, Plane)]
-        rows = [(place, line.effectiveness) for place, line in lines]
-        rows += [(place, plane.effectiveness[k]) for k in range(2) for place, plane in planes]
-        rows += [(place, line.drag) for place, line in lines if line.drag is not None]
-        return np.array([place for place, _ in rows]), np.array([row for _, row in rows])[:, :3]
+                own[place] = response.rows
+        return own[..., :3]
 
     def forces_along(self, force: Array) -> Array:
-        """Forces (k, 1) [N] along the robot's directions of forces (n, 3) [N] in own axes."""
-        places, directions = self._directions
-        return np.asarray(np.einsum("ka,ka->k", directions, force[places])[:, None])
+        """Forces (n, 2) [N] along each actuator's directions of forces (n, 3) [N] in own axes."""
+        return np.asarray(np.einsum("nka,na->nk", self._directions, force))
 
     def tilted(self, effectiveness: Array, beside: Array) -> "Compiled":
         """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench
         `beside`."""
-        other, (places, directions) = copy(self), self._directions
-        other.robot = self.robot.tilted(np.einsum("ka,kaw->kw", directions, effectiveness[places]))
+        other = copy(self)
+        other.robot = self.robot.tilted(np.einsum("nka,naw->nkw", self._directions, effectiveness))
         other.beside = beside
         return other
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
-        lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order
-        own = np.zeros((force.shape[1], self.count, 2))
-        own[:, order[: lines + planes], 0] = force[: lines + planes].T
-        own[:, order[lines:], 1] = force[lines + planes : lines + 2 * planes].T
-        command = np.empty((len(own), self.count, 3))
+        """Commands (N, n, 3) that give forces (N, n, 2) [N] of the dual at least power."""
+        command = np.empty((len(force), self.count, 3))
         for places, group in self.groups:
             before = None if previous is None else previous[places]
-            command[:, places] = group.commands(own[:, places], before)
+            command[:, places] = group.commands(force[:, places], before)
         return command
 
     def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
-        """See `Group.radial_worth`, at prices (m, N): where all actuators are alike, one answers for all."""
+        """See `Group.radial_worth`: where all actuators are alike, one answers for all."""
         for alike, one in self._alike:
             if alike is group:
                 worth = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))
-                return None if worth is None else worth.reshape(ahead.shape).T
-        return group.radial_worth(ahead.T, back.T)
+                return None if worth is None else worth.reshape(ahead.shape)
+        return group.radial_worth(ahead, back)
 
-    def within(self, lower: Array, upper: Array) -> Sets:
-        """What commands between limits (n, 3) can give."""
+    def limits(self, lower: Array, upper: Array) -> Array:
+        """What commands between limits (n, 3) can give: rows (n, 4), see `Group.reach`."""
         reach = np.empty((self.count, 4))
         for places, group in self.groups:
             reach[places] = group.reach(lower[places], upper[places])
-        return self.robot.restricted(reach[self.robot.order])
+        return reach
 
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
@@ -129,15 +119,12 @@ def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
 
 def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
     """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
-    robot = compiled.robot
-    along = np.empty((3, compiled.count, len(wrench)))
-    along[:, robot.order] = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
-    ahead, back, worth = along
+    ahead, back, worth = np.moveaxis(compiled.robot.core.worth(price), -1, 0)
     for places, group in compiled.groups:
         own = group.worth(price)
-        own = compiled.radial_worth(group, ahead[places], back[places]) if own is None else own
+        own = compiled.radial_worth(group, ahead[:, places], back[:, places]) if own is None else own
         if own is not None:
-            worth[places] = own.T
+            worth[:, places] = own
     paid = price * (wrench - compiled.beside)
-    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=0))
-    return np.asarray(paid.sum(axis=1) - worth.sum(axis=0) - rounding)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=1))
+    return np.asarray(paid.sum(axis=1) - worth.sum(axis=1) - rounding)

@@ -1,41 +1,40 @@
 """The default method: least watts by the dual, exact by the actuators' own laws.
 
-Prices give forces (`newton`, `branch`), forces give commands (`compiled`), and what the compiled laws leave
-undone is asked for on top and removed by Levenberg-Marquardt steps on the commands. A wrench out of reach
-becomes the one that the policy asks for (`policies`); from tick to tick, commands stay within what may follow
-the previous ones (`rates`).
+Prices give forces (`finlab.core`), forces give commands (`compiled`), and what the compiled laws leave undone
+is asked for on top and removed by Levenberg-Marquardt steps on the commands. A wrench out of reach becomes the
+one that the policy asks for; from tick to tick, commands stay within what may follow the previous ones
+(`rates`).
 """
 
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.drag import EXACT, Search
-from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
-from finlab.allocation.dual.policies import Nearest, Rates, nearest, within_tick
-from finlab.allocation.dual.sets import Sets
-from finlab.allocation.dual.turns import Linear, settled
+from finlab.allocation.dual.rates import Rates
+from finlab.allocation.dual.turns import Forces, Linear, settled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import Policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
+from finlab.core.calls import BEYOND, MET, Found
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
-STEPS_WITH_DRAG = 2 * ROUNDS
-"""Newton's steps from the prices of commands near to a target."""
+HOLLOW = 1e-3
+"""Share of the limit ranges by which commands are turned aside at first where no small change helps."""
+ENDED = "the search for a better answer was ended by its limit of steps"
 
 
 @dataclass(frozen=True)
@@ -46,32 +45,6 @@ class DualSettings(Settings):
         0.0, 0.0, 1e9, "what an expected miss of 1 % of the yardstick is worth, growing with its square", "W"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
-
-
-class Forces(NamedTuple):
-    """What the dual gives for N targets."""
-
-    force: Array
-    """Forces (k, N) [N]."""
-    price: Array
-    """Prices (N, 6) of the wrench [W/N, W/(N m)]."""
-    within: NDArray[np.bool_]
-    """Targets within reach (N,)."""
-    prices: Array
-    """The same as `price` (r, N) in the robot's basis [W]."""
-    value: Array
-    """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
-    aim: Array
-    """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
-    command: Array | None = None
-    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
-
-    @classmethod
-    def joined(cls, each: Sequence["Forces"]) -> "Forces":
-        """Those of single targets."""
-        along = [1 if name in ("force", "prices") else 0 for name in cls._fields]
-        columns: Any = zip(zip(*each, strict=True), along, strict=True)
-        return cls(*(np.concatenate(parts, axis) for parts, axis in columns))
 
 
 class Dual(Method):
@@ -87,7 +60,7 @@ class Dual(Method):
 
     def prepare(self) -> None:
         doubt = price_of_doubt(self.layout, self.scale, self.settings.robust)
-        self.compiled = Compiled(self.layout, self.plant, doubt)
+        self.compiled = Compiled(self.layout, self.plant, self.scale, doubt)
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
@@ -130,26 +103,32 @@ class Dual(Method):
     ) -> Solution:
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
-        resting, deadline = self.compiled.beside, Deadline(len(targets))
-        forces = self.forces(targets - resting, policy, deadline, self.begin(prices))
-        aim = targets if forces.within.all() else forces.aim + resting
+        resting = self.compiled.beside
+        forces = self.forces(targets - resting, policy, self.begin(prices))
+        found = forces.found
+        aim = targets if found.within.all() else found.aim + resting
         command = self.commands(aim, forces, previous)
-        notes = set()
+        notes = {ENDED} if found.ended else set()
         if policy.kind == "direction":
-            for row in np.flatnonzero(~forces.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, forces, command, deadline))
+            for row in np.flatnonzero(~found.within):
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command))
         if previous is not None and not self.rates.allow(previous, command[0]):
             command = self.in_a_tick(aim, forces, previous)
-        bound: Callable[[Array], Array] = partial(self.bound, aim, forces.price, forces.value)
-        notes |= self.not_held(targets[~forces.within]) | deadline.notes
+        bound: Callable[[Array], Array] = partial(self.bound, aim, found.price, found.value)
+        notes |= self.not_held(targets[~found.within])
         return Solution(
-            command, None if self.unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
+            command, None if self.unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
         )
 
     def begin(self, prices: Array | None) -> Array | None:
-        """Prices (6,) [W/N, W/(N m)] in the robot's basis (r, 1)."""
+        """Prices (6,) [W/N, W/(N m)] in the robot's basis (6,)."""
         robot = self.compiled.robot
-        return None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
+        return None if prices is None else self._padded(robot.basis.T @ (robot.scale * prices))
+
+    @staticmethod
+    def _padded(inner: Array) -> Array:
+        """Prices (r,) in the basis as the core takes them (6,)."""
+        return np.pad(inner, (0, 6 - len(inner)))
 
     def linear(self, model: Linear) -> Self:
         """The same on a linear model; its search, in commands, is that of the whole one."""
@@ -159,7 +138,7 @@ class Dual(Method):
         return other
 
     def _kept_on_the_ray(
-        self, target: Array, row: int, aim: Array, forces: Forces, command: Array, deadline: Deadline
+        self, target: Array, row: int, aim: Array, found: Found, command: Array
     ) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
@@ -168,18 +147,18 @@ class Dual(Method):
         if self.error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
             return ""
         kept = False
-        while high > low + CLOSE * size and not deadline.passed():
+        while high > low + CLOSE * size:
             share = 0.5 * (low + high)
             tried = share / size * target[None]
-            one = self.forces(tried - self.compiled.beside, None, deadline)
+            one = self.forces(tried - self.compiled.beside, None)
             its = self.commands(tried, one)
             if self.error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
-                forces.price[row], forces.value[row] = one.price[0], one.value[0]
+                found.price[row], found.value[row] = one.found.price[0], one.found.value[0]
             else:
                 high = share
         if not kept and (rest := self._cancelled) is not None:
-            kept, command[row], aim[row], forces.price[row], forces.value[row] = True, rest, 0.0, 0.0, 0.0
+            kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
         return "" if kept else "no share of the target was found that the actuators can give alone"
 
     @cached_property
@@ -211,7 +190,7 @@ class Dual(Method):
 
     @cached_property
     def undriven(self) -> tuple[str, ...]:
-        size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
+        size = np.abs(self.compiled.robot.effectiveness).max(axis=(0, 1))
         return axes_in(size <= NOTHING * size.max())
 
     def bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
@@ -230,75 +209,60 @@ class Dual(Method):
         measured = any(part.reads for part in self.layout.actuators)
         return measured or self.compiled.doubt is not None
 
-    def forces(
-        self, targets: Array, policy: Policy | None, deadline: Deadline, prices: Array | None = None
-    ) -> Forces:
-        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place."""
-        robot, sets = self.compiled.robot, self.compiled.robot.sets
-        target, drags = robot.target(targets), len(robot.answers.dragging) > 0
-        if drags and len(targets) > 1:
-            return Forces.joined([self.forces(one[None], policy, deadline) for one in targets])
-        if not len(target):  # nothing pushes, such as foils at rest
-            nothing = np.zeros((len(robot.effectiveness), len(targets)))
-            none = np.zeros((len(targets), 6))
-            return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
-        torn = drags or len(sets.forked) + len(sets.reversing) > 0
-        steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
-        if drags:
-            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
-            steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
-            if prices is None:
-                prices = self.search.prices(near, self._directions)
-        root = solve(robot, target, sets, prices, steps)
-        within = root.solved | (~root.beyond & torn)
-        if robot.basis.shape[1] < 6:
-            rest = targets / robot.scale - (robot.basis @ target).T
-            size = np.linalg.norm(targets / robot.scale, axis=1)
-            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (1e-3 + size)
-        force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
-        if may_have_gaps(robot, sets, force):
-            force, value = self._in_gaps(target, sets, root, within, deadline)
-        command = None
-        if first is not None:
-            # What the tables prove leaves out what foils do beyond them.
-            value = np.zeros(1)
-            command, prices = self._with_drag(targets[0], force, first, root, deadline)
-            within[0] = not np.isnan(command).any()
-        if not within.all() and policy is not None:
-            force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
-            for row in np.flatnonzero(~within):
-                at = np.array([row])
-                near = nearest(robot, sets.take(at), targets[row], policy, self.scale, deadline)
-                aim[row], force[:, row], prices[:, row] = near.wrench, near.force, near.prices
-                if may_have_gaps(robot, sets, near.force[:, None]):
-                    self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
-        return Forces(force, robot.price(prices), within, prices, value, aim, command)
+    def forces(self, targets: Array, policy: Policy | None, inner: Array | None = None) -> Forces:
+        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place; for a
+        single one the search begins at prices `inner` (6,) in the basis."""
+        core = self.compiled.robot.core
+        if self.compiled.robot.speed.any():
+            each = [self._with_drag(one, policy, inner) for one in targets]
+            return each[0] if len(each) == 1 else _joined(each)
+        if len(targets) == 1:
+            return Forces(*core.one(targets[0], policy, inner)[:2])
+        return Forces(core.many(targets, policy))
 
-    def _with_drag(
-        self, wrench: Array, force: Array, first: Array, root: Prices, deadline: Deadline
+    def _with_drag(self, wrench: Array, policy: Policy | None, inner: Array | None) -> Forces:
+        """The same for one wrench (6,) where foils drag, and a command: what the dual leaves to the laws."""
+        robot, core = self.compiled.robot, self.compiled.robot.core
+        if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
+            return Forces(*core.one(wrench, policy)[:2])
+        first = core.look(wrench, core.first(wrench))[0][None]
+        if inner is None:
+            inner = self._padded(self.search.prices(self.compiled.commands(first)[0], self._directions))
+        found, prices, status = core.one(wrench, None, inner)
+        command, prices = self._near(wrench, found.force, first, prices, status)
+        within = not np.isnan(command).any()
+        if not within and policy is not None:
+            found, prices, _ = core.one(wrench, policy, inner)
+        # What the tables prove leaves out what foils do beyond them.
+        price = robot.price(prices)[None]
+        known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
+        return Forces(known, prices, command)
+
+    def _near(
+        self, wrench: Array, force: Array, first: Array, prices: Array, status: int
     ) -> tuple[Array, Array]:
-        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
-        there is none; and its prices (r, 1)."""
-        robot, search = self.compiled.robot, self.search
-        aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
-        if root.solved[0] and self.error(begin, aim[None])[0] <= EXACT:
+        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN where
+        there is none; and its prices (6,)."""
+        search, core, begin = self.search, self.compiled.robot.core, self.compiled.commands(force)
+        aim = wrench + self.compiled.beside
+        if status == MET and self.error(begin, aim[None])[0] <= EXACT:
             return begin, prices
-        value, best_of = root.value, partial(search.cheapest, aim / self.scale)
+        value, best_of = core.look(wrench, prices)[1], partial(search.cheapest, aim / self.scale)
         best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
         if best is not None:
-            if not root.solved[0]:
-                tried = search.prices(best.command, self._directions)
-                prices = np.concatenate([prices, tried], axis=1)
-                value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
-                prices = prices[:, value.argmax()][:, None]
+            if status != MET:
+                tried = self._padded(search.prices(best.command, self._directions))
+                prices, value = max(
+                    ((prices, value), (tried, core.look(wrench, tried)[1])), key=lambda known: known[1]
+                )
             # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
-            if self.compiled.doubt is None and best.cost <= 2.0 * value.max():
+            if self.compiled.doubt is None and best.cost <= 2.0 * value:
                 return best.command[None], prices
         starts = self.plant.sample(np.random.default_rng(0), (ROUNDS,))
         for places, group in self.compiled.groups:
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
-        other = None if root.beyond[0] or deadline.passed() else best_of(starts)
+        other = None if status == BEYOND else best_of(starts)
         ways = [way for way in (best, other) if way is not None]
         command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
         return command[None], prices
@@ -309,40 +273,11 @@ class Dual(Method):
         robot = self.compiled.robot
         return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
-    def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
-        """Replaces forces (k,) of one part of sets with gaps by those of least power in all of it."""
-        robot = self.compiled.robot
-        target = robot.target(near.wrench[None])
-        root = solve(robot, target, sets, deadline=deadline)
-        within = ~root.beyond
-        cheaper, _ = self._in_gaps(target, sets, root, within, deadline)
-        if within[0]:
-            force[:] = cheaper[:, 0]
-
-    def _in_gaps(
-        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_], deadline: Deadline
-    ) -> tuple[Array, Array]:
-        """Forces (k, N) in sets with gaps, and the power (N,) [W] that is proved to be needed there; `within`
-        loses the targets that they do not meet."""
-        robot = self.compiled.robot
-        inside = gaps(robot, root.force, sets, root.prices) > 0.0
-        rows = np.flatnonzero(within & inside.any(axis=0))
-        within &= root.solved | inside.any(axis=0)
-        if not len(rows):
-            return root.force, np.broadcast_to(0.0, len(within))
-        value = np.zeros(len(within))
-        cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows), deadline)
-        force = root.force.copy()
-        force[:, rows] = cut.force
-        within[rows[~cut.met]] = False
-        value[rows] = np.where(cut.met, cut.value * (1.0 - FINE), 0.0)
-        return force, value
-
     def commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
         if previous is None and forces.command is not None and not np.isnan(forces.command).any():
             return self.plant.rested(forces.command)
-        command = self.compiled.commands(forces.force, previous)
+        command = self.compiled.commands(forces.found.force, previous)
         error = self.error(command, aim)
         rough = np.flatnonzero(error > EXACT)
         if not len(rough):
@@ -354,7 +289,7 @@ class Dual(Method):
         for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
             ends = refine(self.search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
-            for row in rows[(ends.error > NEARLY) & forces.within[rows]].tolist():
+            for row in rows[(ends.error > NEARLY) & forces.found.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
@@ -374,13 +309,21 @@ class Dual(Method):
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
         a previous one (n, 3); `forces` is the answer without limits of that kind."""
         box = self.rates.box(previous)
-        sets, full = self.compiled.within(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
+        limits, full = self.compiled.limits(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
         problem = replace(self.search.problem, lower=box.lower, upper=box.upper, full_turn=full)
-        wrench = aim - self.compiled.beside
-        force = within_tick(self.compiled.robot, sets, wrench, forces.prices, 1.0 / self.scale)
-        command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
+        wrench = aim[0] - self.compiled.beside
+        found, _, _ = self.compiled.robot.core.one(wrench, CLOSEST, forces.inner, limits)
+        command = self.plant.feasible(box.clipped(self.compiled.commands(found.force, previous)))
         if self.error(command, aim)[0] > EXACT:
             command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
             command = self.plant.feasible(box.clipped(command))
         rested = self.plant.rested(command)
         return np.where(box.clipped(rested) == rested, rested, command)
+
+
+def _joined(each: Sequence[Forces]) -> Forces:
+    """Those of single targets."""
+    *rows, ended = zip(*(one.found for one in each), strict=True)
+    commands = [one.command for one in each]
+    command = None if commands[0] is None else np.concatenate(commands)  # type: ignore[arg-type]
+    return Forces(Found(*map(np.concatenate, rows), any(ended)), None, command)

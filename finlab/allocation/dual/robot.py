@@ -1,183 +1,155 @@
-"""A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
+"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and their tables."""
 
-from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.actuators.response import Line, Plane, Response, price_grid
-from finlab.allocation.dual.answers import Answers
-from finlab.allocation.dual.sets import Sets
+from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
 from finlab.arrays import Array
-from finlab.precision import NEARLY, NOTHING
+from finlab.axes import TURN
+from finlab.core.calls import MAGIC, VERSION, Core
+from finlab.precision import CLOSE, NEARLY, NOTHING
 
 
 class DualRobot:
-    """One robot, prepared of the responses of its n actuators; lines come first."""
+    """One robot, prepared of the responses of its n actuators: forces along one or two directions of each."""
 
-    def __init__(self, responses: list[Response]) -> None:
-        lines = [each for each in responses if isinstance(each, Line)]
-        planes = [each for each in responses if isinstance(each, Plane)]
-        self.order = np.argsort([isinstance(each, Plane) for each in responses], kind="stable")
-        """Places (n,) of the actuators in the layout."""
-        self.answers = Answers(lines, planes)
-        both: list[Response] = [*lines, *planes]
-        self.ends = np.array([each.ends for each in both])
-        """Least and largest forces (n, 2) [N], of planes sizes, below 0 in reverse."""
-        low, high = self.ends[:, :1], self.ends[:, 1:]
-        self.most = np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12
-        """Largest force or size (n, 1) [N] of each actuator."""
-        self.band = np.array([each.band for each in both])[:, None]
-        """Dead bands (n, 1) [N]: smaller forces, other than 0, cannot be held."""
-        at_band = [sign * np.minimum(self.band, high) for sign in (-1.0, 0.0, 1.0)]
-        self.band_cost = self.answers.marginal(np.concatenate(at_band, axis=1))[1]
-        """Power (n, 3) [W] at the negative end of the band, at rest, and at its positive end."""
-        arcs = np.array([(plane.middle, plane.half) for plane in planes]).reshape(-1, 2)
-        idle = np.array([_needs_no_reverse(plane) for plane in planes], bool)
-        least = np.where(np.pad(idle, (len(lines), 0))[:, None], 0.0, low)
-        self.sets = limited_sets(self.answers, least, high, arcs)
-        """What each may give."""
-        rows = [line.effectiveness for line in lines]
-        rows += [plane.effectiveness[k] for k in range(2) for plane in planes]
-        rows += [line.drag for line in lines if line.drag is not None]
-        self.most_drag = self.answers.drag(self.most) + 1e-12
-        """Drag (f, 1) [N] of the largest forces of the lines that drag."""
-        self._span(np.array(rows))
+    def __init__(self, responses: list[Response], yardstick: Array | None = None) -> None:
+        """Takes what the actuators offer, and the yardstick (6,) of errors [N, N m]."""
+        self.responses = responses
+        self.yardstick = np.ones(6) if yardstick is None else yardstick
+        self.ends = np.array([each.ends for each in responses])
+        """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
+        self.lines = np.array([isinstance(each, Line) for each in responses])
+        """Which have one direction (n,)."""
+        speeds = [each.speed if isinstance(each, Line) and each.drag is not None else 0.0 for each in responses]
+        self.speed = np.array(speeds)
+        """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
+        sizes, self._gain = np.abs(self.ends).max(axis=1), np.zeros((len(responses), 2))
+        drag = np.array([self._drag(i, size) for i, size in enumerate(sizes)])
+        second = np.where(self.lines, drag, sizes)
+        self._sizes = np.stack([sizes, second], axis=1)
+        self.most = self._sizes + 1e-12
+        """Largest force (n, 2) [N] along each direction."""
+        self._gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
+        self._gain = self._gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
+        self._tables, self._places = _tables_of(responses, _HEAD + _EACH * len(responses))
+        self._span(np.array([each.rows for each in responses]))
 
     def _span(self, effectiveness: Array) -> None:
         self.effectiveness = effectiveness
-        """Wrench (k, 6) per newton along each direction, lines, first directions, second directions, drag."""
-        sizes = np.abs(self.ends).max(axis=1, keepdims=True)
-        largest = np.concatenate([sizes, sizes[self.answers.lines :], self.answers.drag(sizes) + 1e-12])
-        scaled = self.effectiveness * largest
+        """Wrench (n, 2, 6) per newton along each direction."""
+        scaled = (effectiveness * self._sizes[..., None]).reshape(-1, 6)
         size = np.sqrt((scaled**2).sum(axis=0))
         self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
         left, values, _ = np.linalg.svd((scaled / self.scale).T, full_matrices=False)
         self.basis = left[:, values > NOTHING * max(values[0], 1e-300)]
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
-        self.matrix = (self.effectiveness / self.scale) @ self.basis
-        """Effectiveness (k, r) in that basis."""
+        self.core = Core(self._block(), len(self.responses))
+        """The robot in the core."""
 
     def tilted(self, effectiveness: Array) -> "DualRobot":
-        """The same actuators with another effectiveness (k, 6)."""
+        """The same actuators with another effectiveness (n, 2, 6)."""
         other = copy(self)
-        for name in ("outer", "squares", "first_force", "trace", "least_trace", "metric"):
-            other.__dict__.pop(name, None)
+        other.__dict__.pop("largest_power", None)
         other._span(effectiveness)
         return other
 
     @cached_property
-    def outer(self) -> Array:
-        """Products (r r, l + 3 p) that make the Hessian of derivatives of the answers."""
-        lines, planes = self.answers.lines, self.answers.planes
-        ends = np.cumsum([lines, planes, planes])
-        line, first, second, drag = np.split(self.matrix, ends)
-        mixed = _products(first, second)
-        mixed = mixed + mixed.swapaxes(1, 2)
-        parts = [_products(line, line), _products(first, first), mixed, _products(second, second)]
-        if len(drag):
-            along = _products(line[self.answers.dragging], drag)
-            parts += [along + along.swapaxes(1, 2), _products(drag, drag)]
-        return np.concatenate(parts).reshape(-1, self.shape[0] * self.shape[1]).T.copy()
-
-    @cached_property
     def largest_power(self) -> float:
         """Power [W] of all actuators at the dearer ends of their sets."""
-        return float(self.sets.most_cost[0])
+        return float(sum(power_of(each, ends).max() for each, ends in zip(self.responses, self.ends, strict=True)))
 
-    @cached_property
-    def gain(self) -> Array:
-        """Force over price (k, 1) [N^2/W] of each direction at its limit, by what half the force costs."""
-        each = self.most / self.answers.prices[:, None]
-        steep = (self.most_drag / self.most[self.answers.dragging]) ** 2
-        return np.concatenate([each, each[self.answers.lines :], each[self.answers.dragging] * steep])
+    def wrench(self, force: Array) -> Array:
+        """Wrenches (..., 6) [N, N m] of forces (..., n, 2) [N]."""
+        return np.asarray(np.einsum("...nk,nkw->...w", force, self.effectiveness))
 
-    @cached_property
-    def squares(self) -> Array:
-        """Products (r r, k) that make the Hessian of weights of the directions."""
-        return np.asarray(np.einsum("ki,kj->ijk", self.matrix, self.matrix).reshape(-1, len(self.matrix)))
+    def price(self, inner: Array) -> Array:
+        """Prices (6,) [W/N, W/(N m)] of the wrench from those in the basis (6,) [W]."""
+        return np.asarray(self.basis @ inner[: self.basis.shape[1]] / self.scale)
 
-    @cached_property
-    def first_force(self) -> Array:
-        """Forces (k, r) of a scaled wrench at least quadratic cost."""
-        hessian = (self.matrix.T * self.gain[:, 0]) @ self.matrix
-        return np.asarray((self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True))
+    def _drag(self, i: int, force: float) -> float:
+        line = self.responses[i]
+        return (float(power_of(line, np.array(force))) - line.table.rest) / self.speed[i] if self.speed[i] > 0.0 else 0.0
 
-    @cached_property
-    def trace(self) -> Array:
-        """Row (l + 3 p,) that makes the trace of the Hessian."""
-        return np.asarray(self.outer.reshape(*self.shape, -1).trace())
-
-    @cached_property
-    def least_trace(self) -> float:
-        """Least trace that a ridge is a share of: that of the quadratic costs, times 1e-6."""
-        return NEARLY * float((self.squares @ self.gain).reshape(self.shape).trace())
-
-    @cached_property
-    def metric(self) -> Array:
-        """Matrix (r, r) by which a ridge grows: the Hessian of the quadratic costs, over its mean, so that
-        directions that are driven badly are not held back more than the others."""
-        hessian = (self.squares @ self.gain).reshape(self.shape)
-        mean = float(hessian.trace()) / max(len(hessian), 1)
-        return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of the Hessian."""
-        return self.matrix.shape[1], self.matrix.shape[1]
-
-    def farthest(self, sets: Sets) -> Callable[[Array], Array]:
-        """Gives the forces (k,) [N] within the sets of one target that are worth most at prices (k,)."""
-        return lambda price: self.answers.farthest(price[:, None], sets)[:, 0]
-
-    def middle(self, sets: Sets) -> Array:
-        """Forces (k,) [N] inside the sets of one target."""
-        lines = self.answers.lines
-        size = 0.5 * (sets.low + sets.high)[:, 0]
-        angle = sets.middle[:, 0]
-        turns = (sets.half[:, 0] < np.pi) & (sets.reverse[:, 0] == 0.0)
-        planar = np.where(turns, size[lines:], 0.0)
-        drag = self.answers.drag(size[:, None])[:, 0]
-        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle), drag])
-
-    def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
-        """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
-        lines = self.answers.lines
-        x, y = self.answers.pair(force)
-        size = np.concatenate([force[:lines], np.hypot(x, y)])
-        within = np.clip(size, sets.low, sets.high)
-        within[lines:] *= 1.0 - 2.0 * sets.flipped
-        cost = self.answers.marginal(within)[1]
-        cut = {"low": size, "high": size, "low_cost": cost, "high_cost": cost}
-        turned = {"middle": np.arctan2(y, x), "half": 0.0, "reverse": 0.0}
-        changes: list[Any] = [(name, value, fixed) for name, value in cut.items()]
-        changes += [(name, value, fixed[lines:]) for name, value in turned.items()]
-        values = {name: np.where(where, value, getattr(sets, name)) for name, value, where in changes}
-        return replace(sets, **values)
-
-    def restricted(self, reach: Array) -> Sets:
-        """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
-        half of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
-        low, high = np.clip(reach[:, :2], self.ends[:, :1], self.ends[:, 1:]).T[..., None]
-        return limited_sets(self.answers, low, high, reach[self.answers.lines :, 2:])
-
-    def target(self, wrench: Array) -> Array:
-        """Wrenches (N, 6) in the basis (r, N)."""
-        return np.asarray(self.basis.T @ (wrench / self.scale).T)
-
-    def price(self, prices: Array) -> Array:
-        """Prices (N, 6) [W/N, W/(N m)] of the wrench from those in the basis (r, N) [W]."""
-        return np.asarray((self.basis @ prices).T / self.scale)
+    def _block(self) -> Array:
+        """The numbers of finlab/core/core.h."""
+        rank, basis = self.basis.shape[1], np.zeros((6, 6))
+        basis[:, :rank] = self.basis
+        matrix = np.zeros((len(self.responses), 2, 6))
+        matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
+        length = _HEAD + _EACH * len(self.responses) + len(self._tables)
+        head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
+        parts = [head, self.scale, self.yardstick, np.zeros(6), basis.ravel()]
+        for i, each in enumerate(self.responses):
+            ahead, back, gauge = self._places[i]
+            low, high = self.ends[i]
+            plane = isinstance(each, Plane)
+            least = 0.0 if isinstance(each, Plane) and _needs_no_reverse(each) else low
+            arc = (each.middle, each.half) if isinstance(each, Plane) else (0.0, 0.0)
+            rows = 2.0 if plane or self.speed[i] > 0.0 else 1.0
+            own = [rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band, self.speed[i]]
+            parts += [np.array(own), self._gain[i], self.most[i], matrix[i].ravel()]
+        return np.concatenate([*parts, self._tables])
 
 
-def _products(a: Array, b: Array) -> Array:
-    """Outer products (m, r, r) of rows (m, r)."""
-    return np.asarray(a[:, :, None] * b[:, None, :])
+_HEAD, _EACH = 59, 29
+
+
+def _tables_of(responses: list[Response], start: int) -> tuple[Array, list[tuple[int, int, int]]]:
+    """Tables of a block that begin at a place, and each actuator's places: ahead, in reverse, gauge."""
+    numbers: list[Array] = []
+    known: dict[int, int] = {}
+    end = start
+
+    def placed(own: RadialTable | Array | None) -> int:
+        nonlocal end
+        if own is None:
+            return 0
+        if isinstance(own, RadialTable):
+            own = own.origin[0]
+        if id(own) not in known:
+            new = own.numbers if isinstance(own, RadialTable) else gauge_numbers(own)
+            known[id(own)], end = end, end + len(new)
+            numbers.append(new)
+        return known[id(own)]
+
+    places = [
+        (placed(each.table), placed(each.reverse), placed(None if isinstance(each, Line) else each.gauge))
+        for each in responses
+    ]
+    return np.concatenate(numbers), places
+
+
+def gauge_numbers(gauge: Array) -> Array:
+    """A gauge (G,) as the core takes it: in each of POINTS directions the support function, its derivative and
+    the gauge; the parabola through the best three directions stands for the gauge between them."""
+    count, angle = len(gauge), np.arange(POINTS) * TURN / POINTS
+    step, psi = TURN / count, np.arange(count) * TURN / count
+    worth = gauge * np.cos(angle[:, None] - psi)
+    best, row = worth.argmax(axis=1), np.arange(POINTS)
+    before, at, after = (worth[row, (best + k) % count] for k in (-1, 0, 1))
+    bend = before - 2.0 * at + after
+    offset = np.clip(np.where(bend < 0.0, 0.5 * (before - after) / np.minimum(bend, -1e-300), 0.0), -0.5, 0.5)
+    sigma = at + offset * (0.5 * (after - before) + 0.5 * offset * bend)
+    g0, g1, g2 = (gauge[(best + k) % count] for k in (-1, 0, 1))
+    rho = g1 + offset * (0.5 * (g2 - g0) + 0.5 * offset * (g0 - 2.0 * g1 + g2))
+    slope = -rho * np.sin(angle - psi[best] - offset * step)
+    own = np.interp(angle, np.append(psi, TURN), np.append(gauge, gauge[0]))
+    return np.concatenate([[POINTS], np.stack([sigma, slope, own], axis=-1).ravel()])
+
+
+def _usual_price(response: Response) -> float:
+    """Price [W/N] of an actuator's largest force where power grows as its power of 1.5 from half of it on: at
+    the peak of a soft fin the price itself says nothing of the forces below."""
+    prices = []
+    for table in filter(None, (response.table, response.reverse)):
+        middle = 0.5 * (table.force[0] + table.force[-1])
+        price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.top)))
+        prices.append(min(max(price, CLOSE * table.top), table.top))
+    return max(prices)
 
 
 def _needs_no_reverse(plane: Plane) -> bool:
@@ -188,20 +160,3 @@ def _needs_no_reverse(plane: Plane) -> bool:
     price = price_grid(back.top)
     own = np.interp(price, price_grid(ahead.top), ahead.force)
     return bool((own >= back.force * (1.0 - NEARLY)).all())
-
-
-def limited_sets(answers: Answers, low: Array, high: Array, arcs: Array) -> Sets:
-    """Sets of actuators between forces (n, 1) [N] of their tables, of planes below 0 in reverse, in arcs
-    (p, 2), middles and halves [rad]."""
-    lines = answers.lines
-    plane = (np.arange(len(low)) >= lines)[:, None]
-    flipped, back = plane & (high <= 0.0) & (low < 0.0), plane & (low < 0.0)
-    near = np.where(flipped, high, np.where(back, 0.0, low))
-    far = np.where(flipped, low, high)
-    cost = answers.marginal(np.concatenate([near, far, low], axis=1))[1]
-    reverse = np.where(back & ~flipped, -low, 0.0)[lines:]
-    near, far = np.where(plane, np.abs(near), near), np.where(plane, np.abs(far), far)
-    turned, (low_cost, high_cost, other) = flipped[lines:], np.split(cost, 3, axis=1)
-    middle, half = arcs[:, :1] + np.pi * turned, arcs[:, 1:]
-    flips = turned.astype(np.float64)
-    return Sets(near, far, low_cost, high_cost, middle, half, reverse, other[lines:], flips)

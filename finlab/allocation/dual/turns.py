@@ -11,12 +11,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finlab.allocation.dual.newton import Deadline
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.core.calls import Found
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, ROUNDS
 
@@ -31,6 +32,17 @@ IN_A_TICK, RANDOM, FOLLOWED = 2, 3, 2
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
 WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 """Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
+
+
+class Forces(NamedTuple):
+    """What the dual gives for N targets."""
+
+    found: Found
+    """Forces, prices and wrenches."""
+    inner: Array | None = None
+    """Prices (r,) of a single target in the robot's basis [W]."""
+    command: Array | None = None
+    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
 
 
 class Linear(NamedTuple):
@@ -75,11 +87,10 @@ def settled(
     dual: Any, targets: Array, policy: Policy, previous: Array | None, prices: Array | None
 ) -> Solution:
     """Returns the answers of method `dual` to targets (N, 6); arguments as for `Dual.solve`."""
-    deadline = Deadline(len(targets))
-    each = [Turns(dual, target[None], policy, previous, deadline).settled(prices) for target in targets]
+    each = [Turns(dual, target[None], policy, previous).settled(prices) for target in targets]
     command, aim, price = (np.concatenate(parts) for parts in list(zip(*each, strict=True))[:3])
     missed = np.array([one.error > NEARLY for one in each])
-    notes = dual.not_held(targets[missed]) | deadline.notes
+    notes = dual.not_held(targets[missed])
     bound = None if dual.unproved else partial(dual.bound, aim, price, np.zeros(len(aim)))
     return Solution(command, bound, prices=price, notes=tuple(sorted(notes - {""})))
 
@@ -87,12 +98,9 @@ def settled(
 class Turns:
     """The turns for one target."""
 
-    def __init__(
-        self, dual: Any, target: Array, policy: Policy, previous: Array | None, deadline: Deadline
-    ) -> None:
+    def __init__(self, dual: Any, target: Array, policy: Policy, previous: Array | None) -> None:
         """Takes a method `Dual` and a target (1, 6); the rest as for `Dual.solve`."""
-        self.dual, self.target, self.policy = dual, target, policy
-        self.previous, self.deadline = previous, deadline
+        self.dual, self.target, self.policy, self.previous = dual, target, policy, previous
 
     def settled(self, prices: Array | None) -> Settled:
         """Returns the best answer that turns from the previous command, or from several beginnings, come
@@ -100,10 +108,10 @@ class Turns:
         dual = self.dual
         if self.previous is not None:
             return self._from(self.previous[None], prices)
-        laws = dual.forces(self.target - dual.compiled.beside, self.policy, self.deadline, dual.begin(prices))
+        laws = dual.forces(self.target - dual.compiled.beside, self.policy, dual.begin(prices)).found
         best = self._from(self._exact(laws.force), laws.price[0])
         if best.power > (1.0 + 10.0 * CLOSE) * self._power(dual.compiled.commands(laws.force)):
-            tried = self._exact(_turned_aside(laws.force, dual.compiled.robot.answers))
+            tried = self._exact(_turned_aside(laws.force[0], dual.compiled.robot.lines))
             merits = np.array([self._merit(one[None], best.worth) for one in tried])
             for k in np.argsort(merits)[:FOLLOWED]:
                 other = self._from(tried[k : k + 1], laws.price[0])
@@ -116,16 +124,16 @@ class Turns:
             force = dual.plant.force(command)
             linear = dual.linear(linear_at(dual.plant, force[0]))
             start = None if price is None else linear.begin(price)
-            own = linear.forces(self.target - linear.compiled.beside, self.policy, self.deadline, start)
-            price = own.price[0]
+            own = linear.forces(self.target - linear.compiled.beside, self.policy, start)
+            price = own.found.price[0]
             # Twice what an error is worth at these prices: an exact penalty.
             worth = max(worth, 2.0 * float(np.linalg.norm(price * dual.scale)))
             before = self._merit(command, worth) if last is None else merit
             last = last or (linear, own)
-            command, merit = self._shorter(command, force[0], own.force, before, worth)
+            command, merit = self._shorter(command, force[0], own.found.force[0], before, worth)
             if merit < before:
                 last = linear, own
-            if before - merit <= 2.0 * CLOSE * before or self.deadline.passed():
+            if before - merit <= 2.0 * CLOSE * before:
                 break
         assert last is not None
         linear, own = last
@@ -134,11 +142,11 @@ class Turns:
     def _shorter(
         self, command: Array, force: Array, there: Array, merit: float, worth: float
     ) -> tuple[Array, float]:
-        """A command on the way from forces (n, 3) to forces (k, 1) that has less merit, and that; the old
+        """A command on the way from forces (n, 3) to forces (n, 2) that has less merit, and that; the old
         ones where none is found."""
         here, size = self.dual.compiled.forces_along(force), 1.0
         for _ in range(HALVINGS):
-            tried = self._exact(here + size * (there - here))
+            tried = self._exact((here + size * (there - here))[None])
             new = self._merit(tried, worth)
             if new < merit:
                 return tried, new
@@ -147,17 +155,17 @@ class Turns:
 
     def _ended(self, command: Array, linear: Any, own: Any, worth: float) -> Settled:
         dual, previous, target = self.dual, self.previous, self.target
-        aim = target if own.within.all() else own.aim + linear.compiled.beside
-        force = dual.compiled.forces_along(dual.plant.force(command)[0])
-        command = linear.commands(aim, own._replace(force=force, command=None), previous)
-        if self.policy.kind == "direction" and not own.within.all():
+        aim = target if own.found.within.all() else own.found.aim + linear.compiled.beside
+        force = dual.compiled.forces_along(dual.plant.force(command)[0])[None]
+        command = linear.commands(aim, Forces(own.found._replace(force=force)), previous)
+        if self.policy.kind == "direction" and not own.found.within.all():
             command, aim = _on_the_ray(dual, target, command)
         if previous is not None and not dual.rates.allow(previous, command[0]):
             command = linear.in_a_tick(aim, own, previous)
-        return Settled(command, aim, own.price, self._power(command), worth, self._error(command))
+        return Settled(command, aim, own.found.price, self._power(command), worth, self._error(command))
 
     def _exact(self, force: Array) -> Array:
-        """Commands (1, n, 3) near to forces (k, 1) that give the target, nearly."""
+        """Commands (K, n, 3) near to forces (K, n, 2) that give the target, nearly."""
         command = self.dual.compiled.commands(force, self.previous)
         wanted = self.target / self.dual.scale
         return np.asarray(
@@ -194,21 +202,19 @@ def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]
     return best, low * target
 
 
-def _turned_aside(force: Array, answers: Any) -> Array:
-    """Other forces (k, 12) to begin at: those of planes turned one way or the other, in the patterns of
-    Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a symmetric
-    robot has no slope that would turn it aside, and which of two jets gives way is a choice between
+def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
+    """Other forces (12, n, 2) to begin at than (n, 2): those of planes turned one way or the other, in the
+    patterns of Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a
+    symmetric robot has no slope that would turn it aside, and which of two jets gives way is a choice between
     minima."""
-    lines, planes, rng = answers.lines, answers.planes, np.random.default_rng(0)
-    signs = WALSH[np.arange(planes) % len(WALSH)]
-    angle = ASIDE * np.concatenate([signs, -signs[:, :1], rng.normal(size=(planes, RANDOM))], axis=1)
-    size = rng.uniform(0.0, 2.0, (lines + planes, angle.shape[1]))
-    size[lines:, : len(WALSH) + 1] = 1.0
-    turned = np.repeat(force, angle.shape[1], axis=1)
-    first, second = answers.pair(force)
-    turned[:lines] *= size[:lines]
-    turned[lines : lines + planes] = size[lines:] * (np.cos(angle) * first - np.sin(angle) * second)
-    turned[lines + planes : lines + 2 * planes] = size[lines:] * (
-        np.sin(angle) * first + np.cos(angle) * second
-    )
-    return turned
+    planes, rng = np.flatnonzero(~lines), np.random.default_rng(0)
+    signs = WALSH[np.arange(len(planes)) % len(WALSH)]
+    angle = np.zeros((len(WALSH) + 1 + RANDOM, len(lines)))
+    own = np.concatenate([signs, -signs[:, :1], rng.normal(size=(len(planes), RANDOM))], axis=1)
+    angle[:, planes] = ASIDE * own.T
+    size = np.ones(angle.shape)
+    size[len(WALSH) + 1 :] = rng.uniform(0.0, 2.0, (RANDOM, len(lines)))
+    size[:, lines] = rng.uniform(0.0, 2.0, (len(size), lines.sum()))
+    cos, sin = np.cos(angle), np.sin(angle)
+    turned = np.stack([cos * force[:, 0] - sin * force[:, 1], sin * force[:, 0] + cos * force[:, 1]], axis=-1)
+    return np.asarray(size[..., None] * turned)

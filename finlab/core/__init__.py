@@ -1,0 +1,1 @@
+"""The dual allocator's core in C, and its calls."""

@@ -1,0 +1,187 @@
+/* One target after the other: least power where it is within reach, else what a policy gives in its place. */
+#include "inner.h"
+
+int fl_version(void) { return FL_VERSION; }
+
+int fl_sizes(int which) {
+  const int sizes[] = {sizeof(real), sizeof(fl_head), sizeof(fl_actuator), sizeof(fl_work),
+                       sizeof(fl_policy), sizeof(fl_answer), FL_MOST};
+  return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
+}
+
+static int is_finite(const real *values, int count) {
+  for (int k = 0; k < count; k++)
+    if (!(FABS(values[k]) <= R(1e30))) return 0;
+  return 1;
+}
+
+static int is_place(real place, real length, int numbers) {
+  return place == FLOOR(place) && place >= 0 && place + numbers <= length;
+}
+
+/* Whether there is a table, or a gauge, at a place: its cells, or points, are few enough to lie in the block. */
+static int is_table(const real *block, real place, real length, int counted, int each, int more) {
+  if (!(place > 0 && is_place(place, length, 3))) return 0;
+  real count = block[(int)place + counted];
+  return count >= 1 && count <= 65536 && count == FLOOR(count) &&
+         is_place(place, length, (counted ? 3 : 1) + each * ((int)count + more));
+}
+
+/* Whether a block can be worked with; an error code. */
+int fl_check(const real *block, int length) {
+  const int head = sizeof(fl_head) / sizeof(real), own = sizeof(fl_actuator) / sizeof(real);
+  if (length < head || block[0] != FL_MAGIC || HEAD(block)->length != length) return FL_BAD_BLOCK;
+  if (block[1] != FL_VERSION) return FL_BAD_VERSION;
+  if (!is_finite(block, length)) return FL_BAD_NUMBER;
+  const fl_head *h = HEAD(block);
+  if (!(h->n >= 1 && h->n <= FL_MOST && h->n == FLOOR(h->n) && length >= head + own * (int)h->n)) return FL_BAD_BLOCK;
+  if (!(h->range >= 0 && h->range <= 6 && h->range == FLOOR(h->range))) return FL_BAD_BLOCK;
+  for (int k = 0; k < 6; k++)
+    if (!(h->scale[k] > 0 && h->yard[k] > 0)) return FL_BAD_NUMBER;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    if (a->rows != 1 && a->rows != 2) return FL_BAD_BLOCK;
+    if (!is_table(block, a->ahead, h->length, 1, 3, 1)) return FL_BAD_BLOCK;
+    if (a->back != 0 && !is_table(block, a->back, h->length, 1, 3, 1)) return FL_BAD_BLOCK;
+    if (a->gauge != 0 && !is_table(block, a->gauge, h->length, 0, 3, 0)) return FL_BAD_BLOCK;
+    if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;
+    if (!(a->share > 0 && a->worth > 0 && a->most[0] > 0 && a->low <= a->high && a->half >= 0)) return FL_BAD_NUMBER;
+    if (!(a->band >= 0 && a->speed >= 0 && a->gain[0] >= 0 && a->gain[1] >= 0)) return FL_BAD_NUMBER;
+  }
+  return 0;
+}
+
+static int in_range(const real *block, const real *wrench, const real *target) {
+  const fl_head *h = HEAD(block);
+  real rest = 0, size = 0;
+  for (int k = 0; k < 6; k++) {
+    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
+    rest += left * left, size += scaled * scaled;
+  }
+  return SQRT(rest) <= NEARLY * (R(1e-3) + SQRT(size));
+}
+
+/* Limits of the forces: rows of least and largest force, middle and half of the arc; none for all. */
+static void set_limits(const real *block, fl_work *work, const real *limits) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const real *own = limits ? limits + 4 * i : 0;
+    if (own)
+      limit(block, i, work->set + i, CLIP(own[0], a->low, a->high), CLIP(own[1], a->low, a->high), own[2], own[3]);
+    else
+      limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
+  }
+  sums_of(block, work);
+}
+
+static void answer(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, const real *price,
+                   fl_answer *out) {
+  int n = COUNT(block), r = RANGE(block);
+  real target[6];
+  memset(out, 0, sizeof *out);
+  work->steps = work->ended = 0;
+  memcpy(out->aim, wrench, sizeof out->aim);
+  to_basis(block, wrench, target);
+  if (r == 0) { /* nothing pushes, such as foils at rest */
+    out->within = 1;
+    for (int k = 0; k < 6; k++) out->within &= wrench[k] == 0, out->aim[k] = 0;
+    return;
+  }
+  int status = newton(block, work, target, price, work->torn ? STEPS_AT_KINK : MOST_STEPS);
+  int within = (status == FL_MET || (status == FL_STUCK && work->torn)) && in_range(block, wrench, target);
+  out->status = status;
+  memcpy(out->inner, work->now->price, sizeof out->inner);
+  memcpy(out->force, work->now->force, n * sizeof out->force[0]);
+  if (may_have_gaps(block, work, out->force)) {
+    int inside = worst_gap(block, work, out->force, out->inner) >= 0;
+    if (within && inside) {
+      real value;
+      within = least_power(block, work, target, status, &value);
+      if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
+      out->value = within ? value * (1 - FINE) : 0;
+    } else
+      within &= status == FL_MET;
+  }
+  out->within = within;
+  if (!within && policy) in_its_place(block, work, wrench, policy, out);
+  for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
+  out->steps = work->steps, out->ended = work->ended;
+}
+
+/* Forces for a wrench, of which what is on top of the forces is taken off already; Newton's method begins at prices
+   in the basis, where there are some, and forces keep within limits (n, 4), where there are some. */
+int fl_answer_one(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, const real *price,
+                  const real *limits, fl_answer *out) {
+  if (!is_finite(wrench, 6) || (price && !is_finite(price, 6))) return FL_BAD_ARGUMENT;
+  if (limits && !is_finite(limits, 4 * COUNT(block))) return FL_BAD_ARGUMENT;
+  if (limits) set_limits(block, work, limits);
+  answer(block, work, wrench, policy, price, out);
+  if (limits) set_limits(block, work, 0);
+  return 0;
+}
+
+/* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, within. */
+int fl_answer_many(const real *block, fl_work *work, const real *wrench, int count, const fl_policy *policy,
+                   real *force, real *price, real *aim, real *value, unsigned char *within) {
+  int n = COUNT(block), ended = 0;
+  fl_answer out;
+  for (int k = 0; k < count; k++) {
+    int error = fl_answer_one(block, work, wrench + 6 * k, policy, 0, 0, &out);
+    if (error) return error;
+    memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
+    memcpy(price + 6 * k, out.price, sizeof out.price);
+    memcpy(aim + 6 * k, out.aim, sizeof out.aim);
+    value[k] = out.value, within[k] = out.within, ended |= out.ended;
+  }
+  return ended ? -1 : 0;
+}
+
+/* What prices (6,) of the wrench in the basis [W] give: forces (n, 2), and the dual value for a wrench. */
+real fl_look(const real *block, fl_work *work, const real *wrench, const real *inner, real *force) {
+  real target[6];
+  to_basis(block, wrench, target);
+  look(block, work, target, inner, work->state);
+  memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
+  return work->state->value;
+}
+
+/* Prices in the basis to begin with for a wrench. */
+void fl_first(const real *block, fl_work *work, const real *wrench, real *inner) {
+  real target[6], ridge;
+  to_basis(block, wrench, target);
+  first_price(block, work, target, inner, &ridge);
+}
+
+/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 3): prices along its force, ahead and
+   in reverse, and what the force is worth, less its power [W]. */
+void fl_worth(const real *block, fl_work *work, const real *price, int count, real *worth) {
+  const fl_head *h = HEAD(block);
+  int r = RANGE(block);
+  for (int k = 0; k < count; k++, price += 6) {
+    real inner[6] = {0};
+    for (int j = 0; j < r; j++)
+      for (int m = 0; m < 6; m++) inner[j] += h->basis[m][j] * h->scale[m] * price[m];
+    for (int i = 0; i < COUNT(block); i++, worth += 3) {
+      const fl_actuator *a = ACTUATOR(block, i);
+      real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
+      along_of(block, i, work->set + i, own, worth, worth + 1);
+      worth[2] = reply_of(block, i, work->set + i, own).conjugate;
+    }
+  }
+}
+
+/* Forces (count, n, 2) that are worth most at prices (count, 6) of the wrench, whatever their power. */
+void fl_support(const real *block, fl_work *work, const real *price, int count, real *force) {
+  const fl_head *h = HEAD(block);
+  int r = RANGE(block);
+  for (int k = 0; k < count; k++, price += 6) {
+    real inner[6] = {0};
+    for (int j = 0; j < r; j++)
+      for (int m = 0; m < 6; m++) inner[j] += h->basis[m][j] * h->scale[m] * price[m];
+    for (int i = 0; i < COUNT(block); i++, force += 2) {
+      const fl_actuator *a = ACTUATOR(block, i);
+      real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
+      farthest_of(block, i, work->set + i, own, force);
+    }
+  }
+}

@@ -1,0 +1,121 @@
+/* The dual allocator in C99: no heap, no library but math.h. Everything a robot needs is one block of numbers
+   (see `layout of a block` below) that Python compiles; everything that changes is in one work area.
+
+   A target wrench w is met at least power by prices l: each actuator answers the price B'l of its own
+   directions with the force that is worth most there, and Newton's method finds the prices at which the
+   answers add up to w. docs/method.md has the mathematics. */
+#ifndef FINLAB_CORE_H
+#define FINLAB_CORE_H
+
+#ifdef FL_SINGLE
+typedef float fl_real;
+#else
+typedef double fl_real;
+#endif
+
+#ifndef FL_MOST
+#define FL_MOST 64 /* actuators */
+#endif
+#define FL_VERSION 1
+#define FL_MAGIC 41721 /* first number of a block */
+
+/* Layout of a block: an `fl_head`, then an `fl_actuator` for each of the n actuators, then their tables. All
+   members are numbers of one type, so both are read where they lie. Places count numbers from the block's
+   first one; 0 stands for a table that is not there. */
+typedef struct {
+  fl_real magic, version, length, n, range; /* length: numbers in the block; range: of the effectiveness, r */
+  fl_real scale[6];                         /* wrench = scale * scaled wrench [N, N m] */
+  fl_real yard[6];                          /* yardstick of errors [N, N m] */
+  fl_real beside[6];                        /* wrench on top of that of the forces [N, N m] */
+  fl_real basis[6][6];                      /* 6 x r: directions of scaled wrenches that are driven */
+} fl_head;
+
+typedef struct {
+  fl_real rows;          /* 1: a force along one direction; 2: in a plane, or a lift and its drag */
+  fl_real ahead, back;   /* places of tables of force over price, ahead and in reverse */
+  fl_real share, worth;  /* force and power of this actuator over those of its tables */
+  fl_real gauge;         /* place of a gauge: how the force differs between directions */
+  fl_real low, high;     /* least and largest force [N]; of planes below 0 against their direction */
+  fl_real least;         /* the same as low, but 0 where a plane needs no reverse */
+  fl_real middle, half;  /* of the arc of directions [rad]; half is pi for all of them */
+  fl_real band;          /* forces smaller than this, other than 0, cannot be held [N] */
+  fl_real speed;         /* above 0: the second row is drag, whose power is speed times drag [m/s] */
+  fl_real gain[2];       /* force over price of each row at the largest force, by half of it [N^2/W] */
+  fl_real most[2];       /* largest force of each row [N] */
+  fl_real matrix[2][6];  /* scaled wrench in the basis per newton of each row */
+} fl_actuator;
+
+/* A table: price of the largest force, cells k, power of the least force; then force, its derivative by the
+   price, conjugate at k + 1 prices top (j / k)^4. A gauge: points p; then support function, its derivative
+   and the gauge in p directions around the circle. */
+
+typedef struct { /* what one actuator may give now */
+  fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
+  fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
+  int live, flipped, forked;
+} fl_set;
+
+typedef struct { /* prices, and what they give */
+  fl_real price[6], residual[6], hessian[6][6], force[FL_MOST][2];
+  fl_real value, size, trace; /* dual value [W], size of the residual, trace of the hessian */
+} fl_state;
+
+#define FL_POINTS 8              /* of a mixture near to a point out of reach */
+#define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
+
+typedef struct {
+  fl_real force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6], at[6];
+  int count;
+} fl_mixture;
+
+typedef struct { /* a part of sets with gaps on the way down */
+  fl_set before;
+  fl_real price[6], force[2];
+  int cut, first, both; /* actuator, side taken first, whether the other one was taken, too */
+} fl_node;
+
+typedef struct {
+  fl_set set[FL_MOST];
+  fl_state state[2], *now; /* what Newton's method looks at, and what it came to */
+  fl_mixture mixture;
+  fl_node node[FL_DEPTH];
+  fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
+  fl_real best[FL_MOST][2];                /* forces of the best part */
+  fl_real metric[6][6], factor[6][6], least_trace, most_cost, largest_power;
+  int quick, torn, steps, ended;
+} fl_work;
+
+enum { FL_MET, FL_BEYOND, FL_STUCK };
+enum { FL_CLOSEST, FL_DIRECTION, FL_PRIORITY };
+typedef struct {
+  int policy, groups;
+  fl_real weight[6];     /* of the axes, largest 1, for FL_CLOSEST */
+  unsigned char group[6][6]; /* axes of each group, for FL_PRIORITY */
+} fl_policy;
+
+typedef struct {
+  fl_real force[FL_MOST][2]; /* of each actuator's rows [N] */
+  fl_real price[6];          /* of the wrench [W/N, W/(N m)] */
+  fl_real inner[6];          /* the same in the basis [W] */
+  fl_real aim[6];            /* wrench that the forces give [N, N m] */
+  fl_real value;             /* power that gaps are proved to need [W] */
+  int status, within;        /* of Newton's method (FL_MET ...); within reach */
+  int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
+} fl_answer;
+
+/* Error codes; 0 is none. */
+enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
+
+int fl_version(void);
+int fl_sizes(int which); /* bytes of fl_real, fl_work, fl_policy, fl_answer; then FL_MOST */
+int fl_check(const fl_real *block, int length);
+int fl_prepare(const fl_real *block, fl_work *work);
+int fl_answer_one(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_policy *policy,
+                  const fl_real *price, const fl_real *limits, fl_answer *out);
+int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, int count, const fl_policy *policy,
+                   fl_real *force, fl_real *price, fl_real *aim, fl_real *value, unsigned char *within);
+void fl_support(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *force);
+void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
+void fl_first(const fl_real *block, fl_work *work, const fl_real *wrench, fl_real *inner);
+fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
+#endif

@@ -1,0 +1,221 @@
+/* Sets with gaps: wide arcs, forces that cannot rest, dead bands, pods that push either way. The dual is that
+   of their convex hulls. Where its answer puts an actuator into a gap, the gap is cut in two. First every gap
+   is left on its nearer side, which mostly gives a good answer. Then both sides of one cut after another are
+   solved, depth first; a part whose dual value proves that it is no cheaper is left out. */
+#include "inner.h"
+
+#define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
+#define NARROW R(0.2)  /* half of an arc up to which the chord stands for the arc of the least forces */
+#define MOST_PARTS 300
+
+static int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
+static real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
+
+/* How far a plane's force is from all that it can give forward and in reverse. */
+static real between_ways(const fl_actuator *a, const fl_set *set, const real *force, real size) {
+  real angle = ATAN2(force[1], force[0]) - set->middle, ends[2] = {set->high, set->reverse};
+  if (size <= NEARLY * a->most[0]) return 0;
+  for (int way = 0; way < 2; way++)
+    if (FABS(wrapped(angle + way * PI)) - set->half <= CLOSE && size <= ends[way] + NEARLY * a->most[0]) return 0;
+  return PI;
+}
+
+/* How far a force is in a gap of its set; 0 where it is not. One that comes from prices is in one where it is
+   between what an actuator gives forward and in reverse, but not where it drags more than lift does: that is
+   left to the commands. */
+static real gap_of(const real *block, int i, const fl_set *set, const real *force, real largest,
+                   const real *price) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  if (!is_plane(a)) {
+    real size = FABS(force[0]), over;
+    if (a->speed > 0) {
+      over = price ? 0 : (force[1] - drag_of(block, i, force[0])) / a->most[1];
+      return over > HOLLOW ? over : 0;
+    }
+    return size < a->band * (1 - NOTHING) && size > NOTHING * a->most[0] && set->low < set->high;
+  }
+  real size = size_of(force), amount = 0;
+  if (set->reverse > 0 && !price) return between_ways(a, set, force, size);
+  if (set->half > NARROW) {
+    real off = FABS(wrapped(ATAN2(force[1], force[0]) - set->middle)) - set->half;
+    if (off > CLOSE && size > NEARLY * a->most[0]) amount += off;
+    if (set->low > HOLLOW * largest && size < R(0.98) * set->low) amount += 1 - size / set->low;
+  }
+  if (set->reverse > 0) {
+    real own[2] = {dot(a->matrix[0], price, RANGE(block)), dot(a->matrix[1], price, RANGE(block))}, off;
+    int ahead = undecided(block, i, set, own, &off);
+    return off > CLOSE * a->most[0] ? PI : ahead ? amount : 0;
+  }
+  return amount;
+}
+
+static real largest_of(const real *block, real force[][2]) {
+  real largest = 0;
+  for (int i = 0; i < COUNT(block); i++)
+    largest = MAX(largest, is_plane(ACTUATOR(block, i)) ? size_of(force[i]) : FABS(force[i][0]));
+  return largest;
+}
+
+/* The actuator whose force is farthest in a gap; -1 where none is. */
+int worst_gap(const real *block, const fl_work *work, real force[][2], const real *price) {
+  real worst = 0, largest = largest_of(block, force);
+  int which = -1;
+  for (int i = 0; i < COUNT(block); i++) {
+    real amount = gap_of(block, i, work->set + i, force[i], largest, price);
+    if (amount > worst) worst = amount, which = i;
+  }
+  return which;
+}
+
+int may_have_gaps(const real *block, const fl_work *work, real force[][2]) {
+  if (!work->quick) return 1;
+  for (int i = 0; i < COUNT(block); i++)
+    if (is_plane(ACTUATOR(block, i)) && size_of(force[i]) < R(0.98) * work->set[i].low) return 1;
+  return 0;
+}
+
+/* The side of a gap on which a force is rather. */
+int nearer_side(const real *block, int i, const fl_set *set, const real *force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  if (a->speed > 0) return force[0] < (set->low + set->high) / 2 ? -1 : 1;
+  if (!is_plane(a)) return FABS(force[0]) > a->band / 2 ? 1 : -1;
+  if (set->half >= PI && set->reverse == 0) return 1;
+  real off = wrapped(ATAN2(force[1], force[0]) - set->middle);
+  return (set->reverse > 0 ? COS(off) : off) < 0 ? -1 : 1;
+}
+
+/* Cuts a set by a force and keeps one side: of an arc the half towards smaller (-1) or larger angles (1), of a
+   full circle that away from or around the force, of either way reverse or the rest, of a dead band rest or
+   what is beyond, of drag less or more. */
+void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  if (is_plane(a)) {
+    if (set->reverse > 0) {
+      if (side < 0) {
+        set->high = set->reverse, set->high_cost = set->reverse_cost;
+        set->middle += PI, set->flipped = 1;
+      }
+      set->reverse = 0;
+    } else {
+      real angle = ATAN2(force[1], force[0]);
+      set->middle = wrapped(set->half >= PI ? angle + (side > 0 ? 0 : PI) : set->middle + side * set->half / 2);
+      set->half /= 2;
+    }
+  } else {
+    real edge = a->speed > 0 ? force[0] : side > 0 ? (force[0] > 0 ? a->band : -a->band) : 0;
+    real cost = cost_at(block, i, edge);
+    int above = a->speed > 0 ? side > 0 : (side > 0) == (force[0] > 0);
+    if (above)
+      set->low = edge, set->low_cost = cost;
+    else
+      set->high = edge, set->high_cost = cost;
+  }
+  set_up(block, i, set);
+}
+
+/* Cuts a gap and takes its nearer side. */
+int descend(const real *block, fl_work *work, int *depth, int cut, real force[][2], const real *price) {
+  if (*depth >= FL_DEPTH) return 0;
+  fl_node *node = work->node + (*depth)++;
+  node->before = work->set[cut], node->cut = cut, node->both = 0;
+  node->force[0] = force[cut][0], node->force[1] = force[cut][1];
+  if (price) memcpy(node->price, price, sizeof node->price);
+  node->first = nearer_side(block, cut, work->set + cut, node->force);
+  narrow(block, cut, work->set + cut, node->force, node->first);
+  sums_of(block, work);
+  return 1;
+}
+
+/* Goes back to the last cut whose other side was not taken and takes it; 0 where there is none. */
+int turn_back(const real *block, fl_work *work, int *depth) {
+  while (*depth > 0) {
+    fl_node *node = work->node + *depth - 1;
+    work->set[node->cut] = node->before;
+    if (!node->both) {
+      node->both = 1;
+      narrow(block, node->cut, work->set + node->cut, node->force, -node->first);
+      sums_of(block, work);
+      return 1;
+    }
+    --*depth;
+  }
+  sums_of(block, work);
+  return 0;
+}
+
+/* Whether forces are met by what the actuators can give. The smoothed dual of a narrow arc may have a force
+   that is smaller than any in it. */
+static int is_full(const real *block, const fl_work *work, int status, int gap) {
+  if (status != FL_MET || gap >= 0) return 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_set *s = work->set + i;
+    if (is_plane(ACTUATOR(block, i)) && s->half <= NARROW && size_of(work->now->force[i]) < R(0.9) * s->low)
+      return 0;
+  }
+  return 1;
+}
+
+/* Remembers an answer without a gap; whether one with a gap could still be cheaper. */
+static int keep(const real *block, fl_work *work, int status, int gap, real *best) {
+  real value = work->now->value;
+  if (is_full(block, work, status, gap)) {
+    if (value < *best) *best = value, memcpy(work->best, work->now->force, sizeof work->best);
+    return 0;
+  }
+  return (status == FL_MET || (status == FL_STUCK && gap >= 0)) && value < *best * (1 - CLOSE);
+}
+
+/* All gaps left on their nearer sides; forces that cannot rest keep their direction. */
+static void dive(const real *block, fl_work *work, const real *target, int status, real *best) {
+  real price[6];
+  for (int round = 0; round < ROUNDS; round++) {
+    const fl_state *s = work->now;
+    real largest = largest_of(block, (real(*)[2])s->force);
+    int gap = worst_gap(block, work, (real(*)[2])s->force, s->price);
+    if (!keep(block, work, status, gap, best) || gap < 0) return;
+    for (int i = 0; i < COUNT(block); i++) {
+      fl_set *set = work->set + i;
+      real force[2] = {s->force[i][0], s->force[i][1]};
+      if (!(gap_of(block, i, set, force, largest, s->price) > 0)) continue;
+      if (is_plane(ACTUATOR(block, i)) && size_of(force) < R(0.98) * set->low) {
+        real off = CLIP(wrapped(ATAN2(force[1], force[0]) - set->middle), -set->half, set->half);
+        force[0] = set->low * COS(set->middle + off), force[1] = set->low * SIN(set->middle + off);
+        freeze(block, i, set, force);
+      } else
+        narrow(block, i, set, force, nearer_side(block, i, set, force));
+    }
+    sums_of(block, work);
+    memcpy(price, s->price, sizeof price);
+    status = newton(block, work, target, price, STEPS_AT_KINK);
+  }
+}
+
+/* Least power for a target at whose prices some force is in a gap: forces in work->best, and the power [W] that
+   no forces in the sets undercut; 0 where no part meets the target. */
+int least_power(const real *block, fl_work *work, const real *target, int status, real *value) {
+  real best = R(1e30), bound = R(1e30), price[6];
+  int depth = 0, parts = 0, root = status;
+  memcpy(work->kept, work->set, sizeof work->kept);
+  memcpy(price, work->now->price, sizeof price);
+  dive(block, work, target, status, &best);
+  memcpy(work->set, work->kept, sizeof work->kept);
+  sums_of(block, work);
+  look(block, work, target, price, work->state);
+  work->now = work->state;
+  for (status = root;; parts++) {
+    fl_state *s = work->now;
+    int gap = worst_gap(block, work, s->force, s->price);
+    int open = keep(block, work, status, gap, &best) && gap >= 0;
+    if (parts >= MOST_PARTS) work->ended = 1, open = 0;
+    if (!open || !descend(block, work, &depth, gap, s->force, s->price)) {
+      if (status != FL_BEYOND) bound = MIN(bound, s->value);
+      if (parts >= MOST_PARTS) bound = MIN(bound, work->now->value);
+      if (!turn_back(block, work, &depth)) break;
+    }
+    status = newton(block, work, target, work->node[depth - 1].price, STEPS_AT_KINK);
+  }
+  memcpy(work->set, work->kept, sizeof work->kept);
+  sums_of(block, work);
+  *value = bound;
+  return best < R(1e30);
+}

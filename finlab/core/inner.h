@@ -1,0 +1,105 @@
+/* What the files of the core share. */
+#ifndef FINLAB_INNER_H
+#define FINLAB_INNER_H
+#include "core.h"
+#include <math.h>
+#include <string.h>
+
+typedef fl_real real;
+#ifdef FL_SINGLE
+#define R(x) x##f
+#define SQRT sqrtf
+#define SIN sinf
+#define COS cosf
+#define ATAN2 atan2f
+#define EXP expf
+#define FLOOR floorf
+#define FABS fabsf
+#define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
+#define ROUNDING R(1e-6)
+#define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
+#define TINY R(1e-30)
+#else
+#define R(x) x
+#define SQRT sqrt
+#define SIN sin
+#define COS cos
+#define ATAN2 atan2
+#define EXP exp
+#define FLOOR floor
+#define FABS fabs
+#define TOLERANCE 1e-10
+#define ROUNDING 1e-12
+#define CLOSE_BY 1e-9
+#define TINY 1e-300
+#endif
+#define PI R(3.14159265358979323846)
+#define NOTHING R(1e-9)
+#define NEARLY R(1e-6)
+#define FINE R(1e-5)
+#define CLOSE R(1e-4)
+#define ROUNDS 12
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define CLIP(x, low, high) MIN(MAX(x, low), high)
+
+#define HEAD(block) ((const fl_head *)(block))
+#define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
+#define COUNT(block) ((int)HEAD(block)->n)
+#define RANGE(block) ((int)HEAD(block)->range)
+
+/* linear.c */
+real dot(const real *a, const real *b, int n);
+real wrapped(real angle);
+int cholesky(real a[6][6], real factor[6][6], int n);
+void solve(real factor[6][6], const real *right, real *x, int n);
+void affine(real point[][6], int count, const real *target, real *share);
+
+/* table.c */
+typedef struct { real force, slope, conjugate; } along;
+along radial(const real *table, real price);
+real marginal(const real *table, real size, real *price);
+typedef struct { real value, slope, bend; } support;
+support gauge_support(const real *gauge, real x, real y);
+real gauge_at(const real *gauge, real angle);
+
+/* reply.c */
+typedef struct { real force[2], xx, xy, yy, conjugate; } reply;
+void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half);
+void set_up(const real *block, int i, fl_set *set);
+void freeze(const real *block, int i, fl_set *set, const real *force);
+real cost_at(const real *block, int i, real force);
+reply reply_of(const real *block, int i, const fl_set *set, const real *price);
+void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force);
+real drag_of(const real *block, int i, real force);
+void along_of(const real *block, int i, const fl_set *set, const real *price, real *ahead, real *back);
+int undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
+
+/* newton.c */
+#define MOST_STEPS 200
+void sums_of(const real *block, fl_work *work);
+void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
+void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
+int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
+void to_basis(const real *block, const real *wrench, real *target);
+void wrench_of(const real *block, real force[][2], real *wrench);
+
+/* gaps.c */
+#define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
+int worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
+int nearer_side(const real *block, int i, const fl_set *set, const real *force);
+void narrow(const real *block, int i, fl_set *set, const real *force, int side);
+int may_have_gaps(const real *block, const fl_work *work, real force[][2]);
+int descend(const real *block, fl_work *work, int *depth, int cut, real force[][2], const real *price);
+int turn_back(const real *block, fl_work *work, int *depth);
+int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
+
+/* nearest.c */
+void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
+                   real apart, fl_mixture *m);
+void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m);
+void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
+
+/* policy.c */
+void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out);
+#endif

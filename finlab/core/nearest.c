@@ -1,0 +1,127 @@
+/* The point of a convex set nearest to another, and the farthest along a ray, by support functions alone.
+
+   Wolfe's algorithm ("Finding the nearest point in a polytope", 1976): the nearest point is kept as a mixture
+   of few points that answered prices. Each step asks for the point that is worth most along the miss, and takes
+   the nearest point of the affine hull of all, points whose share would fall below 0 left out. What the last
+   answer adds proves how far the point is from the nearest one. Sets with curved sides converge the same way. */
+#include "inner.h"
+
+#define MOST_POINTS 400
+#define MOST_SHARES 60
+
+/* The forces that are worth most at a normal (6,) in weighted axes, and the point (6,) that they give. */
+static void farthest(const real *block, const fl_work *work, const real *weight, const real *normal,
+                     real force[][2], real *point) {
+  const fl_head *h = HEAD(block);
+  int r = RANGE(block);
+  real price[6] = {0}, given[6] = {0};
+  for (int j = 0; j < r; j++)
+    for (int k = 0; k < 6; k++) price[j] += h->basis[k][j] * h->scale[k] * weight[k] * normal[k];
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    real own[2] = {dot(a->matrix[0], price, r), a->rows == 2 ? dot(a->matrix[1], price, r) : 0};
+    farthest_of(block, i, work->set + i, own, force[i]);
+    for (int q = 0; q < (int)a->rows; q++)
+      for (int j = 0; j < r; j++) given[j] += force[i][q] * a->matrix[q][j];
+  }
+  for (int k = 0; k < 6; k++) point[k] = weight[k] * h->scale[k] * dot(h->basis[k], given, r);
+}
+
+static void drop(fl_mixture *m, int k) {
+  m->count--;
+  memmove(m->force + k, m->force + k + 1, (m->count - k) * sizeof m->force[0]);
+  memmove(m->point + k, m->point + k + 1, (m->count - k) * sizeof m->point[0]);
+  memmove(m->share + k, m->share + k + 1, (m->count - k) * sizeof m->share[0]);
+}
+
+/* Shares of the points whose mixture is nearest to a target; points without a share are left out. */
+static void mix(fl_mixture *m, const real *target) {
+  real wanted[FL_POINTS];
+  while (m->count > 1) {
+    real step = 1, sum = 0;
+    int least = 0, all = 1;
+    affine(m->point, m->count, target, wanted);
+    for (int k = 0; k < m->count; k++)
+      if (wanted[k] <= ROUNDING) {
+        all = 0;
+        step = MIN(step, m->share[k] / MAX(m->share[k] - wanted[k], TINY));
+      }
+    if (all) {
+      memcpy(m->share, wanted, sizeof wanted);
+      return;
+    }
+    for (int k = 0; k < m->count; k++) {
+      m->share[k] += step * (wanted[k] - m->share[k]);
+      if (m->share[k] < m->share[least]) least = k;
+    }
+    m->share[least] = 0;
+    for (int k = m->count - 1; k >= 0; k--)
+      if (m->share[k] <= ROUNDING) drop(m, k);
+    for (int k = 0; k < m->count; k++) sum += m->share[k];
+    for (int k = 0; k < m->count; k++) m->share[k] /= sum;
+  }
+  m->share[0] = 1;
+}
+
+static void miss_of(fl_mixture *m, const real *target) {
+  for (int k = 0; k < 6; k++) {
+    m->miss[k] = -target[k];
+    for (int p = 0; p < m->count; p++) m->miss[k] += m->share[p] * m->point[p][k];
+  }
+}
+
+/* Makes a mixture the point nearest to a target (6,), in weighted axes; it begins at the mixture, where that has
+   points. Up to the distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. */
+void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
+                   real apart, fl_mixture *m) {
+  real last = R(1e30);
+  if (m->count == 0) {
+    farthest(block, work, weight, target, m->force[0], m->point[0]);
+    m->count = 1, m->share[0] = 1;
+  }
+  for (int k = 0; k < MOST_POINTS; k++) {
+    miss_of(m, target);
+    real size = SQRT(dot(m->miss, m->miss, 6)), normal[6], gain = 0;
+    if (size <= close || size >= last * (1 - ROUNDING)) return; /* the second is rounding */
+    last = size;
+    if (m->count == FL_POINTS) { /* more than an affine basis: the one of least share goes */
+      int least = 0;
+      for (int p = 1; p < m->count; p++)
+        if (m->share[p] < m->share[least]) least = p;
+      drop(m, least);
+    }
+    for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
+    farthest(block, work, weight, normal, m->force[m->count], m->point[m->count]);
+    for (int j = 0; j < 6; j++) gain += m->miss[j] * (target[j] + m->miss[j] - m->point[m->count][j]);
+    if (gain <= MAX(close, apart * size) * size) return;
+    m->share[m->count++] = 0;
+    mix(m, target);
+  }
+}
+
+/* The point that is the largest share, from 0 to 1, of a ray (6,), in weighted axes. A plane across the miss of a
+   share bounds it from above; the next try is that bound (Dinkelbach). Where no share of the ray is in the set,
+   the point is the nearest one to rest. */
+void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m) {
+  real share = 1, last = R(1e30), normal[6], force[FL_MOST][2], point[6], target[6];
+  memcpy(normal, ray, sizeof normal);
+  m->count = 0;
+  for (int k = 0; k < MOST_SHARES; k++) {
+    real across = dot(normal, ray, 6);
+    farthest(block, work, weight, normal, force, point);
+    share = CLIP(across > 0 ? dot(point, normal, 6) / across : 0, 0, share);
+    for (int j = 0; j < 6; j++) target[j] = share * ray[j];
+    nearest_point(block, work, weight, target, CLOSE_BY, R(0.5), m);
+    for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
+    if (share == 0 || SQRT(dot(normal, normal, 6)) <= 2 * CLOSE_BY || share >= last) return;
+    last = share;
+  }
+}
+
+void mixed_force(const real *block, const fl_mixture *m, real force[][2]) {
+  for (int i = 0; i < COUNT(block); i++)
+    for (int q = 0; q < 2; q++) {
+      force[i][q] = 0;
+      for (int p = 0; p < m->count; p++) force[i][q] += m->share[p] * m->force[p][i][q];
+    }
+}

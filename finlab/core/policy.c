@@ -1,0 +1,211 @@
+/* What is given in place of a wrench out of reach: the nearest one, the same direction, or groups of axes.
+
+   Each is the point of a convex set nearest to another, in axes in which what counts more is longer. `closest`
+   takes the axes by their weights, `direction` the farthest share of the target, `priority` the axes of one
+   group after the other, what those before it have got held. Sets with gaps are cut until the best answer of
+   all lies in none. */
+#include "inner.h"
+
+#define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
+#define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
+#define STEPS_AT_RIM 60  /* Newton's steps after which a target at the rim is given up */
+#define SCORES 6
+
+static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                    real force[][2]) {
+  const fl_head *h = HEAD(block);
+  real weight[6], target[6];
+  for (int k = 0; k < 6; k++) {
+    weight[k] = MAX(policy->weight[k], CLOSE) / h->yard[k];
+    target[k] = weight[k] * wrench[k];
+  }
+  work->mixture.count = 0;
+  nearest_point(block, work, weight, target, CLOSE_BY, 0, &work->mixture);
+  mixed_force(block, &work->mixture, force);
+}
+
+static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
+  const fl_head *h = HEAD(block);
+  real target[6], weight[6], ray[6], rest = 0, size = 0;
+  to_basis(block, wrench, target);
+  for (int k = 0; k < 6; k++) {
+    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
+    rest += left * left, size += scaled * scaled;
+    weight[k] = 1 / h->yard[k];
+  }
+  for (int k = 0; k < 6; k++) ray[k] = rest <= NEARLY * NEARLY * size ? wrench[k] * weight[k] : 0;
+  farthest_along(block, work, weight, ray, &work->mixture);
+  mixed_force(block, &work->mixture, force);
+}
+
+static real size_in(const unsigned char *group, const real *missing) {
+  real sum = 0;
+  for (int k = 0; k < 6; k++) sum += group[k] ? missing[k] * missing[k] : 0;
+  return SQRT(sum);
+}
+
+/* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
+static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                     real force[][2]) {
+  const fl_head *h = HEAD(block);
+  fl_mixture *m = &work->mixture;
+  unsigned char held[6] = {0};
+  real aim[6];
+  int any = 0;
+  memcpy(aim, wrench, sizeof aim);
+  m->count = 0;
+  for (int g = 0; g < policy->groups; g++) {
+    const unsigned char *group = policy->group[g];
+    real weight[6], target[6], got[6], missing[6], missed = 0;
+    for (int k = 0; k < 6; k++) weight[k] = (HELD * held[k] + group[k]) / h->yard[k];
+    for (int round = 0; round < (any ? ROUNDS : 1); round++) {
+      for (int p = 0; p < m->count; p++) { /* the points so far, in the axes of this group */
+        wrench_of(block, m->force[p], m->point[p]);
+        for (int k = 0; k < 6; k++) m->point[p][k] *= weight[k];
+      }
+      for (int k = 0; k < 6; k++) target[k] = aim[k] * weight[k];
+      nearest_point(block, work, weight, target, CLOSE_BY * (any ? HELD : 1), 0, m);
+      mixed_force(block, m, force);
+      wrench_of(block, force, got);
+      for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k];
+      missed = size_in(group, missing);
+      if (missed <= PULL || dot(m->miss, m->miss, 6) <= 4 * PULL * PULL) break;
+      for (int k = 0; k < 6; k++)
+        if (group[k]) aim[k] = got[k] + PULL / missed * (wrench[k] - got[k]);
+    }
+    for (int k = 0; k < 6; k++) {
+      held[k] |= group[k];
+      if (group[k] && missed > NEARLY) aim[k] = got[k];
+    }
+    any = 1;
+  }
+}
+
+static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
+
+/* Serves a policy within the sets of a part; how badly, the first number counting most. */
+static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real force[][2],
+                  real *score) {
+  const fl_head *h = HEAD(block);
+  real got[6], missing[6], along[6], left;
+  if (policy->policy == FL_DIRECTION)
+    direction(block, work, wrench, force);
+  else if (policy->policy == FL_PRIORITY)
+    priority(block, work, wrench, policy, force);
+  else
+    closest(block, work, wrench, policy, force);
+  wrench_of(block, force, got);
+  memset(score, 0, SCORES * sizeof *score);
+  for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = wrench[k] / h->yard[k];
+  if (policy->policy == FL_PRIORITY)
+    for (int g = 0; g < policy->groups; g++) score[g] = rounded(size_in(policy->group[g], missing));
+  else if (policy->policy == FL_DIRECTION) {
+    left = dot(missing, along, 6) / MAX(dot(along, along, 6), TINY);
+    for (int k = 0; k < 6; k++) missing[k] -= left * along[k];
+    score[0] = rounded(SQRT(dot(missing, missing, 6))), score[1] = left;
+  } else {
+    for (int k = 0; k < 6; k++) missing[k] *= MAX(policy->weight[k], CLOSE);
+    score[0] = SQRT(dot(missing, missing, 6));
+  }
+}
+
+static int is_less(const real *a, const real *b) {
+  for (int k = 0; k < SCORES; k++)
+    if (a[k] != b[k]) return a[k] < b[k];
+  return 0;
+}
+
+/* Forces in the middle of all sets. */
+static void middle_of(const real *block, const fl_work *work, real force[][2]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const fl_set *s = work->set + i;
+    real size = (s->low + s->high) / 2;
+    force[i][0] = size, force[i][1] = drag_of(block, i, size);
+    if (a->rows == 2 && a->speed == 0) {
+      if (!(s->half < PI) || s->reverse > 0) size = 0;
+      force[i][0] = size * s->cos_middle, force[i][1] = size * s->sin_middle;
+    }
+  }
+}
+
+/* The least power for a wrench that forces give, or hardly another one that is wanted; where Newton's method does
+   not settle, at the rim, a little towards the wrench `inside`, else these forces. */
+void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
+              fl_answer *out) {
+  const fl_head *h = HEAD(block);
+  real wrench[6], target[6], size = 0;
+  wrench_of(block, force, wrench);
+  for (int k = 0; k < 6; k++) {
+    real way = (inside[k] - wrench[k]) / h->scale[k];
+    size += way * way;
+  }
+  for (int tried = wanted ? 0 : 1; tried < 3; tried++) {
+    for (int k = 0; k < 6; k++)
+      out->aim[k] = tried == 0 ? wanted[k]
+                               : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
+    to_basis(block, out->aim, target);
+    int met = newton(block, work, target, 0, STEPS_AT_RIM) == FL_MET;
+    memcpy(out->inner, work->now->price, sizeof out->inner);
+    if (met) {
+      memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+      return;
+    }
+  }
+  memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
+  memcpy(out->aim, wrench, sizeof wrench);
+}
+
+/* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
+   that it began with are kept. */
+static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                      real force[][2]) {
+  real score[SCORES], best[SCORES], own[FL_MOST][2];
+  int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
+  memcpy(work->kept, work->set, sizeof work->kept);
+  for (int parts = 0;; parts++) {
+    serve(block, work, wrench, policy, own, score);
+    int cut = worst_gap(block, work, own, 0), full = cut < 0;
+    int open = parts == 0 || !found || is_less(score, best);
+    if (open && (full || !found)) { /* of parts with a gap the best so far, until there is one without */
+      memcpy(best, score, sizeof best);
+      memcpy(force, own, sizeof own);
+      memcpy(work->best_set, work->set, sizeof work->best_set);
+      found |= full;
+    }
+    if (full && depth == 0) break;
+    if (open && !full && descend(block, work, &depth, cut, own, 0)) continue;
+    if (parts >= most && (found || parts >= 2 * most)) {
+      work->ended = 1;
+      break;
+    }
+    if (!turn_back(block, work, &depth)) break;
+  }
+  memcpy(work->set, work->best_set, sizeof work->set);
+  sums_of(block, work);
+}
+
+void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
+  const fl_head *h = HEAD(block);
+  real force[FL_MOST][2], middle[FL_MOST][2], inside[6] = {0}, wanted[6], target[6], value;
+  best_part(block, work, wrench, policy, force);
+  if (policy->policy != FL_DIRECTION) {
+    middle_of(block, work, middle);
+    wrench_of(block, middle, inside);
+  }
+  wrench_of(block, force, wanted);
+  for (int k = 0; k < 6; k++)
+    if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
+  cheapest(block, work, force, inside, wanted, out);
+  memcpy(work->set, work->kept, sizeof work->set);
+  sums_of(block, work);
+  if (!may_have_gaps(block, work, out->force)) return;
+  to_basis(block, out->aim, target); /* another part of the sets may give it for less */
+  int status = newton(block, work, target, 0, MOST_STEPS);
+  if (status == FL_BEYOND) return;
+  int gap = worst_gap(block, work, work->now->force, work->now->price);
+  if (gap < 0 && status == FL_MET)
+    memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+  else if (gap >= 0 && least_power(block, work, target, status, &value))
+    memcpy(out->force, work->best, COUNT(block) * sizeof out->force[0]);
+}

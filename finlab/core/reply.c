@@ -1,0 +1,256 @@
+/* Answers of one actuator to a price: the force that is worth most, less its power, and its derivative.
+
+   A line answers T(|s|) sign(s), a plane T(v) g with v = s.g and g the direction of the force. Where it may
+   choose between two answers, the ends of a wide arc or the two ways of a pod, it gives a blend of both: what
+   the smooth larger one of their conjugates asks for. A foil gives lift and with it drag; with drag paid a
+   [W/N], lift is as dear as r = 1 - a/U times its power: it answers v as v/r. Where r < 0 drag is welcome:
+   then r is softened to s(r) > 0, and (s - r) times the largest power is on top of the conjugate. */
+#include "inner.h"
+
+#define SOFT R(0.2)
+#define TURNING R(1e-2) /* price, over the mean one of the least force, up to which a force turns round */
+
+static const real *table_of(const real *block, const fl_actuator *a, int back) {
+  return block + (int)(back && a->back > 0 ? a->back : a->ahead);
+}
+
+static along at_price(const real *block, const fl_actuator *a, int back, real price) {
+  real per = a->share / a->worth;
+  along o = radial(table_of(block, a, back), price * per);
+  return (along){o.force * a->share, o.slope * a->share * per, o.conjugate * a->worth};
+}
+
+/* Power [W] of a force of an actuator within its tables, of planes below 0 in reverse. */
+real cost_at(const real *block, int i, real force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  return a->worth * marginal(table_of(block, a, force < 0), FABS(force) / a->share, 0);
+}
+
+/* What follows from the limits of a set. */
+void set_up(const real *block, int i, fl_set *set) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  int plane = a->rows == 2 && a->speed == 0;
+  real least = NOTHING * set->high_cost / MAX(set->high, TINY);
+  if (set->low > 0) least = MAX(least, TURNING * set->low_cost / set->low);
+  set->gap2 = least * least + TINY;
+  set->cos_middle = COS(set->middle), set->sin_middle = SIN(set->middle);
+  set->cos_half = COS(set->half), set->sin_half = SIN(set->half);
+  set->forked = plane && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
+}
+
+/* A set between two forces [N], of planes below 0 against their direction, in an arc [rad]. */
+void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  int plane = a->rows == 2 && a->speed == 0, back = plane && low < 0;
+  set->live = 1, set->flipped = back && high <= 0;
+  real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
+  set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
+  set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;
+  set->reverse = back && !set->flipped ? -low : 0;
+  set->reverse_cost = back ? cost_at(block, i, low) : set->low_cost;
+  set->middle = middle + (set->flipped ? PI : 0), set->half = half;
+  set_up(block, i, set);
+}
+
+/* A set of one force and nothing else. */
+void freeze(const real *block, int i, fl_set *set, const real *force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  int plane = a->rows == 2 && a->speed == 0;
+  real size = plane ? SQRT(force[0] * force[0] + force[1] * force[1]) : force[0];
+  real within = CLIP(size, set->low, set->high);
+  set->low_cost = set->high_cost = cost_at(block, i, set->flipped ? -within : within);
+  set->low = set->high = size;
+  if (plane) set->middle = ATAN2(force[1], force[0]), set->half = 0, set->reverse = 0;
+  set_up(block, i, set);
+}
+
+static along limited(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
+  int back = set->flipped, narrow = !line && set->half < PI;
+  real sign = line && price < 0 ? -1 : 1, size = sign * price;
+  if (line) back = price < 0;
+  along o = at_price(block, a, back, narrow ? MAX(size, 0) : size);
+  o.force *= sign;
+  if (narrow && !(size > 0)) o.slope = 0;
+  if (o.force <= set->low)
+    o = (along){set->low, 0, price * set->low - set->low_cost};
+  else if (o.force >= set->high)
+    o = (along){set->high, 0, price * set->high - set->high_cost};
+  return o;
+}
+
+typedef struct { real along, x, y, xx, xy, yy, other; int beyond; } fan;
+
+static real gauge_or_one(const real *gauge, real angle) { return gauge ? gauge_at(gauge, angle) : 1; }
+
+/* The direction in which a plane answers a price, with its gauge, and how it turns. */
+static fan direction_of(const fl_set *set, const real *gauge, const real *price, real gap2) {
+  real size = SQRT(price[0] * price[0] + price[1] * price[1] + gap2), x = price[0] / size, y = price[1] / size;
+  real tangent = 1 / size;
+  fan o = {size, x, y, 0, 0, 0, 0, 0};
+  if (gauge) {
+    support s = gauge_support(gauge, x, y);
+    o.x = s.value * x - s.slope * y, o.y = s.value * y + s.slope * x;
+    tangent *= MAX(s.value + s.bend, 0);
+    o.along *= s.value;
+  }
+  if (set->half < PI) {
+    real c = set->cos_middle, d = set->sin_middle, ahead = o.x * c + o.y * d, aside = o.y * c - o.x * d;
+    if (FABS(aside) * set->cos_half > ahead * set->sin_half) {
+      /* The nearer end by the price itself: by the force, both are alike where the arc has no width. */
+      real nearer = price[1] * c - price[0] * d < 0 ? -1 : 1, end = set->middle + nearer * set->half;
+      real rho = gauge_or_one(gauge, end);
+      o.x = rho * COS(end), o.y = rho * SIN(end);
+      o.along = price[0] * o.x + price[1] * o.y;
+      o.beyond = 1, o.other = set->middle - nearer * set->half;
+      tangent = 0;
+    }
+  }
+  o.xx = tangent * (1 - x * x), o.xy = -tangent * x * y, o.yy = tangent * (1 - y * y);
+  return o;
+}
+
+/* Blends an answer with another one, in a width [W] of their conjugates. */
+static void blend(reply *own, const reply *other, real width) {
+  real ahead = own->conjugate - other->conjugate, root = SQRT(ahead * ahead + width * width);
+  real share = (1 + ahead / root) / 2, rest = 1 - share, turn = width * width / (2 * root * root * root);
+  real dx = own->force[0] - other->force[0], dy = own->force[1] - other->force[1];
+  own->force[0] = share * own->force[0] + rest * other->force[0];
+  own->force[1] = share * own->force[1] + rest * other->force[1];
+  own->xx = share * own->xx + rest * other->xx + turn * dx * dx;
+  own->xy = share * own->xy + rest * other->xy + turn * dx * dy;
+  own->yy = share * own->yy + rest * other->yy + turn * dy * dy;
+  own->conjugate += (root - ahead) / 2;
+}
+
+static reply along_fan(along o, const fan *f) {
+  return (reply){{o.force * f->x, o.force * f->y},
+                 o.slope * f->x * f->x + o.force * f->xx,
+                 o.slope * f->x * f->y + o.force * f->xy,
+                 o.slope * f->y * f->y + o.force * f->yy,
+                 o.conjugate};
+}
+
+static reply one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
+                     const real *price) {
+  fan f = direction_of(set, gauge, price, set->gap2);
+  reply own = along_fan(limited(block, a, set, 0, f.along), &f);
+  if (set->forked && f.beyond) {
+    real rho = gauge_or_one(gauge, f.other);
+    fan g = {0, rho * COS(f.other), rho * SIN(f.other), 0, 0, 0, 0, 0};
+    reply other = along_fan(limited(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
+    blend(&own, &other, FINE * set->high_cost + R(1e-12));
+  }
+  return own;
+}
+
+/* What a plane that pushes either way gives in reverse. */
+static fl_set reversed(const fl_set *set) {
+  fl_set r = *set;
+  r.low = 0, r.high = set->reverse, r.high_cost = set->reverse_cost, r.reverse = 0, r.flipped = 1;
+  r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
+  real least = NOTHING * r.high_cost / MAX(r.high, TINY);
+  r.gap2 = least * least + TINY;
+  r.forked = r.half < PI && r.half > PI / 2;
+  return r;
+}
+
+static reply plane(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
+  reply own = one_way(block, a, set, a->gauge > 0 ? block + (int)a->gauge : 0, price);
+  if (set->reverse > 0) {
+    fl_set back = reversed(set);
+    reply other = one_way(block, a, &back, 0, price);
+    blend(&own, &other, FINE * back.high_cost + R(1e-12));
+  }
+  return own;
+}
+
+static real rest_of(const real *block, const fl_actuator *a) { return a->worth * block[(int)a->ahead + 2]; }
+
+static reply foil(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
+  real ratio = 1 - price[1] / a->speed, below = MIN(ratio / SOFT - 1, 0), power = EXP(below);
+  real rate = power > CLOSE ? power : 0, soft = below < 0 ? SOFT * MAX(power, CLOSE) : ratio;
+  real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = price[0] / soft;
+  along o = limited(block, a, set, 1, own);
+  real cost = own * o.force - o.conjugate - rest, most = MAX(set->low_cost, set->high_cost) - rest;
+  o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * most - rest;
+  o.slope /= soft;
+  real lean = own * rate / a->speed;
+  return (reply){{o.force, (rate * cost + (1 - rate) * most) / a->speed},
+                 o.slope,
+                 o.slope * lean,
+                 o.slope * lean * lean + (most - cost) * bend / (a->speed * a->speed),
+                 o.conjugate};
+}
+
+reply reply_of(const real *block, int i, const fl_set *set, const real *price) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  if (a->rows == 1) {
+    along o = limited(block, a, set, 1, price[0]);
+    return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate};
+  }
+  return a->speed > 0 ? foil(block, a, set, price) : plane(block, a, set, price);
+}
+
+/* Drag [N], beyond that at rest, of a foil's lift [N]. */
+real drag_of(const real *block, int i, real force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  return a->speed > 0 ? (cost_at(block, i, force) - rest_of(block, a)) / a->speed : 0;
+}
+
+static void farthest_foil(const real *block, int i, const fl_set *set, const real *price, real *force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real cost = -price[1];
+  if (cost > 0)
+    force[0] = limited(block, a, set, 1, price[0] * a->speed / cost).force;
+  else {
+    real low = price[0] * set->low - cost * drag_of(block, i, set->low);
+    force[0] = price[0] * set->high - cost * drag_of(block, i, set->high) > low ? set->high : set->low;
+  }
+  force[1] = drag_of(block, i, force[0]);
+}
+
+/* The force that is worth most at a price, whatever its power. */
+void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  force[1] = 0;
+  if (a->rows == 1) {
+    force[0] = price[0] > 0 ? set->high : set->low;
+    return;
+  }
+  if (a->speed > 0) {
+    farthest_foil(block, i, set, price, force);
+    return;
+  }
+  fan f = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY);
+  real size = f.along > 0 ? set->high : set->low;
+  force[0] = size * f.x, force[1] = size * f.y;
+  if (set->reverse > 0) {
+    fl_set back = reversed(set);
+    fan g = direction_of(&back, 0, price, TINY);
+    if (g.along > 0 && back.high * g.along > size * f.along) force[0] = back.high * g.x, force[1] = back.high * g.y;
+  }
+}
+
+/* Whether a plane that pushes either way answers rather forward, and how far [N] its blend is from that. */
+int undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  fl_set back = reversed(set);
+  reply ahead = one_way(block, a, set, 0, price), other = one_way(block, a, &back, 0, price);
+  real gain = ahead.conjugate - other.conjugate, width = FINE * back.high_cost + R(1e-12);
+  real share = (1 + gain / SQRT(gain * gain + width * width)) / 2;
+  real dx = ahead.force[0] - other.force[0], dy = ahead.force[1] - other.force[1];
+  *off = MIN(share, 1 - share) * SQRT(dx * dx + dy * dy);
+  return share >= R(0.5);
+}
+
+/* Prices along the forces that answer a price, ahead and in reverse. */
+void along_of(const real *block, int i, const fl_set *set, const real *price, real *ahead, real *back) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  *ahead = price[0], *back = 0;
+  if (a->rows == 1 || a->speed > 0) return;
+  *ahead = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY).along;
+  if (set->reverse > 0) {
+    fl_set other = reversed(set);
+    *back = direction_of(&other, 0, price, TINY).along;
+  }
+}

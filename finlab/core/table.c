@@ -1,0 +1,78 @@
+/* Tables of force over price, cubic between their knots, and gauges of forces that differ by direction. */
+#include "inner.h"
+
+static const real *knots(const real *table) { return table + 3; }
+
+/* Force, its derivative and the conjugate at a price from 0 on. */
+along radial(const real *table, real price) {
+  real top = table[0], share = price / top;
+  int cells = (int)table[1];
+  const real *knot = knots(table);
+  if (!(share < 1)) {
+    knot += 3 * cells;
+    return (along){knot[0], 0, knot[2] + (price - top) * knot[0]};
+  }
+  int cell = MIN((int)(SQRT(SQRT(share)) * cells), cells - 1);
+  real first = (real)cell / cells, last = (real)(cell + 1) / cells;
+  first *= first, last *= last;
+  real begin = first * first, width = last * last - begin, t = (share - begin) / width, scale = top * width;
+  knot += 3 * cell;
+  real m0 = knot[1] * scale, m1 = knot[4] * scale, rise = knot[3] - knot[0];
+  real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
+  return (along){knot[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / scale,
+                 knot[2] + scale * t * (knot[0] + t * (m0 / 2 + t * (b / 3 + t * c / 4)))};
+}
+
+/* Power of a size of force within the table, and the price at which it is given. */
+real marginal(const real *table, real size, real *price) {
+  int cells = (int)table[1], low = 0, high = cells;
+  const real *knot = knots(table);
+  while (high - low > 1) {
+    int between = (low + high) / 2;
+    if (knot[3 * between] < size)
+      low = between;
+    else
+      high = between;
+  }
+  real first = (real)low / cells, last = (real)high / cells;
+  first *= first, last *= last;
+  real begin = first * first, width = last * last - begin, scale = table[0] * width;
+  knot += 3 * low;
+  real m0 = knot[1] * scale, m1 = knot[4] * scale, rise = knot[3] - knot[0];
+  real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
+  real t = rise > 0 ? (size - knot[0]) / rise : 0;
+  for (int k = 0; k < ROUNDS; k++) { /* an error of the price counts squared in the power */
+    real slope = m0 + t * (2 * b + 3 * t * c), before = t;
+    if (slope > 0) t = CLIP(t - (knot[0] + t * (m0 + t * (b + t * c)) - size) / slope, 0, 1);
+    if (FABS(t - before) <= ROUNDING) break;
+  }
+  real paid = table[0] * begin + scale * t;
+  if (price) *price = paid;
+  return paid * size - (knot[2] + scale * t * (knot[0] + t * (m0 / 2 + t * (b / 3 + t * c / 4))));
+}
+
+/* Support function of a gauge in the direction (x, y) of the price, and its two derivatives by the angle. */
+support gauge_support(const real *gauge, real x, real y) {
+  int points = (int)gauge[0];
+  real step = 2 * PI / points, place = ATAN2(y, x) / step;
+  if (place < 0) place += points;
+  int cell = (int)place % points, next = (cell + 1) % points;
+  real t = place - FLOOR(place);
+  const real *a = gauge + 1 + 3 * cell, *z = gauge + 1 + 3 * next;
+  real m0 = a[1] * step, m1 = z[1] * step, rise = z[0] - a[0];
+  real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
+  return (support){a[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / step,
+                   (2 * b + 6 * t * c) / (step * step)};
+}
+
+/* The gauge itself in a direction of the force. */
+real gauge_at(const real *gauge, real angle) {
+  int points = (int)gauge[0];
+  real place = angle / (2 * PI) * points;
+  place -= points * FLOOR(place / points);
+  int cell = (int)place % points;
+  real t = place - FLOOR(place), at[4];
+  for (int k = 0; k < 4; k++) at[k] = gauge[1 + 3 * ((cell + k - 1 + points) % points) + 2];
+  real m0 = (at[2] - at[0]) / 2, m1 = (at[3] - at[1]) / 2, rise = at[2] - at[1];
+  return at[1] + t * (m0 + t * (3 * rise - 2 * m0 - m1 + t * (m0 + m1 - 2 * rise)));
+}
