@@ -87,8 +87,9 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     for (int k = 0; k < 6; k++) out->within &= wrench[k] == 0, out->aim[k] = 0;
     return;
   }
-  int status = newton(block, work, target, price, work->torn ? STEPS_AT_KINK : MOST_STEPS);
-  int within = (status == FL_MET || (status == FL_STUCK && work->torn)) && in_range(block, wrench, target);
+  int torn = work->torn || work->drags, most = work->drags ? STEPS_WITH_DRAG : torn ? STEPS_AT_KINK : MOST_STEPS;
+  int status = newton(block, work, target, price, most);
+  int within = (status == FL_MET || (status == FL_STUCK && torn)) && in_range(block, wrench, target);
   out->status = status;
   memcpy(out->inner, work->now->price, sizeof out->inner);
   memcpy(out->force, work->now->force, n * sizeof out->force[0]);

@@ -68,10 +68,11 @@ typedef struct {
   int count;
 } fl_mixture;
 
-typedef struct { /* a part of sets with gaps on the way down */
+#define FL_SCORES 6
+typedef struct { /* a cut on the way to one part of sets with gaps */
   fl_set before;
-  fl_real price[6], force[2];
-  int cut, first, both; /* actuator, side taken first, whether the other one was taken, too */
+  fl_real force[2], price[6], score[FL_SCORES]; /* price and score of the side that was not taken first */
+  int cut, first, both;                         /* actuator, side taken first, whether the other one was, too */
 } fl_node;
 
 typedef struct {
@@ -82,7 +83,7 @@ typedef struct {
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost, largest_power;
-  int quick, torn, steps, ended;
+  int quick, torn, drags, steps, ended;
 } fl_work;
 
 enum { FL_MET, FL_BEYOND, FL_STUCK };

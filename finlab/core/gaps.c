@@ -113,31 +113,30 @@ void narrow(const real *block, int i, fl_set *set, const real *force, int side) 
   set_up(block, i, set);
 }
 
-/* Cuts a gap and takes its nearer side. */
-int descend(const real *block, fl_work *work, int *depth, int cut, real force[][2], const real *price) {
+/* Remembers a cut of the set of an actuator by its force; 0 where there are too many. */
+fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force) {
   if (*depth >= FL_DEPTH) return 0;
   fl_node *node = work->node + (*depth)++;
   node->before = work->set[cut], node->cut = cut, node->both = 0;
-  node->force[0] = force[cut][0], node->force[1] = force[cut][1];
-  if (price) memcpy(node->price, price, sizeof node->price);
-  node->first = nearer_side(block, cut, work->set + cut, node->force);
-  narrow(block, cut, work->set + cut, node->force, node->first);
-  sums_of(block, work);
-  return 1;
+  node->force[0] = force[0], node->force[1] = force[1];
+  return node;
 }
 
-/* Goes back to the last cut whose other side was not taken and takes it; 0 where there is none. */
-int turn_back(const real *block, fl_work *work, int *depth) {
-  while (*depth > 0) {
+void take_side(const real *block, fl_work *work, const fl_node *node, int side) {
+  work->set[node->cut] = node->before;
+  narrow(block, node->cut, work->set + node->cut, node->force, side);
+  sums_of(block, work);
+}
+
+/* Goes back to the last cut whose other side was not taken; 0 where there is none. */
+fl_node *last_open(const real *block, fl_work *work, int *depth) {
+  for (; *depth > 0; --*depth) {
     fl_node *node = work->node + *depth - 1;
     work->set[node->cut] = node->before;
     if (!node->both) {
       node->both = 1;
-      narrow(block, node->cut, work->set + node->cut, node->force, -node->first);
-      sums_of(block, work);
-      return 1;
+      return node;
     }
-    --*depth;
   }
   sums_of(block, work);
   return 0;
@@ -190,11 +189,32 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
   }
 }
 
+/* Solves both sides of a cut from the prices so far and stays at the cheaper one. */
+static int cheaper_side(const real *block, fl_work *work, const real *target, fl_node *node) {
+  real begin[6], price[2][6], value[2];
+  int status[2], side = nearer_side(block, node->cut, &node->before, node->force);
+  memcpy(begin, work->now->price, sizeof begin);
+  for (int k = 0; k < 2; k++, side = -side) {
+    take_side(block, work, node, side);
+    status[k] = newton(block, work, target, begin, STEPS_AT_KINK);
+    value[k] = status[k] == FL_BEYOND ? R(1e30) : work->now->value;
+    memcpy(price[k], work->now->price, sizeof price[k]);
+  }
+  int first = value[1] < value[0]; /* the side is the first one's again */
+  node->first = first ? -side : side;
+  node->score[0] = value[!first];
+  memcpy(node->price, price[!first], sizeof node->price);
+  if (first) return status[1];
+  take_side(block, work, node, side);
+  return newton(block, work, target, price[0], STEPS_AT_KINK);
+}
+
 /* Least power for a target at whose prices some force is in a gap: forces in work->best, and the power [W] that
    no forces in the sets undercut; 0 where no part meets the target. */
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value) {
   real best = R(1e30), bound = R(1e30), price[6];
   int depth = 0, parts = 0, root = status;
+  fl_node *node;
   memcpy(work->kept, work->set, sizeof work->kept);
   memcpy(price, work->now->price, sizeof price);
   dive(block, work, target, status, &best);
@@ -202,17 +222,20 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   sums_of(block, work);
   look(block, work, target, price, work->state);
   work->now = work->state;
-  for (status = root;; parts++) {
+  for (status = root;;) {
     fl_state *s = work->now;
-    int gap = worst_gap(block, work, s->force, s->price);
-    int open = keep(block, work, status, gap, &best) && gap >= 0;
-    if (parts >= MOST_PARTS) work->ended = 1, open = 0;
-    if (!open || !descend(block, work, &depth, gap, s->force, s->price)) {
-      if (status != FL_BEYOND) bound = MIN(bound, s->value);
-      if (parts >= MOST_PARTS) bound = MIN(bound, work->now->value);
-      if (!turn_back(block, work, &depth)) break;
+    int gap = worst_gap(block, work, s->force, s->price), open = keep(block, work, status, gap, &best) && gap >= 0;
+    if (open && parts < MOST_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
+      status = cheaper_side(block, work, target, node), parts += 2;
+      continue;
     }
-    status = newton(block, work, target, work->node[depth - 1].price, STEPS_AT_KINK);
+    work->ended |= open;
+    if (status != FL_BEYOND) bound = MIN(bound, s->value);
+    while ((node = last_open(block, work, &depth)) && !(node->score[0] < best * (1 - CLOSE)))
+      bound = MIN(bound, node->score[0]);
+    if (!node) break;
+    take_side(block, work, node, -node->first);
+    status = newton(block, work, target, node->price, STEPS_AT_KINK);
   }
   memcpy(work->set, work->kept, sizeof work->kept);
   sums_of(block, work);

@@ -77,6 +77,7 @@ int undecided(const real *block, int i, const fl_set *set, const real *price, re
 
 /* newton.c */
 #define MOST_STEPS 200
+#define STEPS_WITH_DRAG 24 /* from the prices of commands near to a target */
 void sums_of(const real *block, fl_work *work);
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
@@ -90,8 +91,9 @@ int worst_gap(const real *block, const fl_work *work, real force[][2], const rea
 int nearer_side(const real *block, int i, const fl_set *set, const real *force);
 void narrow(const real *block, int i, fl_set *set, const real *force, int side);
 int may_have_gaps(const real *block, const fl_work *work, real force[][2]);
-int descend(const real *block, fl_work *work, int *depth, int cut, real force[][2], const real *price);
-int turn_back(const real *block, fl_work *work, int *depth);
+fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force);
+void take_side(const real *block, fl_work *work, const fl_node *node, int side);
+fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
 /* nearest.c */

@@ -56,11 +56,12 @@ int fl_prepare(const real *block, fl_work *work) {
 
 /* What follows from all sets. */
 void sums_of(const real *block, fl_work *work) {
-  work->most_cost = 0, work->quick = 1, work->torn = 0;
+  work->most_cost = 0, work->quick = 1, work->torn = work->drags = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *s = work->set + i;
     work->most_cost += MAX(MAX(s->low_cost, s->high_cost), s->reverse > 0 ? s->reverse_cost : 0);
-    if (s->forked || s->reverse > 0 || ACTUATOR(block, i)->speed > 0) work->torn = 1;
+    if (s->forked || s->reverse > 0) work->torn = 1;
+    if (ACTUATOR(block, i)->speed > 0) work->drags = 1;
     if (s->forked || s->reverse > 0 || ACTUATOR(block, i)->band > 0) work->quick = 0;
   }
 }

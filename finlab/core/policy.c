@@ -9,7 +9,6 @@
 #define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
 #define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
 #define STEPS_AT_RIM 60  /* Newton's steps after which a target at the rim is given up */
-#define SCORES 6
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                     real force[][2]) {
@@ -95,7 +94,7 @@ static void serve(const real *block, fl_work *work, const real *wrench, const fl
   else
     closest(block, work, wrench, policy, force);
   wrench_of(block, force, got);
-  memset(score, 0, SCORES * sizeof *score);
+  memset(score, 0, FL_SCORES * sizeof *score);
   for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = wrench[k] / h->yard[k];
   if (policy->policy == FL_PRIORITY)
     for (int g = 0; g < policy->groups; g++) score[g] = rounded(size_in(policy->group[g], missing));
@@ -110,7 +109,7 @@ static void serve(const real *block, fl_work *work, const real *wrench, const fl
 }
 
 static int is_less(const real *a, const real *b) {
-  for (int k = 0; k < SCORES; k++)
+  for (int k = 0; k < FL_SCORES; k++)
     if (a[k] != b[k]) return a[k] < b[k];
   return 0;
 }
@@ -156,30 +155,52 @@ void cheapest(const real *block, fl_work *work, real force[][2], const real *ins
   memcpy(out->aim, wrench, sizeof wrench);
 }
 
+/* Serves both sides of a cut and stays at the one that does better. */
+static void better_side(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_node *node,
+                        real force[][2], real *score) {
+  real other[FL_MOST][2];
+  int side = nearer_side(block, node->cut, &node->before, node->force);
+  take_side(block, work, node, side);
+  serve(block, work, wrench, policy, force, score);
+  take_side(block, work, node, -side);
+  serve(block, work, wrench, policy, other, node->score);
+  node->first = side;
+  if (is_less(node->score, score)) {
+    real kept[FL_SCORES];
+    memcpy(kept, score, sizeof kept);
+    memcpy(score, node->score, sizeof kept);
+    memcpy(node->score, kept, sizeof kept);
+    memcpy(force, other, COUNT(block) * sizeof *other);
+    node->first = -side;
+  } else
+    take_side(block, work, node, side);
+}
+
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
    that it began with are kept. */
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2]) {
-  real score[SCORES], best[SCORES], own[FL_MOST][2];
+  real score[FL_SCORES], best[FL_SCORES], own[FL_MOST][2];
   int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
+  fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
-  for (int parts = 0;; parts++) {
-    serve(block, work, wrench, policy, own, score);
-    int cut = worst_gap(block, work, own, 0), full = cut < 0;
-    int open = parts == 0 || !found || is_less(score, best);
-    if (open && (full || !found)) { /* of parts with a gap the best so far, until there is one without */
+  serve(block, work, wrench, policy, own, score);
+  for (int parts = 0;; parts += 2) {
+    int cut = worst_gap(block, work, own, 0);
+    if (cut < 0 || !found) { /* of parts with a gap the last one, until there is one without */
       memcpy(best, score, sizeof best);
       memcpy(force, own, sizeof own);
       memcpy(work->best_set, work->set, sizeof work->best_set);
-      found |= full;
+      found |= cut < 0;
     }
-    if (full && depth == 0) break;
-    if (open && !full && descend(block, work, &depth, cut, own, 0)) continue;
-    if (parts >= most && (found || parts >= 2 * most)) {
-      work->ended = 1;
-      break;
+    if (cut >= 0 && parts < most && (node = cut_at(work, &depth, cut, own[cut]))) {
+      better_side(block, work, wrench, policy, node, own, score);
+      if (!found || is_less(score, best)) continue;
     }
-    if (!turn_back(block, work, &depth)) break;
+    while ((node = last_open(block, work, &depth)) && !is_less(node->score, best)) {}
+    if (!node || parts >= most) break;
+    take_side(block, work, node, -node->first);
+    serve(block, work, wrench, policy, own, score);
   }
   memcpy(work->set, work->best_set, sizeof work->set);
   sums_of(block, work);

@@ -63,7 +63,7 @@ class Search(NamedTuple):
         return Priced(ends.command[met[cheap]], float(costs[cheap]), int(met[cheap]))
 
     def prices(self, command: Array, directions: Array) -> Array:
-        """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) is the
+        """Returns the prices (r,) of normalized `directions` (6, r) at which a command (n, 3) is the
         cheapest, nearly: what a change of it adds to the wrench is worth the power that it adds."""
         problem = self.problem
         jacobian = problem.slope(command[None])[1][0]
@@ -74,7 +74,7 @@ class Search(NamedTuple):
             width[:, None] * (jacobian[free] @ directions),
             width * self.slope(command[None])[0][free],
         )
-        return np.asarray(np.linalg.lstsq(rows, cost, rcond=NOTHING)[0][:, None])
+        return np.asarray(np.linalg.lstsq(rows, cost, rcond=NOTHING)[0])
 
     def cheapest(self, wrench: Array, starts: Array) -> Priced | None:
         """Returns what gives a normalized wrench (6,) at least cost near to the cheapest of some commands
