@@ -1,0 +1,1 @@
+"""Hot loops in C, and the way to them from Python."""

@@ -1,0 +1,33 @@
+"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files in this folder."""
+
+import ctypes
+import sys
+from functools import cache
+from pathlib import Path
+
+from finlab.errors import FinlabError
+
+VERSION = 1
+"""What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
+PATH = Path(__file__).with_name("libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so"))
+
+
+@cache
+def library() -> ctypes.PyDLL:
+    """Returns the library. Its functions keep the interpreter's lock: a call takes microseconds.
+
+    Raises:
+        FinlabError: it is missing, does not load here, or was compiled from other C files.
+    """
+    try:
+        core = ctypes.PyDLL(str(PATH))
+    except OSError as error:
+        problem = f"cannot be loaded ({error})" if PATH.exists() else "is missing"
+    else:
+        version = core.fl_version() if hasattr(core, "fl_version") else 0
+        if version == VERSION:
+            return core
+        problem = f"has version {version}, and this finlab needs {VERSION}"
+    raise FinlabError(
+        f"the compiled core {PATH} {problem}; run `make setup` in a source tree, or install finlab again by pip"
+    )
