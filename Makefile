@@ -35,7 +35,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
 
-core $(LIBRARY): hatch_build.py $(wildcard finlab/core/*.[ch]) | $(STAMP)
+core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.[ch])
 	$(BIN)/python hatch_build.py
 
 app: setup

@@ -1,7 +1,7 @@
 """The compiled core's build: a hook of hatchling, and a command that compiles it in the tree.
 
-The compiler is `$CC`, else one on PATH, else that of the package ziglang, which also compiles for the other system
-that FINLAB_TARGET names.
+The compiler is `$CC`, else one on PATH, else that of the package ziglang, which compiles for other systems,
+too, where FINLAB_TARGET names one.
 """
 
 import os
@@ -18,8 +18,8 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from packaging.tags import platform_tags
 
 CORE = Path(__file__).with_name("finlab") / "core"
-# Results are the same on every machine of a kind: no fast math, no contraction, no instructions of this machine.
-FLAGS = "-std=c99 -O2 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall".split()
+# No fast math, no contraction, no instructions of this machine alone: results do not depend on the builder.
+FLAGS = shlex.split("-std=c99 -O2 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall")
 ZIG = [sys.executable, "-m", "ziglang", "cc", "-s", "-mcpu=baseline", "-target"]
 # Target as zig names it: platform in the name of the wheel, ending of a library.
 TARGETS = {
@@ -69,15 +69,15 @@ def compile_core(folder: Path) -> Path:
             said, failed = str(error), True
         if failed:
             sys.exit(
-                f"{said}\nthe core of finlab did not compile by {shlex.join(command)}; install a C compiler with "
-                "its headers (on Debian and Ubuntu: apt-get install gcc libc6-dev), or set CC to one"
+                f"{said}\nthe core of finlab did not compile by {shlex.join(command)}; install a C compiler "
+                "with its headers (on Debian and Ubuntu: apt-get install gcc libc6-dev), or set CC to one"
             )
         print(said, end="", file=sys.stderr)  # warnings
         shutil.copy(made, folder / f"{name}.new")
         return (folder / f"{name}.new").replace(folder / name)
 
 
-class CoreHook(BuildHookInterface):
+class CoreHook(BuildHookInterface[Any]):
     """Puts the library into the wheel, or into the tree where the install is editable."""
 
     def dependencies(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files in this folder."""
+"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files here."""
 
 import ctypes
 import sys
@@ -29,5 +29,6 @@ def library() -> ctypes.PyDLL:
             return core
         problem = f"has version {version}, and this finlab needs {VERSION}"
     raise FinlabError(
-        f"the compiled core {PATH} {problem}; run `make setup` in a source tree, or install finlab again by pip"
+        f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source tree, "
+        "elsewhere install finlab again"
     )
