@@ -2,16 +2,18 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 STAMP := .venv/.ready
+LIBRARY := finlab/core/libfinlab.$(if $(filter Darwin,$(shell uname)),dylib,so)
 HOST_PORT ?= 8080
 
 # Tests and benchmarks share few cores with a browser; one thread each is faster than many that wait.
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas figures help setup app test test-all test-near test-fast check format checkpoint wheel wheel-check clean
+.PHONY: schemas figures help setup core app test test-all test-near test-fast check format checkpoint wheel wheels wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
+	@echo "make core         compile the C files of finlab/core, a second; setup does it where they changed"
 	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
 	@echo "make test         every test, browser tests included; of long tables of cases one in ten"
 	@echo "make test-all     every test and every case"
@@ -22,15 +24,19 @@ help:
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make format       let ruff correct what it can"
 	@echo "make checkpoint   train the network that is shipped (hours)"
-	@echo "make wheel-check  build the wheel, install it in an empty environment of each Python here and try it"
+	@echo "make wheels       build the wheels of Linux, macOS and Windows"
+	@echo "make wheel-check  build them, install this machine's in an empty environment of each Python here and try it"
 
-setup: $(STAMP)
+setup: $(STAMP) $(LIBRARY)
 
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
 	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
+
+core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.[ch])
+	$(BIN)/python hatch_build.py
 
 app: setup
 	$(BIN)/finlab app --port $(HOST_PORT)
@@ -68,10 +74,17 @@ format: setup
 checkpoint: setup
 	$(BIN)/finlab train mdn -o runs/default
 
-wheel: setup
-	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+WHEEL := $(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .
 
-wheel-check: wheel
+wheel: setup
+	$(WHEEL)
+
+wheels: setup
+	$(BIN)/pip install --disable-pip-version-check -q -c constraints.txt ziglang
+	for target in $$($(BIN)/python -c 'import hatch_build as b; print(*b.TARGETS)'); do \
+	    FINLAB_TARGET=$$target $(WHEEL) || exit 1; done
+
+wheel-check: wheel wheels
 	tools/wheel-check
 
 clean:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "arrays"),
-    ("axes", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
+    ("axes", "core", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
     ("bundle_files", "executor"),
     ("actuators",),
     ("interaction",),

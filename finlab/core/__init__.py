@@ -1,1 +1,1 @@
-"""The dual allocator's core in C, and its calls."""
+"""Hot loops in C, and the way to them from Python."""

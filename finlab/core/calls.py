@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.core.library import library
 
-MAGIC, VERSION = 41721.0, 1.0
-"""First numbers of a block."""
+MAGIC = 41721.0
+"""First number of a block; its version is the second."""
 MET, BEYOND, STUCK = range(3)
 """How Newton's method ends: at a target, where it is proved to be out of reach, at its bound of steps."""
 ANSWER = 19

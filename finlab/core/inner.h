@@ -49,7 +49,11 @@ typedef fl_real real;
 #define RANGE(block) ((int)HEAD(block)->range)
 
 /* linear.c */
-real dot(const real *a, const real *b, int n);
+static inline real dot(const real *a, const real *b, int n) {
+  real sum = 0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
 real wrapped(real angle);
 int cholesky(real a[6][6], real factor[6][6], int n);
 void solve(real factor[6][6], const real *right, real *x, int n);

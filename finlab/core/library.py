@@ -1,16 +1,51 @@
-import ctypes, os
+"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files here."""
+
+import ctypes
+import sys
 from functools import cache
+from pathlib import Path
+
+from finlab.errors import FinlabError
+
+VERSION = 1
+"""What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
+SIGNATURES = {
+    "fl_sizes": "ii",
+    "fl_check": "ipi",
+    "fl_prepare": "ipp",
+    "fl_answer_one": "ippppppp",
+    "fl_answer_many": "ipppipppppp",
+    "fl_first": "vpppp",
+    "fl_look": "rppppp",
+    "fl_worth": "vpppip",
+    "fl_support": "vpppip",
+}
+"""What each function returns and takes: i int, r real, p pointer, v nothing."""
+_TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "v": None}
+PATH = Path(__file__).with_name("libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so"))
+
+
 @cache
-def library():
-    lib = ctypes.PyDLL(os.path.join(os.path.dirname(__file__), "libfinlab.so"))
-    pointer, whole = ctypes.c_void_p, ctypes.c_int
-    lib.fl_sizes.argtypes = [whole]
-    lib.fl_check.argtypes = [pointer, whole]
-    lib.fl_prepare.argtypes = [pointer, pointer]
-    lib.fl_answer_one.argtypes = [pointer] * 7
-    lib.fl_answer_many.argtypes = [pointer] * 3 + [whole] + [pointer] * 6
-    lib.fl_first.argtypes = [pointer] * 4
-    lib.fl_look.argtypes = [pointer] * 5
-    lib.fl_look.restype = ctypes.c_double
-    lib.fl_worth.argtypes = lib.fl_support.argtypes = [pointer, pointer, pointer, whole, pointer]
-    return lib
+def library() -> ctypes.PyDLL:
+    """Returns the library. Its functions keep the interpreter's lock: a call takes microseconds.
+
+    Raises:
+        FinlabError: it is missing, does not load here, or was compiled from other C files.
+    """
+    try:
+        core = ctypes.PyDLL(str(PATH))
+    except OSError as error:
+        problem = f"cannot be loaded ({error})" if PATH.exists() else "is missing"
+    else:
+        version = core.fl_version() if hasattr(core, "fl_version") else 0
+        if version == VERSION:
+            for name, kinds in SIGNATURES.items():
+                function = getattr(core, name)
+                function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+                function.restype = _TYPES[kinds[0]]
+            return core
+        problem = f"has version {version}, and this finlab needs {VERSION}"
+    raise FinlabError(
+        f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source tree, "
+        "elsewhere install finlab again"
+    )

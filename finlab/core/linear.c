@@ -1,12 +1,6 @@
 /* Small dense systems, and the affine combination of few points that comes nearest to another. */
 #include "inner.h"
 
-real dot(const real *a, const real *b, int n) {
-  real sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
-
 real wrapped(real angle) { return angle - 2 * PI * FLOOR((angle + PI) / (2 * PI)); }
 
 /* Cholesky factor of the lower triangle of a (n x n), its diagonal inverted; 0 where a is singular to rounding. */

@@ -8,7 +8,8 @@ import numpy as np
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
 from finlab.arrays import Array
 from finlab.axes import TURN
-from finlab.core.calls import MAGIC, VERSION, Core
+from finlab.core.calls import MAGIC, Core
+from finlab.core.library import VERSION
 from finlab.precision import CLOSE, NEARLY, NOTHING
 
 
