@@ -104,7 +104,7 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
       within &= status == FL_MET;
   }
   out->within = within;
-  if (!within && policy) in_its_place(block, work, wrench, policy, out);
+  if (policy && (!within || policy->always)) in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
   out->steps = work->steps, out->ended = work->ended;
 }

@@ -40,18 +40,19 @@ class _Policy(ctypes.Structure):
     _fields_ = [
         ("kind", ctypes.c_int),
         ("groups", ctypes.c_int),
+        ("always", ctypes.c_int),
         ("weight", ctypes.c_double * 6),
         ("group", ctypes.c_ubyte * 36),
     ]
 
 
 @lru_cache(maxsize=64)
-def _policy(policy: Any) -> _Policy:
+def _policy(policy: Any, always: bool) -> _Policy:
     groups = policy.groups
     weights = np.array(policy.axis_weights)
     masks = np.concatenate([*groups, np.zeros(36 - 6 * len(groups))]).astype(int).tolist()
     kind = ("closest", "direction", "priority").index(policy.kind)
-    return _Policy(kind, len(groups), tuple(weights / weights.max()), tuple(masks))
+    return _Policy(kind, len(groups), always, tuple(weights / weights.max()), tuple(masks))
 
 
 class Core:
@@ -72,12 +73,18 @@ class Core:
             raise ValueError(f"the core takes the robot for {CODES[error]}")
 
     def one(
-        self, wrench: Array, policy: Any, inner: Array | None = None, limits: Array | None = None
+        self,
+        wrench: Array,
+        policy: Any,
+        inner: Array | None = None,
+        limits: Array | None = None,
+        always: bool = False,
     ) -> tuple[Found, Array, int]:
         """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method ended
-        (`MET` ...); `inner` are such prices to begin at, `limits` rows (n, 4) of least and largest force, middle and half of the arc."""
+        (`MET` ...); `inner` are such prices to begin at, `limits` rows (n, 4) of least and largest force, middle and half of the arc; a policy is
+        served where the wrench is out of reach, or `always`."""
         wrench = np.ascontiguousarray(wrench)
-        own = None if policy is None else ctypes.byref(_policy(policy))
+        own = None if policy is None else ctypes.byref(_policy(policy, always))
         starts = [None if values is None else np.ascontiguousarray(values) for values in (inner, limits)]
         places = [None if values is None else values.ctypes.data for values in starts]
         if error := self._core.fl_answer_one(
@@ -96,7 +103,7 @@ class Core:
         wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
         force, value = np.empty((count, self._count, 2)), np.empty(count)
         price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
-        own = None if policy is None else ctypes.byref(_policy(policy))
+        own = None if policy is None else ctypes.byref(_policy(policy, False))
         outs = [values.ctypes.data for values in (force, price, aim, value, within)]
         error = self._core.fl_answer_many(self._at, self._work, wrenches.ctypes.data, count, own, *outs)
         if error > 0:

@@ -16,6 +16,9 @@ typedef double fl_real;
 #ifndef FL_MOST
 #define FL_MOST 64 /* actuators */
 #endif
+#ifndef FL_PARTS
+#define FL_PARTS 1000 /* of sets with gaps that are looked at for one target */
+#endif
 #define FL_VERSION 1
 #define FL_MAGIC 41721 /* first number of a block */
 
@@ -89,7 +92,7 @@ typedef struct {
 enum { FL_MET, FL_BEYOND, FL_STUCK };
 enum { FL_CLOSEST, FL_DIRECTION, FL_PRIORITY };
 typedef struct {
-  int policy, groups;
+  int policy, groups, always; /* always: also where a target seems within reach */
   fl_real weight[6];     /* of the axes, largest 1, for FL_CLOSEST */
   unsigned char group[6][6]; /* axes of each group, for FL_PRIORITY */
 } fl_policy;

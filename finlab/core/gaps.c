@@ -5,8 +5,7 @@
 #include "inner.h"
 
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
-#define NARROW R(0.2)  /* half of an arc up to which the chord stands for the arc of the least forces */
-#define MOST_PARTS 300
+
 
 static int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
 static real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
@@ -142,22 +141,28 @@ fl_node *last_open(const real *block, fl_work *work, int *depth) {
   return 0;
 }
 
-/* Whether forces are met by what the actuators can give. The smoothed dual of a narrow arc may have a force
-   that is smaller than any in it. */
-static int is_full(const real *block, const fl_work *work, int status, int gap) {
-  if (status != FL_MET || gap >= 0) return 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_set *s = work->set + i;
-    if (is_plane(ACTUATOR(block, i)) && s->half <= NARROW && size_of(work->now->force[i]) < R(0.9) * s->low)
-      return 0;
-  }
-  return 1;
+/* Whether the smoothed answer of an arc has a force that is smaller than any in it. */
+static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
+  return is_plane(ACTUATOR(block, i)) && set->half <= NARROW && size_of(force) < R(0.9) * set->low;
+}
+
+static int any_hollow(const real *block, const fl_work *work) {
+  for (int i = 0; i < COUNT(block); i++)
+    if (is_hollow(block, i, work->set + i, work->now->force[i])) return 1;
+  return 0;
+}
+
+/* Freezes a plane at its least force, in the direction of a force or next to it in its arc. */
+static void freeze_at_least(const real *block, int i, fl_set *set, const real *force) {
+  real off = CLIP(wrapped(ATAN2(force[1], force[0]) - set->middle), -set->half, set->half);
+  real least[2] = {set->low * COS(set->middle + off), set->low * SIN(set->middle + off)};
+  freeze(block, i, set, least);
 }
 
 /* Remembers an answer without a gap; whether one with a gap could still be cheaper. */
 static int keep(const real *block, fl_work *work, int status, int gap, real *best) {
   real value = work->now->value;
-  if (is_full(block, work, status, gap)) {
+  if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
     if (value < *best) *best = value, memcpy(work->best, work->now->force, sizeof work->best);
     return 0;
   }
@@ -171,15 +176,14 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
     const fl_state *s = work->now;
     real largest = largest_of(block, (real(*)[2])s->force);
     int gap = worst_gap(block, work, (real(*)[2])s->force, s->price);
-    if (!keep(block, work, status, gap, best) || gap < 0) return;
+    if (!keep(block, work, status, gap, best)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
-      real force[2] = {s->force[i][0], s->force[i][1]};
-      if (!(gap_of(block, i, set, force, largest, s->price) > 0)) continue;
-      if (is_plane(ACTUATOR(block, i)) && size_of(force) < R(0.98) * set->low) {
-        real off = CLIP(wrapped(ATAN2(force[1], force[0]) - set->middle), -set->half, set->half);
-        force[0] = set->low * COS(set->middle + off), force[1] = set->low * SIN(set->middle + off);
-        freeze(block, i, set, force);
+      const real *force = s->force[i];
+      int hollow = is_hollow(block, i, set, force);
+      if (!hollow && !(gap_of(block, i, set, force, largest, s->price) > 0)) continue;
+      if (hollow || (is_plane(ACTUATOR(block, i)) && size_of(force) < R(0.98) * set->low)) {
+        freeze_at_least(block, i, set, force);
       } else
         narrow(block, i, set, force, nearer_side(block, i, set, force));
     }
@@ -224,8 +228,16 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   work->now = work->state;
   for (status = root;;) {
     fl_state *s = work->now;
-    int gap = worst_gap(block, work, s->force, s->price), open = keep(block, work, status, gap, &best) && gap >= 0;
-    if (open && parts < MOST_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
+    int gap = worst_gap(block, work, s->force, s->price), open = keep(block, work, status, gap, &best);
+    if (open && gap < 0) { /* hollow: at their least forces */
+      real own = s->value;
+      fl_set before[FL_MOST];
+      memcpy(before, work->set, sizeof before);
+      dive(block, work, target, status, &best);
+      memcpy(work->set, before, sizeof before);
+      bound = MIN(bound, own), status = FL_BEYOND, open = 0;
+    }
+    if (open && parts < FL_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
       status = cheaper_side(block, work, target, node), parts += 2;
       continue;
     }

@@ -90,6 +90,7 @@ void to_basis(const real *block, const real *wrench, real *target);
 void wrench_of(const real *block, real force[][2], real *wrench);
 
 /* gaps.c */
+#define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
 #define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
 int worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
 int nearer_side(const real *block, int i, const fl_set *set, const real *force);

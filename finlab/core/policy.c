@@ -224,9 +224,12 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   to_basis(block, out->aim, target); /* another part of the sets may give it for less */
   int status = newton(block, work, target, 0, MOST_STEPS);
   if (status == FL_BEYOND) return;
+  memcpy(out->inner, work->now->price, sizeof out->inner); /* those of all sets prove more than those of a part */
   int gap = worst_gap(block, work, work->now->force, work->now->price);
   if (gap < 0 && status == FL_MET)
     memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
-  else if (gap >= 0 && least_power(block, work, target, status, &value))
+  else if (gap >= 0 && least_power(block, work, target, status, &value)) {
     memcpy(out->force, work->best, COUNT(block) * sizeof out->force[0]);
+    out->value = value * (1 - FINE);
+  }
 }

@@ -232,7 +232,7 @@ class Dual(Method):
         command, prices = self._near(wrench, found.force, first, prices, status)
         within = not np.isnan(command).any()
         if not within and policy is not None:
-            found, prices, _ = core.one(wrench, policy, inner)
+            found, prices, _ = core.one(wrench, policy, inner, always=True)
         # What the tables prove leaves out what foils do beyond them.
         price = robot.price(prices)[None]
         known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
