@@ -22,6 +22,7 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
 )
+from finlab.actuators.form import Form
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
@@ -68,6 +69,10 @@ class AzimuthGroup(Group):
             _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
             for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
         ]
+
+    @property
+    def forms(self) -> list[Form]:
+        return [Form("pod")] * len(self.responses)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as

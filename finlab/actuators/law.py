@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.form import size_numbers
 from finlab.arrays import Array, Values, library_of
 
 OWN_INERTIA = 0.0097
@@ -133,6 +134,16 @@ class FinLaw(ActuatorLaw):
     blade: Blade = Blade()
     """The plate whose beating takes power, where nothing better is known."""
 
+    offset: Any = 0.0
+    """Angle [rad] from the zero direction to the thrust, where the law has one for all."""
+    unevenness: tuple[float, float] = (0.0, 0.0)
+    """e and phi_e: how the size depends on the zero direction, as 1 + e cos(phi - phi_e)."""
+
+    @abstractmethod
+    def grid_numbers(self, lower: Array, upper: Array) -> Array:
+        """Returns the law of one fin within limits (3,) as a grid for the core; see `finlab.actuators.form`:
+        forces along own axes, or their size alone, without the unevenness."""
+
     def power(self, command: Values, inflow: Array | None = None) -> Values:
         return self.blade.power(command[..., 0], command[..., 1])
 
@@ -145,8 +156,10 @@ class FinLaw(ActuatorLaw):
 class PlanarLaw(FinLaw):
     """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction."""
 
-    offset: Any = 0.0
-    """Angle [rad] from the zero direction to the thrust."""
+    def grid_numbers(self, lower: Array, upper: Array) -> Array:
+        """See `FinLaw`: of the size."""
+        even, around = 1.0 + self.unevenness[0], self.unevenness[1]
+        return size_numbers(lambda a, f: np.asarray(self.thrust(a, f, around) / even), lower, upper)
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from finlab.actuators.form import Form
 from finlab.actuators.thrust_model import lower_hull
 from finlab.arrays import Array
 
@@ -270,6 +271,11 @@ class Group(ABC):
         """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth at prices
         (N, 6) of the wrench, less its power; None where the answers' forces are all."""
         return None
+
+    @property
+    @abstractmethod
+    def forms(self) -> list[Form]:
+        """How the forces of each become commands."""
 
     @abstractmethod
     def commands(self, force: Array, previous: Array | None = None) -> Array:

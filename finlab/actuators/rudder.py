@@ -19,6 +19,7 @@ from msgspec import Meta
 
 from finlab.actuators import actuator
 from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.form import Form, grid_numbers
 from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
 from finlab.axes import AHEAD, SHORT, Direction3, Vector, across, arc_words
@@ -145,6 +146,13 @@ class RudderGroup(Group):
         angle = np.linspace(0.0, 0.3 * np.pi, CELLS)[:, None] + np.zeros(len(rudders))
         result = self._law.coefficients(angle)
         self._curves, self._tables = [], []
+        around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, CELLS, endpoint=False)
+        whole = self._law.coefficients(around[:, None] + np.zeros(len(rudders)))
+        still = np.zeros(1)
+        self._grids = [
+            grid_numbers((still, still, around), np.stack(pair, axis=-1)[None, None], period=np.pi)
+            for pair in zip(whole.lift.T, whole.drag.T, strict=True)
+        ]
         for lift, drag in zip(result.lift.T, result.drag.T, strict=True):
             falls = np.append(np.diff(lift) <= 0.0, True)
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
@@ -221,6 +229,17 @@ class RudderGroup(Group):
         most = np.array([lifts[-1] for lifts, _, _ in self._curves])[:, None]
         lift = np.clip(self._law.coefficients(near.T).lift.T, -most, most)
         return np.asarray(lift * self._met.pressure[:, None])
+
+    @property
+    def forms(self) -> list[Form]:
+        forms, (pressure, course) = [], (self._met.pressure, self._met.course)
+        for i, (lifts, angles, _) in enumerate(self._curves):
+            cos, sin = np.cos(course[i]), np.sin(course[i])
+            axes = np.array([[0.0, -sin, cos], [0.0, -cos, -sin], [0.0, 0.0, 0.0]])
+            foil = (max(pressure[i], NOTHING), self._turned[i], self._law.drag[i])
+            numbers = (1.0, course[i], 0.0, 0.0, *foil)
+            forms.append(Form("foil", axes, self._grids[i], np.stack([lifts, angles], axis=-1), numbers=numbers))
+        return forms
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)

@@ -20,6 +20,7 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
 )
+from finlab.actuators.form import Form
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
@@ -58,6 +59,10 @@ class ThrusterGroup(Group):
         ]
         self._limits = np.array([thruster.force for thruster in thrusters])
         self._power = ThrustPower([thruster.model for thruster in thrusters])
+
+    @property
+    def forms(self) -> list[Form]:
+        return [Form("thruster", numbers=(sign, *Form("thruster").numbers[1:])) for sign in self._sign]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         command = np.zeros((*force.shape[:-1], 3))

@@ -27,6 +27,22 @@ static int is_table(const real *block, real place, real length, int counted, int
          is_place(place, length, (counted ? 3 : 1) + each * ((int)count + more));
 }
 
+static int is_grid(const real *block, real place, real length) {
+  if (!(place > 0 && is_place(place, length, 7))) return 0;
+  const real *grid = block + (int)place;
+  real knots = 0, points = 1;
+  for (int k = 0; k < 3; k++) {
+    if (!(grid[k] >= 1 && grid[k] <= 65536 && grid[k] == FLOOR(grid[k]))) return 0;
+    knots += grid[k], points *= grid[k];
+  }
+  if (!(grid[3] >= 0 && grid[5] >= 1 && grid[5] <= 3 && grid[5] == FLOOR(grid[5]))) return 0;
+  if (!is_place(place, length, 7) || place + 7 + knots + points * grid[5] > length) return 0;
+  for (int k = 0, at = 7; k < 3; at += (int)grid[k++])
+    for (int j = 1; j < (int)grid[k]; j++)
+      if (!(grid[at + j] > grid[at + j - 1])) return 0;
+  return 1;
+}
+
 /* Whether a block can be worked with; an error code. */
 int fl_check(const real *block, int length) {
   const int head = sizeof(fl_head) / sizeof(real), own = sizeof(fl_actuator) / sizeof(real);
@@ -43,7 +59,12 @@ int fl_check(const real *block, int length) {
     if (a->rows != 1 && a->rows != 2) return FL_BAD_BLOCK;
     if (!is_table(block, a->ahead, h->length, 1, 3, 1)) return FL_BAD_BLOCK;
     if (a->back != 0 && !is_table(block, a->back, h->length, 1, 3, 1)) return FL_BAD_BLOCK;
-    if (a->gauge != 0 && !is_table(block, a->gauge, h->length, 0, 3, 0)) return FL_BAD_BLOCK;
+    if (a->gauge != 0 && !is_table(block, a->gauge, h->length, 0, 4, 0)) return FL_BAD_BLOCK;
+    if (!(a->form >= FL_THRUSTER && a->form <= FL_FOIL && a->form == FLOOR(a->form))) return FL_BAD_BLOCK;
+    if (a->form >= FL_FIN && !is_table(block, a->beat, h->length, 0, 2, a->form == FL_FIN)) return FL_BAD_BLOCK;
+    if (a->form >= FL_FIN && !is_grid(block, a->law, h->length)) return FL_BAD_BLOCK;
+    for (int k = 0; k < 3; k++)
+      if (!(a->lower[k] <= a->upper[k] && a->step[k] >= 0)) return FL_BAD_NUMBER;
     if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;
     if (!(a->share > 0 && a->worth > 0 && a->most[0] > 0 && a->low <= a->high && a->half >= 0)) return FL_BAD_NUMBER;
     if (!(a->band >= 0 && a->speed >= 0 && a->gain[0] >= 0 && a->gain[1] >= 0)) return FL_BAD_NUMBER;
@@ -61,25 +82,29 @@ static int in_range(const real *block, const real *wrench, const real *target) {
   return SQRT(rest) <= NEARLY * (R(1e-3) + SQRT(size));
 }
 
-/* Limits of the forces: rows of least and largest force, middle and half of the arc; none for all. */
-static void set_limits(const real *block, fl_work *work, const real *limits) {
+/* Limits of the forces for now: those of commands in a box, or all. */
+static void set_limits(const real *block, fl_work *work, const fl_box *box) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const real *own = limits ? limits + 4 * i : 0;
-    if (own)
-      limit(block, i, work->set + i, CLIP(own[0], a->low, a->high), CLIP(own[1], a->low, a->high), own[2], own[3]);
-    else
-      limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
+    real own[4] = {a->least, a->high, a->middle, a->half};
+    if (box) {
+      reach_of(block, i, box, own);
+      own[0] = CLIP(own[0], a->low, a->high), own[1] = CLIP(own[1], a->low, a->high);
+    }
+    limit(block, i, work->set + i, own[0], own[1], own[2], own[3]);
   }
   sums_of(block, work);
 }
 
+/* Forces for a wrench, of which what is on top of the forces is taken off already. */
 static void answer(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, const real *price,
                    fl_answer *out) {
   int n = COUNT(block), r = RANGE(block);
   real target[6];
-  memset(out, 0, sizeof *out);
-  work->steps = work->ended = 0;
+  out->value = 0, out->status = FL_MET;
+  memset(out->inner, 0, sizeof out->inner);
+  memset(out->price, 0, sizeof out->price);
+  memset(out->force, 0, n * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof out->aim);
   to_basis(block, wrench, target);
   if (r == 0) { /* nothing pushes, such as foils at rest */
@@ -106,35 +131,76 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
   out->within = within;
   if (policy && (!within || policy->always)) in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
-  out->steps = work->steps, out->ended = work->ended;
 }
 
-/* Forces for a wrench, of which what is on top of the forces is taken off already; Newton's method begins at prices
-   in the basis, where there are some, and forces keep within limits (n, 4), where there are some. */
-int fl_answer_one(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, const real *price,
-                  const real *limits, fl_answer *out) {
-  if (!is_finite(wrench, 6) || (price && !is_finite(price, 6))) return FL_BAD_ARGUMENT;
-  if (limits && !is_finite(limits, 4 * COUNT(block))) return FL_BAD_ARGUMENT;
-  if (limits) set_limits(block, work, limits);
-  answer(block, work, wrench, policy, price, out);
-  if (limits) set_limits(block, work, 0);
+/* The commands that come nearest to an aim among those that may follow the previous ones. */
+static void in_a_tick(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
+  static const fl_policy nearest = {FL_CLOSEST, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  const fl_head *h = HEAD(block);
+  fl_answer own;
+  real wrench[6], price[6];
+  for (int k = 0; k < 6; k++) wrench[k] = out->aim[k] - h->beside[k];
+  memcpy(price, out->inner, sizeof price);
+  tick_limits(block, q->previous, &work->box);
+  set_limits(block, work, &work->box);
+  answer(block, work, wrench, &nearest, price, &own);
+  set_limits(block, work, 0);
+  commands_for(block, &work->box, own.force, q->previous, out->command);
+  out->error = refine(block, work, &work->box, out->aim, out->command, TICK_STEPS);
+  rest_in_bands(block, &work->box, out->command);
+  into_limits(block, out->command);
+}
+
+static int answered(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
+  const fl_head *h = HEAD(block);
+  real wrench[6];
+  for (int k = 0; k < 6; k++) wrench[k] = q->wrench[k] - h->beside[k];
+  work->steps = work->ended = 0;
+  answer(block, work, wrench, q->policy, q->price, out);
+  for (int k = 0; k < 6; k++) out->aim[k] = out->within ? q->wrench[k] : out->aim[k] + h->beside[k];
+  all_limits(block, &work->box);
+  commands_for(block, &work->box, out->force, q->previous, out->command);
+  out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
+  rest_in_bands(block, &work->box, out->command);
+  if (q->previous && !may_follow(block, q->previous, out->command)) in_a_tick(block, work, q, out);
+  out->steps = work->steps, out->ended = work->ended;
   return 0;
 }
 
-/* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, within. */
+/* An answer to a question; an error code. */
+int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
+  if (!is_finite(q->wrench, 6) || (q->price && !is_finite(q->price, 6))) return FL_BAD_ARGUMENT;
+  for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
+    if (FABS(q->previous[k]) > R(1e30)) return FL_BAD_ARGUMENT;
+  return answered(block, work, q, out);
+}
+
+/* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands
+   (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
 int fl_answer_many(const real *block, fl_work *work, const real *wrench, int count, const fl_policy *policy,
-                   real *force, real *price, real *aim, real *value, unsigned char *within) {
+                   real *force, real *price, real *aim, real *value, real *command, unsigned char *within) {
   int n = COUNT(block), ended = 0;
+  fl_question q = {{0}, policy, 0, 0};
   fl_answer out;
   for (int k = 0; k < count; k++) {
-    int error = fl_answer_one(block, work, wrench + 6 * k, policy, 0, 0, &out);
+    memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
+    int error = fl_answer_one(block, work, &q, &out);
     if (error) return error;
     memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
     memcpy(price + 6 * k, out.price, sizeof out.price);
     memcpy(aim + 6 * k, out.aim, sizeof out.aim);
+    memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
     value[k] = out.value, within[k] = out.within, ended |= out.ended;
   }
   return ended ? -1 : 0;
+}
+
+/* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of previous ones (n, 3). */
+void fl_commands(const real *block, fl_work *work, const real *force, int count, const real *previous, real *command) {
+  int n = COUNT(block);
+  all_limits(block, &work->box);
+  for (int k = 0; k < count; k++)
+    commands_for(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
 }
 
 /* What prices (6,) of the wrench in the basis [W] give: forces (n, 2), and the dual value for a wrench. */

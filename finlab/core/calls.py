@@ -14,8 +14,8 @@ MAGIC = 41721.0
 """First number of a block; its version is the second."""
 MET, BEYOND, STUCK = range(3)
 """How Newton's method ends: at a target, where it is proved to be out of reach, at its bound of steps."""
-ANSWER = 19
-"""Numbers of an answer after its forces."""
+MOST = 64
+"""Actuators of a robot at most."""
 CODES = ("", "no block of a robot", "a block of another version", "a number out of range", "a bad argument")
 
 
@@ -32,6 +32,8 @@ class Found(NamedTuple):
     """Power (N,) [W] that gaps in the sets are proved to need; 0 where there is none."""
     within: NDArray[np.bool_]
     """Targets within reach (N,)."""
+    command: Array
+    """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
     ended: bool
     """Whether a search ended at its bound of steps."""
 
@@ -43,6 +45,31 @@ class _Policy(ctypes.Structure):
         ("always", ctypes.c_int),
         ("weight", ctypes.c_double * 6),
         ("group", ctypes.c_ubyte * 36),
+    ]
+
+
+class _Question(ctypes.Structure):
+    _fields_ = [
+        ("wrench", ctypes.c_double * 6),
+        ("policy", ctypes.c_void_p),
+        ("inner", ctypes.c_void_p),
+        ("previous", ctypes.c_void_p),
+    ]
+
+
+class _Answer(ctypes.Structure):
+    _fields_ = [
+        ("force", ctypes.c_double * (2 * MOST)),
+        ("price", ctypes.c_double * 6),
+        ("inner", ctypes.c_double * 6),
+        ("aim", ctypes.c_double * 6),
+        ("value", ctypes.c_double),
+        ("error", ctypes.c_double),
+        ("command", ctypes.c_double * (3 * MOST)),
+        ("status", ctypes.c_int),
+        ("within", ctypes.c_int),
+        ("steps", ctypes.c_int),
+        ("ended", ctypes.c_int),
     ]
 
 
@@ -63,13 +90,15 @@ class Core:
         core = library()
         self._core, self._block, self._count = core, block, count
         self._work = ctypes.create_string_buffer(core.fl_sizes(3))
-        self._out = ctypes.create_string_buffer(core.fl_sizes(5))
-        most = core.fl_sizes(6)
-        self._numbers = np.frombuffer(self._out, np.float64, 2 * most + ANSWER)
-        self._integers = np.frombuffer(self._out, np.int32, 4, 8 * (2 * most + ANSWER))
-        self._rest = self._numbers[2 * most :]
-        self._at = block.ctypes.data
-        if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._work):
+        self._question, self._answer = _Question(), _Answer()
+        self._to, self._from = ctypes.addressof(self._question), ctypes.addressof(self._answer)
+        self._force, self._command = (
+            np.ctypeslib.as_array(getattr(self._answer, name))[: width * count].reshape(1, count, width)
+            for name, width in (("force", 2), ("command", 3))
+        )
+        self._vectors = np.frombuffer(self._answer, np.float64, 20, 16 * MOST)
+        self._at, self._area = block.ctypes.data, ctypes.addressof(self._work)
+        if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area):
             raise ValueError(f"the core takes the robot for {CODES[error]}")
 
     def one(
@@ -77,43 +106,57 @@ class Core:
         wrench: Array,
         policy: Any,
         inner: Array | None = None,
-        limits: Array | None = None,
+        previous: Array | None = None,
         always: bool = False,
     ) -> tuple[Found, Array, int]:
         """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method ended
-        (`MET` ...); `inner` are such prices to begin at, `limits` rows (n, 4) of least and largest force, middle and half of the arc; a policy is
-        served where the wrench is out of reach, or `always`."""
-        wrench = np.ascontiguousarray(wrench)
-        own = None if policy is None else ctypes.byref(_policy(policy, always))
-        starts = [None if values is None else np.ascontiguousarray(values) for values in (inner, limits)]
-        places = [None if values is None else values.ctypes.data for values in starts]
-        if error := self._core.fl_answer_one(
-            self._at, self._work, wrench.ctypes.data, own, *places, self._out
-        ):
+        (`MET` ...). It begins at prices `inner`, where there are some; commands may follow `previous` ones
+        (n, 3); a policy is served where the wrench is out of reach, or `always`."""
+        question, answer = self._question, self._answer
+        question.wrench[:] = wrench.tolist()
+        question.policy = None if policy is None else ctypes.addressof(_policy(policy, always))
+        known = [None if values is None else np.ascontiguousarray(values) for values in (inner, previous)]
+        question.inner, question.previous = (None if own is None else own.ctypes.data for own in known)
+        if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
             raise ValueError(f"the core got {CODES[error]}")
-        force = self._numbers[: 2 * self._count].reshape(1, -1, 2).copy()
-        rest = self._rest.copy()
-        status, inside, _, ended = self._integers.tolist()
-        within = np.array([inside != 0])
-        found = Found(force, rest[None, :6], rest[None, 12:18], rest[18:], within, ended != 0)
-        return found, rest[6:12], status
+        vectors = self._vectors.copy()
+        found = Found(
+            self._force.copy(),
+            vectors[None, :6],
+            vectors[None, 12:18],
+            vectors[18:19],
+            np.array([answer.within != 0]),
+            self._command.copy(),
+            answer.ended != 0,
+        )
+        return found, vectors[6:12], answer.status
 
     def many(self, wrenches: Array, policy: Any) -> Found:
         """The answers to wrenches (N, 6)."""
         wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
         force, value = np.empty((count, self._count, 2)), np.empty(count)
         price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
-        own = None if policy is None else ctypes.byref(_policy(policy, False))
-        outs = [values.ctypes.data for values in (force, price, aim, value, within)]
-        error = self._core.fl_answer_many(self._at, self._work, wrenches.ctypes.data, count, own, *outs)
+        command = np.empty((count, self._count, 3))
+        own = None if policy is None else ctypes.addressof(_policy(policy, False))
+        outs = [values.ctypes.data for values in (force, price, aim, value, command, within)]
+        error = self._core.fl_answer_many(self._at, self._area, wrenches.ctypes.data, count, own, *outs)
         if error > 0:
             raise ValueError(f"the core got {CODES[error]}")
-        return Found(force, price, aim, value, within, error < 0)
+        return Found(force, price, aim, value, within, command, error < 0)
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """Commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep those of `previous` (n, 3)."""
+        force, command = np.ascontiguousarray(force), np.empty((len(force), self._count, 3))
+        before = None if previous is None else np.ascontiguousarray(previous)
+        start = None if before is None else before.ctypes.data
+        data = (force.ctypes.data, len(force), start, command.ctypes.data)
+        self._core.fl_commands(self._at, self._area, *data)
+        return command
 
     def first(self, wrench: Array) -> Array:
         """Prices (6,) [W] in the basis at which a search for a wrench (6,) begins."""
         wrench, inner = np.ascontiguousarray(wrench), np.zeros(6)
-        self._core.fl_first(self._at, self._work, wrench.ctypes.data, inner.ctypes.data)
+        self._core.fl_first(self._at, self._area, wrench.ctypes.data, inner.ctypes.data)
         return inner
 
     def look(self, wrench: Array, inner: Array) -> tuple[Array, float]:
@@ -121,19 +164,19 @@ class Core:
         wrench, inner = np.ascontiguousarray(wrench), np.ascontiguousarray(inner)
         force = np.empty((self._count, 2))
         data = (wrench.ctypes.data, inner.ctypes.data, force.ctypes.data)
-        return force, self._core.fl_look(self._at, self._work, *data)
+        return force, self._core.fl_look(self._at, self._area, *data)
 
     def worth(self, price: Array) -> Array:
         """At prices (N, 6) of the wrench, of each actuator (N, n, 3): prices along its force, ahead and in
         reverse, and what the force is worth, less its power [W]."""
         price = np.ascontiguousarray(price)
         worth = np.empty((len(price), self._count, 3))
-        self._core.fl_worth(self._at, self._work, price.ctypes.data, len(price), worth.ctypes.data)
+        self._core.fl_worth(self._at, self._area, price.ctypes.data, len(price), worth.ctypes.data)
         return worth
 
     def farthest(self, price: Array) -> Array:
         """Forces (N, n, 2) [N] that are worth most at prices (N, 6) of the wrench, whatever their power."""
         price = np.ascontiguousarray(price)
         force = np.empty((len(price), self._count, 2))
-        self._core.fl_support(self._at, self._work, price.ctypes.data, len(price), force.ctypes.data)
+        self._core.fl_support(self._at, self._area, price.ctypes.data, len(price), force.ctypes.data)
         return force

@@ -46,11 +46,23 @@ typedef struct {
   fl_real gain[2];       /* force over price of each row at the largest force, by half of it [N^2/W] */
   fl_real most[2];       /* largest force of each row [N] */
   fl_real matrix[2][6];  /* scaled wrench in the basis per newton of each row */
+  fl_real own[3][6];     /* wrench over the yardstick per newton along each of the own axes of the law */
+  fl_real form;          /* how forces become commands: FL_THRUSTER ... */
+  fl_real lower[3], upper[3]; /* limits of the command, unused ones 0 */
+  fl_real step[3];       /* largest changes of a command in a tick */
+  fl_real turns;         /* 1 where the angle of the command may turn freely */
+  fl_real law, beat;     /* places of the grid of its law, and of a fin's beat or a foil's curve of lift and angle */
+  fl_real sign;          /* of a thruster's command over its force */
+  fl_real lean, uneven, uneven_at; /* of a fin: angle from command to force; 1 + uneven cos(angle - uneven_at) */
+  fl_real pressure, turned, rest;  /* of a foil: force per coefficient [N], angle without lift, coefficient of drag there */
 } fl_actuator;
+enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
 
 /* A table: price of the largest force, cells k, power of the least force; then force, its derivative by the
-   price, conjugate at k + 1 prices top (j / k)^4. A gauge: points p; then support function, its derivative
-   and the gauge in p directions around the circle. */
+   price, conjugate at k + 1 prices top (j / k)^4. A gauge: points p; then support function, its derivative,
+   the gauge, and the angle from the command's direction to the force's in p directions around the circle. A curve:
+   points p; then pairs, the first number ascending. A beat: cells k; then amplitude and frequency of the shares
+   (j / k)^2 of the largest force. A grid: see law.c. */
 
 typedef struct { /* what one actuator may give now */
   fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
@@ -78,11 +90,18 @@ typedef struct { /* a cut on the way to one part of sets with gaps */
   int cut, first, both;                         /* actuator, side taken first, whether the other one was, too */
 } fl_node;
 
+typedef struct { /* commands that are allowed */
+  fl_real low[FL_MOST][3], high[FL_MOST][3];
+  int free[FL_MOST]; /* whether the angle may be any */
+} fl_box;
+
 typedef struct {
   fl_set set[FL_MOST];
   fl_state state[2], *now; /* what Newton's method looks at, and what it came to */
   fl_mixture mixture;
   fl_node node[FL_DEPTH];
+  fl_box box;
+  fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost, largest_power;
@@ -103,6 +122,8 @@ typedef struct {
   fl_real inner[6];          /* the same in the basis [W] */
   fl_real aim[6];            /* wrench that the forces give [N, N m] */
   fl_real value;             /* power that gaps are proved to need [W] */
+  fl_real error;             /* distance of the commands' wrench from the aim, on the yardstick, by the laws' tables */
+  fl_real command[FL_MOST][3];
   int status, within;        /* of Newton's method (FL_MET ...); within reach */
   int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
 } fl_answer;
@@ -114,10 +135,18 @@ int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_work, fl_policy, fl_answer; then FL_MOST */
 int fl_check(const fl_real *block, int length);
 int fl_prepare(const fl_real *block, fl_work *work);
-int fl_answer_one(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_policy *policy,
-                  const fl_real *price, const fl_real *limits, fl_answer *out);
+typedef struct {
+  fl_real wrench[6];       /* [N, N m] */
+  const fl_policy *policy; /* what to give beyond reach; 0: nothing else */
+  const fl_real *price;    /* in the basis: where to begin; 0 for none */
+  const fl_real *previous; /* commands (n, 3) of the tick before; 0 for none, NaN for an unknown one */
+} fl_question;
+int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, int count, const fl_policy *policy,
-                   fl_real *force, fl_real *price, fl_real *aim, fl_real *value, unsigned char *within);
+                   fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,
+                   unsigned char *within);
+void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
+                 fl_real *command);
 void fl_support(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *force);
 void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
 void fl_first(const fl_real *block, fl_work *work, const fl_real *wrench, fl_real *inner);

@@ -66,6 +66,7 @@ real marginal(const real *table, real size, real *price);
 typedef struct { real value, slope, bend; } support;
 support gauge_support(const real *gauge, real x, real y);
 real gauge_at(const real *gauge, real angle);
+real lean_at(const real *gauge, real angle);
 
 /* reply.c */
 typedef struct { real force[2], xx, xy, yy, conjugate; } reply;
@@ -106,6 +107,22 @@ void nearest_point(const real *block, const fl_work *work, const real *weight, c
                    real apart, fl_mixture *m);
 void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
+
+/* law.c */
+void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]);
+void command_for(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command);
+void reach_of(const real *block, int i, const fl_box *box, real *limits);
+
+/* command.c */
+#define EXACT R(1e-8)
+#define TICK_STEPS 5
+void all_limits(const real *block, fl_box *box);
+void tick_limits(const real *block, const real *previous, fl_box *box);
+int may_follow(const real *block, const real *previous, real command[][3]);
+void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
+real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
+void into_limits(const real *block, real command[][3]);
+void rest_in_bands(const real *block, const fl_box *box, real command[][3]);
 
 /* policy.c */
 void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out);

@@ -58,7 +58,7 @@ support gauge_support(const real *gauge, real x, real y) {
   if (place < 0) place += points;
   int cell = (int)place % points, next = (cell + 1) % points;
   real t = place - FLOOR(place);
-  const real *a = gauge + 1 + 3 * cell, *z = gauge + 1 + 3 * next;
+  const real *a = gauge + 1 + 4 * cell, *z = gauge + 1 + 4 * next;
   real m0 = a[1] * step, m1 = z[1] * step, rise = z[0] - a[0];
   real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
   return (support){a[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / step,
@@ -72,7 +72,17 @@ real gauge_at(const real *gauge, real angle) {
   place -= points * FLOOR(place / points);
   int cell = (int)place % points;
   real t = place - FLOOR(place), at[4];
-  for (int k = 0; k < 4; k++) at[k] = gauge[1 + 3 * ((cell + k - 1 + points) % points) + 2];
+  for (int k = 0; k < 4; k++) at[k] = gauge[1 + 4 * ((cell + k - 1 + points) % points) + 2];
   real m0 = (at[2] - at[0]) / 2, m1 = (at[3] - at[1]) / 2, rise = at[2] - at[1];
   return at[1] + t * (m0 + t * (3 * rise - 2 * m0 - m1 + t * (m0 + m1 - 2 * rise)));
+}
+
+/* Angle from the command's direction to that of the force, in a direction of the force. */
+real lean_at(const real *gauge, real angle) {
+  int points = (int)gauge[0];
+  real place = angle / (2 * PI) * points;
+  place -= points * FLOOR(place / points);
+  int cell = (int)place % points;
+  real first = gauge[1 + 4 * cell + 3], last = gauge[1 + 4 * ((cell + 1) % points) + 3];
+  return first + wrapped(last - first) * (place - FLOOR(place));
 }

@@ -12,8 +12,10 @@ from finlab.actuators.fin.fin_model import FinModelSpec
 from finlab.actuators.fin.force_table_file import read_force_table
 from finlab.actuators.fin.formulas import Drag, Lighthill, Soft
 from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
+from finlab.actuators.form import grid_numbers
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.arrays import Array, Values, library_of
+from finlab.axes import TURN
 from finlab.bundle_files import archive_around
 
 
@@ -30,6 +32,11 @@ class GridLaw(FinLaw):
     def has_power(self) -> bool:
         """Whether it is known what power the fins take."""
         return self._grids.columns > 3
+
+    def grid_numbers(self, lower: Array, upper: Array) -> Array:
+        """See `FinLaw`: the table as it is."""
+        (grid,) = self._grids.grids
+        return grid_numbers(grid.axes, grid.values[..., :3], TURN if grid.periodic else 0.0)
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""

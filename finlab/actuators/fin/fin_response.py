@@ -16,11 +16,12 @@ import numpy as np
 from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
 from finlab.actuators.law import FinLaw, PlanarLaw
+from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn, wrapped
 from finlab.errors import DataError
-from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 GRID = 17, 33
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
@@ -47,6 +48,8 @@ class FinTable(NamedTuple):
     """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
     box: "_Box"
     """The law within the limits."""
+    form: Form
+    """How a force becomes a command."""
     deflection: Array
     """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
     same."""
@@ -79,6 +82,10 @@ class FinGroup(Group):
         self._lower, self._upper = limits.T
         self._middle = limits.mean(axis=1)
         self._even = all(each.gauge is None for each in tables)
+
+    @property
+    def forms(self) -> list[Form]:
+        return [table.form for table in self._tables]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`. What the table leaves undone, by the laws, is asked for on top."""
@@ -175,7 +182,24 @@ def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
     size = force[-1] * np.linspace(0.0, 1.0, POINTS + 1) ** 2
     beat = np.stack([np.interp(size, force, command[:, k]) for k in range(2)], axis=-1)
     middle, half, gauge, deflection = _directions(law, box)
-    return FinTable(table, middle, half, gauge, beat, box, deflection)
+    form = _form(law, box, beat, gauge, deflection)
+    return FinTable(table, middle, half, gauge, beat, box, form, deflection)
+
+
+def _form(law: FinLaw, box: "_Box", beat: Array, gauge: Array | None, deflection: Array) -> Form:
+    step = POINTS
+    while step > 1 and np.abs(_thinned(beat, step) - beat).max() > CLOSE * (box.upper - box.lower)[:2].max():
+        step //= 2
+    uneven, lean = law.unevenness, float(deflection[0]) if gauge is None else float(law.offset)
+    numbers = (1.0, lean, *uneven, 1.0, 0.0, 0.0)
+    grid = law.grid_numbers(box.lower, box.upper)
+    return Form("fin", None, grid, beat[::step], None if gauge is None else deflection, numbers)
+
+
+def _thinned(beat: Array, step: int) -> Array:
+    """What every `step`-th row of a table (POINTS + 1, 2) says of all."""
+    place = np.arange(len(beat))
+    return np.stack([np.interp(place, place[::step], column[::step]) for column in beat.T], axis=-1)
 
 
 class _Box:

@@ -85,7 +85,7 @@ class Soft(PlanarLaw):
     def __init__(self, k: Any, p: Any, x0: Any, q: Any, e: Any, phi_e: Any, d: Any) -> None:
         """Takes thrust scale [N], exponents, saturation [rad Hz], unevenness, its angle and lean [rad]."""
         self._k, self._p, self._x0, self._q, self._e, self._phi_e = k, p, x0, q, e, phi_e
-        self.offset = d
+        self.offset, self.unevenness = d, (e, phi_e)
         self.uniform = not np.any(e)
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:

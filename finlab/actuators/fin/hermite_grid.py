@@ -36,6 +36,7 @@ class HermiteGrids:
 
     def __init__(self, grids: list[Grid]) -> None:
         """Prepares the grids."""
+        self.grids = grids
         knots = [axis for grid in grids for axis in _closed(grid)]
         counts = np.array([len(axis) for axis in knots])
         first, last = np.array([axis[0] for axis in knots]), np.array([axis[-1] for axis in knots])

@@ -2,6 +2,7 @@
 
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +21,14 @@ class Compiled:
     """The actuators of one robot, ready for prices."""
 
     def __init__(
-        self, layout: Layout, plant: Plant, yardstick: Array, doubt: Array | None = None
+        self, layout: Layout, plant: Plant, yardstick: Array, period_s: float, doubt: Array | None = None
     ) -> None:
-        """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
-        beside its power is `doubt`, see `price_of_doubt`. Errors as for `FinGroup`."""
+        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick (6,)
+        and ticks of a period; what a squared force costs beside its power is `doubt`, see `price_of_doubt`.
+        Errors as for `FinGroup`."""
         self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
+        self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
+        self._effectiveness = plant.effectiveness
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -38,18 +42,21 @@ class Compiled:
         self._prepare()
 
     def _prepare(self) -> None:
-        responses: list[object] = [None] * self.count
+        responses: list[Any] = [None] * self.count
+        forms: list[Any] = [None] * self.count
         self.weight = np.zeros(self.count)
         """What doubt makes a squared force (n,) cost [W/N^2]."""
         for places, group in self.groups:
-            for place, response in zip(places, group.responses, strict=True):
+            for place, response, form in zip(places, group.responses, group.forms, strict=True):
                 if self.doubt is not None:
                     self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
                 weight = float(self.weight[place])
-                responses[place] = with_square(response, weight) if weight else response
-        self.robot: DualRobot = DualRobot(responses, self._yardstick)  # type: ignore[arg-type]
+                responses[place], forms[place] = with_square(response, weight) if weight else response, form
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
+        self.robot = DualRobot(
+            responses, forms, self._limits, self._effectiveness, self._yardstick, self.beside
+        )
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
@@ -79,17 +86,9 @@ class Compiled:
         """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench
         `beside`."""
         other = copy(self)
-        other.robot = self.robot.tilted(np.einsum("nka,naw->nkw", self._directions, effectiveness))
-        other.beside = beside
+        along = np.einsum("nka,naw->nkw", self._directions, effectiveness)
+        other.robot, other.beside = self.robot.tilted(along, effectiveness, beside), beside
         return other
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give forces (N, n, 2) [N] of the dual at least power."""
-        command = np.empty((len(force), self.count, 3))
-        for places, group in self.groups:
-            before = None if previous is None else previous[places]
-            command[:, places] = group.commands(force[:, places], before)
-        return command
 
     def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
         """See `Group.radial_worth`: where all actuators are alike, one answers for all."""
@@ -98,13 +97,6 @@ class Compiled:
                 worth = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))
                 return None if worth is None else worth.reshape(ahead.shape)
         return group.radial_worth(ahead, back)
-
-    def limits(self, lower: Array, upper: Array) -> Array:
-        """What commands between limits (n, 3) can give: rows (n, 4), see `Group.reach`."""
-        reach = np.empty((self.count, 4))
-        for places, group in self.groups:
-            reach[places] = group.reach(lower[places], upper[places])
-        return reach
 
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:

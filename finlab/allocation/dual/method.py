@@ -21,7 +21,7 @@ from finlab.allocation.dual.rates import Rates
 from finlab.allocation.dual.turns import Forces, Linear, settled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -60,7 +60,7 @@ class Dual(Method):
 
     def prepare(self) -> None:
         doubt = price_of_doubt(self.layout, self.scale, self.settings.robust)
-        self.compiled = Compiled(self.layout, self.plant, self.scale, doubt)
+        self.compiled = Compiled(self.layout, self.plant, self.scale, self.settings.period_s, doubt)
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
@@ -103,17 +103,13 @@ class Dual(Method):
     ) -> Solution:
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
-        resting = self.compiled.beside
-        forces = self.forces(targets - resting, policy, self.begin(prices))
+        forces = self.forces(targets, policy, self.begin(prices), previous)
         found = forces.found
-        aim = targets if found.within.all() else found.aim + resting
-        command = self.commands(aim, forces, previous)
+        aim, command = found.aim, self.exact(forces, previous)
         notes = {ENDED} if found.ended else set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command))
-        if previous is not None and not self.rates.allow(previous, command[0]):
-            command = self.in_a_tick(aim, forces, previous)
+                notes.add(self._kept_on_the_ray(targets[row], int(row), found, command))
         bound: Callable[[Array], Array] = partial(self.bound, aim, found.price, found.value)
         notes |= self.not_held(targets[~found.within])
         return Solution(
@@ -138,11 +134,11 @@ class Dual(Method):
         return other
 
     def _kept_on_the_ray(
-        self, target: Array, row: int, aim: Array, found: Found, command: Array
+        self, target: Array, row: int, found: Found, command: Array
     ) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
-        along = target / self.scale
+        along, aim = target / self.scale, found.aim
         low, high, size = 0.0, float(aim[row] / self.scale @ along), max(float(along @ along), 1e-300)
         if self.error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
             return ""
@@ -150,8 +146,8 @@ class Dual(Method):
         while high > low + CLOSE * size:
             share = 0.5 * (low + high)
             tried = share / size * target[None]
-            one = self.forces(tried - self.compiled.beside, None)
-            its = self.commands(tried, one)
+            one = self.forces(tried, None)
+            its = self.exact(one)
             if self.error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
                 found.price[row], found.value[row] = one.found.price[0], one.found.value[0]
@@ -209,25 +205,30 @@ class Dual(Method):
         measured = any(part.reads for part in self.layout.actuators)
         return measured or self.compiled.doubt is not None
 
-    def forces(self, targets: Array, policy: Policy | None, inner: Array | None = None) -> Forces:
+    def forces(
+        self, targets: Array, policy: Policy | None, inner: Array | None = None, previous: Array | None = None
+    ) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place; for a
-        single one the search begins at prices `inner` (6,) in the basis."""
+        single one the search begins at prices `inner` (6,) in the basis, and commands may follow `previous`
+        ones (n, 3)."""
         core = self.compiled.robot.core
         if self.compiled.robot.speed.any():
-            each = [self._with_drag(one, policy, inner) for one in targets]
+            each = [self._with_drag(one, policy, inner, previous) for one in targets]
             return each[0] if len(each) == 1 else _joined(each)
         if len(targets) == 1:
-            return Forces(*core.one(targets[0], policy, inner)[:2])
+            return Forces(*core.one(targets[0], policy, inner, previous)[:2])
         return Forces(core.many(targets, policy))
 
-    def _with_drag(self, wrench: Array, policy: Policy | None, inner: Array | None) -> Forces:
+    def _with_drag(
+        self, wrench: Array, policy: Policy | None, inner: Array | None, previous: Array | None
+    ) -> Forces:
         """The same for one wrench (6,) where foils drag, and a command: what the dual leaves to the laws."""
         robot, core = self.compiled.robot, self.compiled.robot.core
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
-            return Forces(*core.one(wrench, policy)[:2])
-        first = core.look(wrench, core.first(wrench))[0][None]
+            return Forces(*core.one(wrench, policy, previous=previous)[:2])
+        first = core.look(wrench - self.compiled.beside, core.first(wrench - self.compiled.beside))[0][None]
         if inner is None:
-            inner = self._padded(self.search.prices(self.compiled.commands(first)[0], self._directions))
+            inner = self._padded(self.search.prices(core.commands(first)[0], self._directions))
         found, prices, status = core.one(wrench, None, inner)
         command, prices = self._near(wrench, found.force, first, prices, status)
         within = not np.isnan(command).any()
@@ -236,6 +237,8 @@ class Dual(Method):
         # What the tables prove leaves out what foils do beyond them.
         price = robot.price(prices)[None]
         known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
+        if within:
+            known = known._replace(command=command)
         return Forces(known, prices, command)
 
     def _near(
@@ -243,17 +246,17 @@ class Dual(Method):
     ) -> tuple[Array, Array]:
         """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN where
         there is none; and its prices (6,)."""
-        search, core, begin = self.search, self.compiled.robot.core, self.compiled.commands(force)
-        aim = wrench + self.compiled.beside
-        if status == MET and self.error(begin, aim[None])[0] <= EXACT:
+        search, core = self.search, self.compiled.robot.core
+        begin, pushed = core.commands(force), wrench - self.compiled.beside
+        if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
             return begin, prices
-        value, best_of = core.look(wrench, prices)[1], partial(search.cheapest, aim / self.scale)
-        best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
+        value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
+        best = best_of(np.concatenate([begin, core.commands(first)]))
         if best is not None:
             if status != MET:
                 tried = self._padded(search.prices(best.command, self._directions))
                 prices, value = max(
-                    ((prices, value), (tried, core.look(wrench, tried)[1])), key=lambda known: known[1]
+                    ((prices, value), (tried, core.look(pushed, tried)[1])), key=lambda known: known[1]
                 )
             # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
             if self.compiled.doubt is None and best.cost <= 2.0 * value:
@@ -273,30 +276,42 @@ class Dual(Method):
         robot = self.compiled.robot
         return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
-    def commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
-        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
-            return self.plant.rested(forces.command)
-        command = self.compiled.commands(forces.found.force, previous)
-        error = self.error(command, aim)
-        rough = np.flatnonzero(error > EXACT)
+    def exact(self, forces: Forces, previous: Array | None = None) -> Array:
+        """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as what
+        may follow the `previous` ones (n, 3) comes."""
+        found, command = forces.found, forces.found.command
+        rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
         if not len(rough):
-            return self.plant.rested(command)
-        if forces.command is not None:
-            own = forces.command[rough]
-            command[rough] = np.where(np.isnan(own), command[rough], own)
+            return command
+        if previous is not None:
+            return self._follow(found, forces.inner, previous)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
         for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
-            ends = refine(self.search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+            ends = refine(self.search.problem, found.aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
-            for row in rows[(ends.error > NEARLY) & forces.found.within[rows]].tolist():
+            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
                 starts = command[row] + shares * draw * self.search.problem.width
-                other = self.search.exact(aim[row] / self.scale, starts)
+                other = self.search.exact(found.aim[row] / self.scale, starts)
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
+
+    def _follow(self, found: Found, inner: Array | None, previous: Array) -> Array:
+        """Steps by the laws on a command of a tick, in the box of what may follow the previous one (n, 3)."""
+        if self.rates.allow(previous, found.command[0]):
+            free = self.exact(Forces(found._replace(command=found.command.copy()), inner))
+            if self.rates.allow(previous, free[0]):
+                return free
+        box = self.rates.box(previous)
+        full = box.free[:, 2] & self.plant.full_turn
+        problem = replace(self.search.problem, lower=box.lower, upper=box.upper, full_turn=full)
+        start = box.clipped(found.command)
+        command = refine(problem, found.aim / self.scale, start, TICK_STEPS, EXACT).command
+        command = self.plant.feasible(box.clipped(command))
+        rested = self.plant.rested(command)
+        return np.where(box.clipped(rested) == rested, rested, command)
 
     def error(self, command: Array, aim: Array) -> Array:
         return self._missing(self.plant.wrench_of(self.plant.force(command)), aim)
@@ -304,21 +319,6 @@ class Dual(Method):
     def _missing(self, wrench: Array, aim: Array) -> Array:
         missing = (wrench - aim) / self.scale
         return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
-
-    def in_a_tick(self, aim: Array, forces: Forces, previous: Array) -> Array:
-        """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
-        a previous one (n, 3); `forces` is the answer without limits of that kind."""
-        box = self.rates.box(previous)
-        limits, full = self.compiled.limits(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
-        problem = replace(self.search.problem, lower=box.lower, upper=box.upper, full_turn=full)
-        wrench = aim[0] - self.compiled.beside
-        found, _, _ = self.compiled.robot.core.one(wrench, CLOSEST, forces.inner, limits)
-        command = self.plant.feasible(box.clipped(self.compiled.commands(found.force, previous)))
-        if self.error(command, aim)[0] > EXACT:
-            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
-            command = self.plant.feasible(box.clipped(command))
-        rested = self.plant.rested(command)
-        return np.where(box.clipped(rested) == rested, rested, command)
 
 
 def _joined(each: Sequence[Forces]) -> Forces:

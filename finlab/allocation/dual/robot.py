@@ -1,10 +1,12 @@
 """A robot as the core sees it: scaled effectiveness in the range that its actuators span, and their tables."""
 
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
 
 import numpy as np
 
+from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
 from finlab.arrays import Array
 from finlab.axes import TURN
@@ -16,10 +18,20 @@ from finlab.precision import CLOSE, NEARLY, NOTHING
 class DualRobot:
     """One robot, prepared of the responses of its n actuators: forces along one or two directions of each."""
 
-    def __init__(self, responses: list[Response], yardstick: Array | None = None) -> None:
-        """Takes what the actuators offer, and the yardstick (6,) of errors [N, N m]."""
-        self.responses = responses
-        self.yardstick = np.ones(6) if yardstick is None else yardstick
+    def __init__(
+        self,
+        responses: list[Response],
+        forms: list[Form],
+        limits: Sequence[Array],
+        effectiveness: Array,
+        yardstick: Array,
+        beside: Array | None = None,
+    ) -> None:
+        """Takes what the actuators offer, how forces become commands, least and largest commands, largest
+        changes in a tick and free angles (n, 3), the wrench (n, 3, 6) per newton along their own axes, the
+        yardstick (6,) of errors, and the wrench (6,) on top of that of the forces [N, N m]."""
+        self.responses, self._forms, self._limits = responses, forms, limits
+        self.yardstick, self.beside = yardstick, np.zeros(6) if beside is None else beside
         self.ends = np.array([each.ends for each in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.lines = np.array([isinstance(each, Line) for each in responses])
@@ -35,12 +47,14 @@ class DualRobot:
         """Largest force (n, 2) [N] along each direction."""
         self._gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
         self._gain = self._gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
-        self._tables, self._places = _tables_of(responses, _HEAD + _EACH * len(responses))
-        self._span(np.array([each.rows for each in responses]))
+        self._tables, self._places = _tables_of(responses, forms, _HEAD + _EACH * len(responses))
+        self._span(np.array([each.rows for each in responses]), effectiveness)
 
-    def _span(self, effectiveness: Array) -> None:
+    def _span(self, effectiveness: Array, own: Array) -> None:
         self.effectiveness = effectiveness
         """Wrench (n, 2, 6) per newton along each direction."""
+        axes = np.array([np.eye(3) if form.axes is None else form.axes for form in self._forms])
+        self._own = axes @ own / self.yardstick
         scaled = (effectiveness * self._sizes[..., None]).reshape(-1, 6)
         size = np.sqrt((scaled**2).sum(axis=0))
         self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
@@ -51,11 +65,12 @@ class DualRobot:
         self.core = Core(self._block(), len(self.responses))
         """The robot in the core."""
 
-    def tilted(self, effectiveness: Array) -> "DualRobot":
-        """The same actuators with another effectiveness (n, 2, 6)."""
+    def tilted(self, effectiveness: Array, own: Array, beside: Array) -> "DualRobot":
+        """The same actuators with another effectiveness (n, 2, 6) along their directions and (n, 3, 6) along
+        their own axes, and another wrench on top."""
         other = copy(self)
-        other.__dict__.pop("largest_power", None)
-        other._span(effectiveness)
+        other.beside = beside
+        other._span(effectiveness, own)
         return other
 
     @cached_property
@@ -83,50 +98,71 @@ class DualRobot:
         matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
         length = _HEAD + _EACH * len(self.responses) + len(self._tables)
         head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
-        parts = [head, self.scale, self.yardstick, np.zeros(6), basis.ravel()]
+        parts = [head, self.scale, self.yardstick, self.beside, basis.ravel()]
         for i, each in enumerate(self.responses):
-            ahead, back, gauge = self._places[i]
+            (ahead, back, gauge, law, beat), form = self._places[i], self._forms[i]
             low, high = self.ends[i]
             plane = isinstance(each, Plane)
             least = 0.0 if isinstance(each, Plane) and _needs_no_reverse(each) else low
             arc = (each.middle, each.half) if isinstance(each, Plane) else (0.0, 0.0)
             rows = 2.0 if plane or self.speed[i] > 0.0 else 1.0
             own = [rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band, self.speed[i]]
-            parts += [np.array(own), self._gain[i], self.most[i], matrix[i].ravel()]
+            parts += [np.array(own), self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()]
+            lower, upper, step, turns = (values[i] for values in self._limits)
+            sign, *numbers = form.numbers
+            parts += [[KINDS.index(form.kind)], lower, upper, np.minimum(step, 1e30)]
+            parts += [[turns.any(), law, beat, sign, *numbers]]
         return np.concatenate([*parts, self._tables])
 
 
-_HEAD, _EACH = 59, 29
+_HEAD, _EACH = 59, 67
+KINDS = "thruster", "pod", "fin", "foil"
 
 
-def _tables_of(responses: list[Response], start: int) -> tuple[Array, list[tuple[int, int, int]]]:
-    """Tables of a block that begin at a place, and each actuator's places: ahead, in reverse, gauge."""
+def _tables_of(
+    responses: list[Response], forms: list[Form], start: int
+) -> tuple[Array, list[tuple[int, ...]]]:
+    """Tables of a block that begin at a place, and each actuator's places: ahead, in reverse, gauge, law, beat."""
     numbers: list[Array] = []
     known: dict[int, int] = {}
     end = start
 
-    def placed(own: RadialTable | Array | None) -> int:
+    def placed(key: object, new: Callable[[], Array]) -> int:
         nonlocal end
-        if own is None:
+        if key is None:
             return 0
-        if isinstance(own, RadialTable):
-            own = own.origin[0]
-        if id(own) not in known:
-            new = own.numbers if isinstance(own, RadialTable) else gauge_numbers(own)
-            known[id(own)], end = end, end + len(new)
-            numbers.append(new)
-        return known[id(own)]
+        if id(key) not in known:
+            numbers.append(new())
+            known[id(key)], end = end, end + len(numbers[-1])
+        return known[id(key)]
 
-    places = [
-        (placed(each.table), placed(each.reverse), placed(None if isinstance(each, Line) else each.gauge))
-        for each in responses
-    ]
+    def table(own: RadialTable | None) -> int:
+        return 0 if own is None else placed(own.origin[0], lambda: own.origin[0].numbers)
+
+    places = []
+    for each, form in zip(responses, forms, strict=True):
+        gauge = each.gauge if isinstance(each, Plane) else None
+        curve, law = form.beat, form.law
+        places.append(
+            (
+                table(each.table),
+                table(each.reverse),
+                placed(gauge, lambda gauge=gauge, form=form: gauge_numbers(gauge, form.deflection)),
+                placed(law, lambda law=law: law),
+                placed(curve, lambda curve=curve, form=form: _curve_numbers(curve, form.kind)),
+            )
+        )
     return np.concatenate(numbers), places
 
 
-def gauge_numbers(gauge: Array) -> Array:
-    """A gauge (G,) as the core takes it: in each of POINTS directions the support function, its derivative and
-    the gauge; the parabola through the best three directions stands for the gauge between them."""
+def _curve_numbers(curve: Array, kind: str) -> Array:
+    """A curve or a beat: how many points, or cells, then these."""
+    return np.concatenate([[len(curve) - (kind == "fin")], curve.ravel()])
+
+
+def gauge_numbers(gauge: Array, deflection: Array) -> Array:
+    """A gauge (G,) as the core takes it: in each of POINTS directions the support function, its derivative,
+    the gauge and the deflection (POINTS,); the parabola through the best three directions stands for the gauge between them."""
     count, angle = len(gauge), np.arange(POINTS) * TURN / POINTS
     step, psi = TURN / count, np.arange(count) * TURN / count
     worth = gauge * np.cos(angle[:, None] - psi)
@@ -139,7 +175,7 @@ def gauge_numbers(gauge: Array) -> Array:
     rho = g1 + offset * (0.5 * (g2 - g0) + 0.5 * offset * (g0 - 2.0 * g1 + g2))
     slope = -rho * np.sin(angle - psi[best] - offset * step)
     own = np.interp(angle, np.append(psi, TURN), np.append(gauge, gauge[0]))
-    return np.concatenate([[POINTS], np.stack([sigma, slope, own], axis=-1).ravel()])
+    return np.concatenate([[POINTS], np.stack([sigma, slope, own, deflection], axis=-1).ravel()])
 
 
 def _usual_price(response: Response) -> float:

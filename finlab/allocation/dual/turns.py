@@ -108,9 +108,9 @@ class Turns:
         dual = self.dual
         if self.previous is not None:
             return self._from(self.previous[None], prices)
-        laws = dual.forces(self.target - dual.compiled.beside, self.policy, dual.begin(prices)).found
+        laws = dual.forces(self.target, self.policy, dual.begin(prices)).found
         best = self._from(self._exact(laws.force), laws.price[0])
-        if best.power > (1.0 + 10.0 * CLOSE) * self._power(dual.compiled.commands(laws.force)):
+        if best.power > (1.0 + 10.0 * CLOSE) * self._power(laws.command):
             tried = self._exact(_turned_aside(laws.force[0], dual.compiled.robot.lines))
             merits = np.array([self._merit(one[None], best.worth) for one in tried])
             for k in np.argsort(merits)[:FOLLOWED]:
@@ -124,7 +124,7 @@ class Turns:
             force = dual.plant.force(command)
             linear = dual.linear(linear_at(dual.plant, force[0]))
             start = None if price is None else linear.begin(price)
-            own = linear.forces(self.target - linear.compiled.beside, self.policy, start)
+            own = linear.forces(self.target, self.policy, start)
             price = own.found.price[0]
             # Twice what an error is worth at these prices: an exact penalty.
             worth = max(worth, 2.0 * float(np.linalg.norm(price * dual.scale)))
@@ -154,19 +154,15 @@ class Turns:
         return command, merit
 
     def _ended(self, command: Array, linear: Any, own: Any, worth: float) -> Settled:
-        dual, previous, target = self.dual, self.previous, self.target
-        aim = target if own.found.within.all() else own.found.aim + linear.compiled.beside
-        force = dual.compiled.forces_along(dual.plant.force(command)[0])[None]
-        command = linear.commands(aim, Forces(own.found._replace(force=force)), previous)
-        if self.policy.kind == "direction" and not own.found.within.all():
-            command, aim = _on_the_ray(dual, target, command)
-        if previous is not None and not dual.rates.allow(previous, command[0]):
-            command = linear.in_a_tick(aim, own, previous)
-        return Settled(command, aim, own.found.price, self._power(command), worth, self._error(command))
+        dual, found, aim = self.dual, own.found._replace(command=command), own.found.aim
+        command = linear.exact(own._replace(found=found), self.previous)
+        if self.policy.kind == "direction" and not found.within.all():
+            command, aim = _on_the_ray(dual, self.target, command)
+        return Settled(command, aim, found.price, self._power(command), worth, self._error(command))
 
     def _exact(self, force: Array) -> Array:
         """Commands (K, n, 3) near to forces (K, n, 2) that give the target, nearly."""
-        command = self.dual.compiled.commands(force, self.previous)
+        command = self.dual.compiled.robot.core.commands(force, self.previous)
         wanted = self.target / self.dual.scale
         return np.asarray(
             refine(self.dual.search.problem, wanted, command, ROUNDS // 3, 0.1 * NEARLY).command

@@ -1,0 +1,223 @@
+/* Laws of actuators by tables: the force of a command, its derivatives, and a command for a force. */
+#include "inner.h"
+
+/* Weights of four neighbours in value and derivative, and the first of them, on an axis of knots: a cubic whose
+   slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
+typedef struct { real value[4], slope[4]; int first; } weights;
+
+static weights weights_at(const real *knot, int count, real period, real x) {
+  weights w = {{0, 1, 0, 0}, {0}, -1};
+  if (count == 1) return w;
+  int cells = period > 0 ? count : count - 1, low = 0, high = cells;
+  real begin = knot[0], end = period > 0 ? begin + period : knot[count - 1], held;
+  if (period > 0) x -= period * FLOOR((x - begin) / period);
+  held = CLIP(x, begin, end);
+  while (high - low > 1) {
+    int between = (low + high) / 2;
+    if (knot[between] <= held)
+      low = between;
+    else
+      high = between;
+  }
+  real from = knot[low], to = low + 1 < count ? knot[low + 1] : end, width = to - from, t = (held - from) / width;
+  real before = low > 0 ? from - knot[low - 1] : period > 0 ? end - knot[count - 1] : 0;
+  real after = low + 2 < count ? knot[low + 2] - to : low + 2 == count && period > 0 ? end - to : period > 0 ? knot[1] - knot[0] : 0;
+  real early = width / (before + width), late = width / (width + after), pace = held == x ? 1 / width : 0;
+  real linear[4] = {-early, 0, early, 0}, square[4] = {2 * early, late - 3, 3 - 2 * early, -late};
+  real cubic[4] = {-early, 2 - late, early - 2, late};
+  for (int k = 0; k < 4; k++) {
+    w.value[k] = (k == 1) + t * (linear[k] + t * (square[k] + t * cubic[k]));
+    w.slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
+  }
+  w.first = low - 1;
+  return w;
+}
+
+/* A grid: counts of three axes, period of the third (0: none), whether the first axis is the product of the first
+   two commands, columns c, whether the values are roots of what they stand for; then the knots of the axes, and c
+   values at each point. Values (c,) and their derivatives by each command (3, c). */
+static void grid_at(const real *grid, const real *command, real *value, real (*slope)[3]) {
+  int count[3] = {(int)grid[0], (int)grid[1], (int)grid[2]}, product = grid[4] != 0, columns = (int)grid[5];
+  const real *knot = grid + 7, *values = knot + count[0] + count[1] + count[2];
+  real at[3] = {product ? command[0] * command[1] : command[0], command[1], command[2]};
+  weights w[3];
+  for (int k = 0; k < 3; knot += count[k++]) w[k] = weights_at(knot, count[k], count[k] > 1 && k == 2 ? grid[3] : 0, at[k]);
+  for (int c = 0; c < columns; c++) value[c] = slope[0][c] = slope[1][c] = slope[2][c] = 0;
+  for (int a = 0; a < 4; a++) {
+    if (count[0] == 1 && a != 1) continue;
+    int i = CLIP(w[0].first + a, 0, count[0] - 1);
+    for (int f = 0; f < 4; f++) {
+      if (count[1] == 1 && f != 1) continue;
+      int j = CLIP(w[1].first + f, 0, count[1] - 1);
+      real both = w[0].value[a] * w[1].value[f], by_a = w[0].slope[a] * w[1].value[f];
+      real by_f = w[0].value[a] * w[1].slope[f];
+      for (int d = 0; d < 4; d++) {
+        if (count[2] == 1 && d != 1) continue;
+        int k = w[2].first + d;
+        k = grid[3] > 0 ? (k + count[2]) % count[2] : CLIP(k, 0, count[2] - 1);
+        const real *own = values + columns * (k + count[2] * (j + count[1] * i));
+        for (int c = 0; c < columns; c++) {
+          real v = own[c] * w[2].value[d];
+          value[c] += both * v, slope[0][c] += by_a * v, slope[1][c] += by_f * v;
+          slope[2][c] += both * own[c] * w[2].slope[d];
+        }
+      }
+    }
+  }
+  if (product)
+    for (int c = 0; c < columns; c++) {
+      slope[1][c] += slope[0][c] * command[0];
+      slope[0][c] *= command[1];
+    }
+  if (grid[6] != 0)
+    for (int c = 0; c < columns; c++) {
+      for (int k = 0; k < 3; k++) slope[k][c] *= 2 * value[c];
+      value[c] *= value[c];
+    }
+}
+
+/* Force along an actuator's own axes (3,) of a command (3,), and its derivatives (3 commands, 3 axes). */
+void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *grid = block + (int)a->law;
+  memset(force, 0, 3 * sizeof *force);
+  memset(slope, 0, 9 * sizeof **slope);
+  if (a->form == FL_THRUSTER)
+    force[0] = command[0], slope[0][0] = 1;
+  else if (a->form == FL_POD) {
+    real c = COS(command[0]), s = SIN(command[0]);
+    force[1] = command[1] * c, force[2] = command[1] * s;
+    slope[0][1] = -force[2], slope[0][2] = force[1], slope[1][1] = c, slope[1][2] = s;
+  } else if (a->form == FL_FOIL) {
+    real at[3] = {0, 0, command[0] - a->lean}, by[3][3];
+    grid_at(grid, at, force, by);
+    for (int k = 0; k < 2; k++) force[k] *= a->pressure, slope[0][k] = a->pressure * by[2][k];
+    force[1] -= a->pressure * a->rest;
+  } else if (grid[5] == 1) { /* a size along a direction */
+    real size, by[3][3], around = command[2] - a->uneven_at, uneven = 1 + a->uneven * COS(around);
+    real c = COS(command[2] + a->lean), s = SIN(command[2] + a->lean);
+    grid_at(grid, command, &size, by);
+    real parts[3] = {by[0][0] * uneven, by[1][0] * uneven, -size * a->uneven * SIN(around)};
+    size *= uneven;
+    force[1] = size * c, force[2] = size * s;
+    for (int k = 0; k < 3; k++) slope[k][1] = parts[k] * c, slope[k][2] = parts[k] * s;
+    slope[2][1] -= force[2], slope[2][2] += force[1];
+  } else
+    grid_at(grid, command, force, slope);
+}
+
+/* Where an ascending column of a curve (count, 2) has a value: linear between its points. */
+static real on_curve(const real *curve, real value) {
+  int count = (int)curve[0], low = 0, high = count - 1;
+  const real *row = curve + 1;
+  while (high - low > 1) {
+    int between = (low + high) / 2;
+    if (row[2 * between] <= value)
+      low = between;
+    else
+      high = between;
+  }
+  real width = row[2 * high] - row[2 * low], t = width > 0 ? CLIP((value - row[2 * low]) / width, 0, 1) : 0;
+  return row[2 * low + 1] + t * (row[2 * high + 1] - row[2 * low + 1]);
+}
+
+static real in_limits(const fl_box *box, int i, int k, real value) { return CLIP(value, box->low[i][k], box->high[i][k]); }
+
+static real angle_in(const fl_box *box, int i, int k, real angle) {
+  real middle = (box->low[i][k] + box->high[i][k]) / 2;
+  return in_limits(box, i, k, middle + wrapped(angle - middle));
+}
+
+/* Amplitude and frequency of a fin for a share of its largest force, from a table at shares (j / k)^2. */
+static void beat_at(const real *beat, real share, real *command) {
+  int cells = (int)beat[0];
+  real place = SQRT(CLIP(share, 0, 1)) * cells;
+  int cell = MIN((int)place, cells - 1);
+  const real *row = beat + 1 + 2 * cell;
+  for (int k = 0; k < 2; k++) command[k] = row[k] + (row[k + 2] - row[k]) * (place - cell);
+}
+
+static void fin_command(const real *block, int i, const fl_box *box, const real *force, real *command) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
+  real angle = ATAN2(force[1], force[0]), size = SQRT(force[0] * force[0] + force[1] * force[1]), wanted = size;
+  real given[3], slope[3][3];
+  for (int k = 0; k < 3; k++) { /* what the tables leave undone is asked for on top */
+    real most = a->high * (gauge ? gauge_at(gauge, angle) : 1), lean = gauge ? lean_at(gauge, angle) : a->lean;
+    beat_at(block + (int)a->beat, wanted / most, command);
+    command[0] = in_limits(box, i, 0, command[0]), command[1] = in_limits(box, i, 1, command[1]);
+    command[2] = angle_in(box, i, 2, angle - lean);
+    if (k == 2) break;
+    force_of(block, i, command, given, slope);
+    wanted = MAX(wanted + size - SQRT(given[1] * given[1] + given[2] * given[2]), 0);
+    if (gauge && size > 0) angle += wrapped(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));
+  }
+}
+
+/* Angle and force of a pod, one way or the other: what comes nearer to a force, or the cheaper one. */
+static void pod_command(const real *block, int i, const fl_box *box, const real *force, real before, real *command) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real size = SQRT(force[0] * force[0] + force[1] * force[1]);
+  real angle = size > 0 ? ATAN2(force[1], force[0]) : before, way[2][2], missing[2], watts[2];
+  for (int k = 0; k < 2; k++) {
+    way[k][0] = angle_in(box, i, 0, angle + k * PI), way[k][1] = in_limits(box, i, 1, k ? -size : size);
+    real dx = way[k][1] * COS(way[k][0]) - size * COS(angle), dy = way[k][1] * SIN(way[k][0]) - size * SIN(angle);
+    missing[k] = SQRT(dx * dx + dy * dy), watts[k] = cost_at(block, i, way[k][1]);
+  }
+  real least = NEARLY * a->upper[1];
+  int back = box->low[i][1] < 0 && (missing[1] < missing[0] - least ||
+                                    (missing[1] <= missing[0] + least && watts[1] < watts[0] * (1 - NEARLY)));
+  command[0] = way[back][0], command[1] = way[back][1], command[2] = 0;
+}
+
+/* A command within a box for a force, as near as the tables are; an angle that does not count stays that of the
+   command before, where there is one. */
+void command_for(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  if (a->form == FL_FIN)
+    fin_command(block, i, box, force, command);
+  else if (a->form == FL_POD)
+    pod_command(block, i, box, force, before ? before[0] : 0, command);
+  else {
+    real angle = a->form == FL_FOIL ? on_curve(block + (int)a->beat, FABS(force[0]) / a->pressure) : 0;
+    command[0] = a->form == FL_FOIL ? (force[0] < 0 ? -angle : angle) + a->turned : a->sign * force[0];
+    command[0] = in_limits(box, i, 0, command[0]), command[1] = command[2] = 0;
+  }
+}
+
+/* Limits of the forces (4,) that commands within a box give: least and largest, middle and half of the arc. */
+void reach_of(const real *block, int i, const fl_box *box, real *limits) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *low = box->low[i], *high = box->high[i];
+  if (a->form == FL_THRUSTER) {
+    limits[0] = a->sign > 0 ? low[0] : -high[0], limits[1] = a->sign > 0 ? high[0] : -low[0];
+    limits[2] = limits[3] = 0;
+    return;
+  }
+  int angle = a->form == FL_FIN ? 2 : 0;
+  real half = (high[angle] - low[angle]) / 2, best = 0;
+  limits[2] = (low[angle] + high[angle]) / 2, limits[3] = half >= PI - NOTHING ? PI : half;
+  limits[0] = low[1], limits[1] = high[1];
+  if (a->form == FL_POD) return;
+  limits[0] = R(1e30), limits[1] = -R(1e30);
+  for (int j = 0; j < 25; j++) {
+    real force[3], slope[3][3], command[3] = {0, 0, limits[2]};
+    if (a->form == FL_FOIL)
+      command[0] = low[0] + (real)j / 24 * (high[0] - low[0]);
+    else
+      command[0] = low[0] + (real)(j % 5) / 4 * (high[0] - low[0]), command[1] = low[1] + (real)(j / 5) / 4 * (high[1] - low[1]);
+    force_of(block, i, command, force, slope);
+    real size = a->form == FL_FOIL ? force[0] : SQRT(force[1] * force[1] + force[2] * force[2]);
+    if (size > limits[1]) best = ATAN2(force[2], force[1]);
+    limits[0] = MIN(limits[0], size), limits[1] = MAX(limits[1], size);
+  }
+  if (a->form == FL_FOIL) {
+    limits[2] = limits[3] = 0;
+    return;
+  }
+  limits[2] += wrapped(best - limits[2]); /* where the force points at the middle of the commands' arc */
+  if (a->gauge > 0) {
+    real rho = gauge_at(block + (int)a->gauge, limits[2]);
+    limits[0] /= rho, limits[1] /= rho;
+  }
+}
