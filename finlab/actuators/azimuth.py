@@ -13,6 +13,7 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
+from finlab.actuators.form import Form
 from finlab.actuators.propeller import (
     T200,
     ForceRate,
@@ -22,15 +23,13 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
 )
-from finlab.actuators.form import Form
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, is_full_turn, wrapped
+from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, is_full_turn
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
-from finlab.precision import NEARLY
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
@@ -74,39 +73,10 @@ class AzimuthGroup(Group):
     def forms(self) -> list[Form]:
         return [Form("pod")] * len(self.responses)
 
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as
-        near to 0 as the arc allows. What can be given forward and in reverse is given at the least power."""
-        size = np.hypot(force[..., 0], force[..., 1])
-        before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
-        angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
-        ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
-        if (self._lower[:, 1] >= 0.0).all():
-            return ahead
-        wanted, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
-        missing, watts = [], []
-        for way in (ahead, back):
-            force = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
-            missing.append(np.linalg.norm(force - wanted, axis=0))
-            watts.append(self._power.watts(way[..., 1]))
-        cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
-        return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)
-
-    def _pushed(self, angle: Array, force: Array) -> Array:
-        """Commands (..., m, 3) that come nearest to angles [rad] and forces [N] (..., m)."""
-        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
-        command = np.zeros((*force.shape, 3))
-        command[..., 0] = middle + wrapped(angle - middle)
-        command[..., 1] = force
-        return np.clip(command, self._lower, self._upper)
-
     def radial_worth(self, price: Array, back: Array) -> Array:
         least, most = self._lower[:, 1], self._upper[:, 1]
         ahead = self._power.worth(price, np.maximum(least, 0.0), most)
         return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
 
 
 def _plane(azimuth: "Azimuth", matrix: Array, middle: float, half: float) -> Plane:

@@ -10,7 +10,7 @@ from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.arrays import Array
 from finlab.precision import NOTHING
 
-CELLS = (16, 1), (64, 1), (256, 1), (16, 16), (64, 64)
+CELLS = (16, 1), (64, 1), (256, 1), (1024, 1), (16, 16), (64, 64)
 """Cells of amplitude and frequency that are tried for the law of a fin."""
 
 
@@ -48,16 +48,23 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
     share = np.random.default_rng(0).uniform(size=(300, 3))
     command = lower + share * (upper - lower)
     wanted, best, least = size(command[:, 0], command[:, 1]), np.empty(0), np.inf
-    for cells, beat, root in product(CELLS, (False, True), (True, False)):
-        ends = [(lower[0] * lower[1], upper[0] * upper[1]) if beat else (lower[0], upper[0]), (lower[1], upper[1])]
-        axes = [_knots(*end, count) for end, count in zip(ends, cells, strict=True)]
+    for (cells, more), beat, root in product(CELLS, (False, True), (True, False)):
+        ends = (lower[0] * lower[1], upper[0] * upper[1]) if beat else (lower[0], upper[0])
+        # Of the product alone, the frequency does not matter; powers of it bend most near 0.
+        axes = [_knots(*ends, cells, 2.0 if beat else 1.0), _knots(lower[1], upper[1], more, 1.0)]
+        if beat and more == 1:
+            axes[1] = np.array([0.5 * (lower[1] + upper[1])])
         first, second = np.meshgrid(*axes, indexing="ij")
         amplitude = np.abs(first) / np.maximum(np.abs(second), NOTHING) if beat else np.abs(first)
-        value = size(amplitude, np.abs(second))
-        value = np.sign(first) * np.sign(second) ** (not beat) * np.sqrt(value) if root else value
-        at = np.stack([command[:, 0] * command[:, 1] if beat else command[:, 0], command[:, 1], share[:, 2]], axis=-1)
-        grid = Grid([*axes, np.array([0.0, 1.0])], np.stack([value, value], axis=-1)[..., None], False)
-        got = HermiteGrids([grid])(at, 1)[:, 0, 0, 0, 0] ** (2 if root else 1)
+        value = np.maximum(size(amplitude, np.abs(second)), 0.0)
+        if root:
+            value = np.sqrt(value) * np.sign(first) * (1.0 if beat else np.sign(second))
+        at = np.stack(
+            [command[:, 0] * command[:, 1] if beat else command[:, 0], command[:, 1], share[:, 2]], axis=-1
+        )
+        known = [np.append(axis, axis + 1.0) if len(axis) == 1 else axis for axis in (*axes, np.zeros(1))]
+        values = np.broadcast_to(value[..., None, None], (len(known[0]), len(known[1]), 2, 1))
+        got = HermiteGrids([Grid(known, values, False)])(at, 1)[:, 0, 0, 0, 0] ** (2 if root else 1)
         error = float(np.abs(got - wanted).max())
         if error < least:
             least, best = error, grid_numbers([*axes, np.zeros(1)], value[..., None, None], 0.0, beat, root)
@@ -66,7 +73,8 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
     return best
 
 
-def _knots(low: float, high: float, cells: int) -> Array:
-    """Knots of equal cells between two ends, and one more on either side: slopes at the ends are as good."""
-    width = max(high - low, NOTHING) / cells
-    return low + width * np.arange(-1.0, cells + 2.0)
+def _knots(low: float, high: float, cells: int, power: float) -> Array:
+    """Knots between two ends, as dense towards the lower one as a power of equal steps, and one more on either
+    side: slopes at the ends are as good."""
+    width, share = max(high - low, NOTHING), (np.arange(cells + 2.0) / cells) ** power
+    return low + width * np.concatenate([[-share[1]], share])

@@ -86,7 +86,9 @@ class RadialTable:
         """The table with `share` times the force, and `cost` times the power, at each command."""
         per, (base, force, power) = share / cost, self.origin
         scaled = base, share * force, cost * power
-        return RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost, scaled)
+        return RadialTable(
+            self.top / per, self.force * share, self.slope * share * per, self.rest * cost, scaled
+        )
 
     def cost(self, force: Array) -> Array:
         """Power (...) [W] of forces (...) [N] within the table."""
@@ -100,7 +102,9 @@ class RadialTable:
         t = share / np.diff(_GRID)[cell]
         first, last, (m0, m1) = self.force[cell], self.force[cell + 1], self._bends[:, cell]
         rise = last - first
-        part = first + t * (m0 / 2.0 + t * ((3.0 * rise - 2.0 * m0 - m1) / 3.0 + t * (m0 + m1 - 2.0 * rise) / 4.0))
+        part = first + t * (
+            m0 / 2.0 + t * ((3.0 * rise - 2.0 * m0 - m1) / 3.0 + t * (m0 + m1 - 2.0 * rise) / 4.0)
+        )
         return np.asarray(self._starts[cell] + width[cell] * t * part)
 
     @cached_property
@@ -235,7 +239,9 @@ def with_square(response: Response, weight: float) -> Response:
 
 def power_of(response: Response, force: Array) -> Array:
     """Returns the power (...) [W] of forces (...) [N], of planes sizes, below 0 in reverse."""
-    ahead, astern = (table.cost(np.abs(force)) for table in (response.table, response.reverse or response.table))
+    ahead, astern = (
+        table.cost(np.abs(force)) for table in (response.table, response.reverse or response.table)
+    )
     return np.where(force < 0.0, astern, ahead)
 
 
@@ -276,14 +282,3 @@ class Group(ABC):
     @abstractmethod
     def forms(self) -> list[Form]:
         """How the forces of each become commands."""
-
-    @abstractmethod
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, m, 3), padded as in a layout's limits, that give forces (N, m, 2) [N] along the own
-        directions (a line's second entry is 0) at least power, as near as the table is. Where no force is
-        asked for, azimuths keep the angles of the `previous` commands (..., m, 3)."""
-
-    @abstractmethod
-    def reach(self, lower: Array, upper: Array) -> Array:
-        """What commands between `lower` and `upper` (m, 3) can give: least and largest force [N] (of planes
-        the sizes), middle and half of the arc [rad] (0 and 0 for lines), as rows (m, 4)."""

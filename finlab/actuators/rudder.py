@@ -18,8 +18,8 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
-from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.form import Form, grid_numbers
+from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
 from finlab.axes import AHEAD, SHORT, Direction3, Vector, across, arc_words
@@ -238,20 +238,10 @@ class RudderGroup(Group):
             axes = np.array([[0.0, -sin, cos], [0.0, -cos, -sin], [0.0, 0.0, 0.0]])
             foil = (max(pressure[i], NOTHING), self._turned[i], self._law.drag[i])
             numbers = (1.0, course[i], 0.0, 0.0, *foil)
-            forms.append(Form("foil", axes, self._grids[i], np.stack([lifts, angles], axis=-1), numbers=numbers))
+            forms.append(
+                Form("foil", axes, self._grids[i], np.stack([lifts, angles], axis=-1), numbers=numbers)
+            )
         return forms
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
-        command = np.zeros((*force.shape[:-1], 3))
-        for i, (lifts, angles, _) in enumerate(self._curves):
-            command[..., i, 0] = np.interp(size[..., i], lifts, angles)
-        angle = np.copysign(command[..., 0], force[..., 0]) + self._turned
-        command[..., 0] = np.minimum(np.maximum(angle, self._limits[:, 0]), self._limits[:, 1])
-        return command
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        return np.pad(self._lift(np.stack([lower[:, 0], upper[:, 0]], axis=-1)), ((0, 0), (0, 2)))
 
 
 class RudderCommand(actuator.Command, frozen=True, rename={"deflection": "deflection_rad"}):

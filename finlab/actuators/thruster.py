@@ -11,6 +11,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from finlab.actuators.actuator import Box, Command, Diameter, Faults, Metres, Place, Seconds, Uncertainty
+from finlab.actuators.form import Form
 from finlab.actuators.propeller import (
     T200,
     ForceRate,
@@ -20,7 +21,6 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
 )
-from finlab.actuators.form import Form
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
@@ -64,17 +64,8 @@ class ThrusterGroup(Group):
     def forms(self) -> list[Form]:
         return [Form("thruster", numbers=(sign, *Form("thruster").numbers[1:])) for sign in self._sign]
 
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        command = np.zeros((*force.shape[:-1], 3))
-        command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
-        return command
-
     def radial_worth(self, price: Array, back: Array) -> Array:
         return self._power.worth(self._sign * price, *self._limits.T)
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        ends = self._sign[:, None] * np.stack([lower[:, 0], upper[:, 0]], axis=-1)
-        return np.pad(np.sort(ends, axis=-1), ((0, 0), (0, 2)))
 
 
 def _line(thruster: "Thruster", along: Array) -> Line:

@@ -32,7 +32,8 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
     rest += left * left, size += scaled * scaled;
     weight[k] = 1 / h->yard[k];
   }
-  for (int k = 0; k < 6; k++) ray[k] = rest <= NEARLY * NEARLY * size ? wrench[k] * weight[k] : 0;
+  for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
+    ray[k] = rest <= NEARLY * NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
   farthest_along(block, work, weight, ray, &work->mixture);
   mixed_force(block, &work->mixture, force);
 }

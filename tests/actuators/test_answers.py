@@ -13,6 +13,7 @@ from finlab.actuators.response import Group, Line
 from finlab.actuators.rudder import Rudder, RudderGroup, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.actuators.thruster import Thruster, ThrusterGroup, ThrusterLaw
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
@@ -56,20 +57,29 @@ def prices_of(group: Group, top: float) -> Array:
     return np.random.default_rng(0).normal(0.0, top, (6, 40))
 
 
+def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
+    """A robot of the actuators of a group alone, with commands (m, 3) between limits."""
+    free = np.zeros(low.shape, bool)
+    free[:, 0] = [form.kind == "pod" for form in group.forms]
+    limits = low, high, np.full(low.shape, np.inf), free & (high - low >= 2.0 * np.pi - 1e-9)
+    return DualRobot(group.responses, group.forms, limits, wrench, np.ones(6))
+
+
+def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
+    """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
+    inner = robot.basis.T @ (robot.scale * price)
+    force, value = robot.core.look(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
+    return force, -value
+
+
 def check(
     group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
 ) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command gives it."""
-    robot = DualRobot(group.responses)
-    multipliers = prices_of(group, 5.0)
-    answer = robot.answers(robot.effectiveness @ multipliers, robot.sets)
-    m = len(group.responses)
-    force = np.zeros((multipliers.shape[1], m, 2))
-    planes = len(robot.effectiveness) - m
-    force[..., 0] = answer.force[:m].T
-    if planes:
-        force[..., 1] = answer.force[m:].T
-    command = group.commands(force)
+    multipliers, m = prices_of(group, 5.0), len(group.responses)
+    robot = prepared(group, wrench, low, high)
+    force = np.array([answer(robot, price)[0] for price in multipliers.T])
+    command = robot.core.commands(force)
     assert (command >= low).all() and (command <= high).all()
     given = law.force(command)
     worth = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command)
@@ -78,7 +88,8 @@ def check(
     others -= law.power(tried)[:, None]
     scale = np.abs(worth).max(axis=0) + 1e-9
     assert (worth >= others.max(axis=0) - 5e-4 * scale).all()
-    np.testing.assert_allclose(answer.conjugate, worth.sum(axis=1), atol=5e-4 * scale.sum())
+    most = [answer(robot, price)[1] for price in multipliers.T]
+    np.testing.assert_allclose(most, worth.sum(axis=1), atol=5e-4 * scale.sum())
 
 
 def test_thrusters_answer_with_what_is_worth_most() -> None:
@@ -94,7 +105,8 @@ def test_thrusters_of_one_model_answer_together() -> None:
     group = ThrusterGroup(parts, wrench)
     low, high = (np.array([getattr(part, end) for part in parts]) for end in ("lower", "upper"))
     check(group, ThrusterLaw(parts), wrench, low, high)
-    np.testing.assert_array_equal(group.reach(low, high)[:, :2], [[-39, 51], [0, 5], [0, 8]])
+    ends = prepared(group, wrench, low, high).ends
+    np.testing.assert_allclose(ends, [[-39, 51], [0, 5], [0, 8]], rtol=1e-12)
 
 
 def test_azimuths_answer_with_what_is_worth_most() -> None:
@@ -111,13 +123,12 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[floa
     inflow = frames @ np.array(flow)
     group, law = RudderGroup(RUDDERS, wrench).at(inflow), RudderLaw(RUDDERS)
     low, high = (np.array([getattr(part, end) for part in RUDDERS]) for end in ("lower", "upper"))
-    found = group.reach(low, high)
-    met = law.met(inflow)
+    robot, met = prepared(group, wrench, low, high), law.met(inflow)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
     for share in (0.0, 0.3, 1.0):
         force = np.zeros((1, 2, 2))
-        force[0, :, 0] = found[:, 0] + share * (found[:, 1] - found[:, 0])
-        command = group.commands(force)[0]
+        force[0, :, 0] = robot.ends[:, 0] + share * (robot.ends[:, 1] - robot.ends[:, 0])
+        command = robot.core.commands(force)[0]
         assert (command >= low).all() and (command <= high).all()
         given = law.force(command, inflow)
         most = met.pressure * 0.03
@@ -131,14 +142,16 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
-    robot = DualRobot(RudderGroup([part], wrench).at(inflow).responses)
-    price = np.stack([np.linspace(-3.0, 3.0, 31), np.zeros(31)])
-    answer = robot.answers(price, robot.sets)
+    group = RudderGroup([part], wrench).at(inflow)
+    robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
+    price = np.linspace(-3.0, 3.0, 31)
+    rows = np.linalg.pinv(robot.effectiveness[0])  # multipliers at which lift has a price, and drag none
+    found = [answer(robot, rows @ [own, 0.0])[1] for own in price]
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.met(inflow).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
-    worth = price[0] * lift[:, None] - law.power(delta, inflow)
-    np.testing.assert_allclose(answer.conjugate, worth.max(axis=0), rtol=0.02, atol=0.02)
+    worth = price * lift[:, None] - law.power(delta, inflow)
+    np.testing.assert_allclose(found, worth.max(axis=0), rtol=0.02, atol=0.02)
 
 
 def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
@@ -147,9 +160,8 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     wrench, law = columns([part]), RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
     group = RudderGroup([part], wrench).at(inflow)
-    robot = DualRobot(group.responses)
-    lift = robot.answers((robot.effectiveness @ multipliers)[:, None], robot.sets).force
-    command = group.commands(np.array([[[lift[0, 0], 0.0]]]))
+    robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
+    command = robot.core.commands(answer(robot, multipliers)[0][None])
     tried = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     found, best = (
         np.einsum("nma,maw,w->n", law.force(each, inflow), wrench, multipliers)
@@ -163,30 +175,23 @@ def test_a_rudder_at_rest_offers_nothing() -> None:
     group = RudderGroup(RUDDERS, columns(RUDDERS))
     lines = [line for line in group.responses if isinstance(line, Line)]
     assert [(line.low, line.high) for line in lines] == [(0.0, 0.0)] * 2
-    assert not group.commands(np.zeros((3, 2, 2)))[:, 0].any()
+    assert not group.beside_of(np.zeros((3, 2, 2))).any()
 
 
 def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
     group = AzimuthGroup(AZIMUTHS, columns(AZIMUTHS))
-    rest, before = np.zeros((3, 2)), np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
+    low, high = (np.array([getattr(part, end) for part in AZIMUTHS]) for end in ("lower", "upper"))
+    core = prepared(group, columns(AZIMUTHS), low, high).core
+    rest, before = np.zeros((1, 3, 2)), np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
     for previous, angles in ((before, [3.0, 0.9, 1.2]), (None, [0, 0, 1]), (np.nan * before, [0, 0, 1])):
-        np.testing.assert_allclose(group.commands(rest, previous)[:, 0], angles, atol=1e-12)
-
-
-def test_what_a_tick_can_do_of_an_azimuth_is_a_smaller_arc() -> None:
-    group = AzimuthGroup(AZIMUTHS[:1], columns(AZIMUTHS[:1]))
-    found = group.reach(np.array([[3.0, 1.0, 0.0]]), np.array([[3.4, 4.0, 0.0]]))
-    np.testing.assert_allclose(found, [[1.0, 4.0, 3.2, 0.2]])
+        np.testing.assert_allclose(core.commands(rest, previous)[0, :, 0], angles, atol=1e-12)
 
 
 def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
     robot = Layout("robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1]))
     found = groups_of(robot.actuators, own_effectiveness(robot))
     assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
-    force = np.zeros((2, robot.n, 2))
-    command = np.empty((2, robot.n, 3))
-    for places, group in found:
-        assert len(group.responses) == len(places)
-        command[:, places] = group.at(None).commands(force[:, places])
+    assert [len(group.responses) == len(group.forms) == len(places) for places, group in found]
     plant = Plant(robot)
+    command = Compiled(robot, plant, np.ones(6)).robot.core.commands(np.zeros((2, robot.n, 2)))
     np.testing.assert_array_equal(plant.feasible(command), command)

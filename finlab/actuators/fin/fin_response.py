@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
+from finlab.actuators.fin.fin_laws import file_stamp, make_law
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
-from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.form import Form
+from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn, wrapped
@@ -27,10 +27,6 @@ GRID = 17, 33
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
 PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no end."""
-
-
-_SHARES = np.array([[[a, f, 0.5]] for a in np.linspace(0.0, 1.0, 5) for f in np.linspace(0.0, 1.0, 5)])
-"""Commands (25, 1, 3) between limits, as shares, at the middle of an arc."""
 
 
 class FinTable(NamedTuple):
@@ -68,65 +64,15 @@ class FinGroup(Group):
         a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
-        self._stacked = stack_laws([fin.model for fin in fins])
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
         ]
         self._largest = np.array([each.table.largest for each in tables])
-        self._beat = np.array([each.beat for each in tables])
-        self._deflection = np.array([np.broadcast_to(each.deflection, POINTS) for each in tables])
-        self._gauge = np.array([np.ones(POINTS) if each.gauge is None else each.gauge for each in tables])
-        self._row = np.arange(len(fins))
-        limits = np.array([fin.limits.zero_direction for fin in fins])
-        self._lower, self._upper = limits.T
-        self._middle = limits.mean(axis=1)
-        self._even = all(each.gauge is None for each in tables)
 
     @property
     def forms(self) -> list[Form]:
         return [table.form for table in self._tables]
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. What the table leaves undone, by the laws, is asked for on top."""
-        x, y = force[..., 0], force[..., 1]
-        angle, size = np.arctan2(y, x), np.hypot(x, y)
-        command = self._command(angle, size)
-        actual = self._force(command)
-        wanted = np.maximum(2.0 * size - np.hypot(actual[..., 1], actual[..., 2]), 0.0)
-        if not self._even:
-            lean = wrapped(angle - np.arctan2(actual[..., 2], actual[..., 1]))
-            angle = angle + np.where(size > 0.0, lean, 0.0)
-        return self._command(angle, wanted)
-
-    def _force(self, command: Array) -> Array:
-        if len(self._stacked) == 1:
-            return np.asarray(self._stacked[0][1].force(command))
-        force = np.empty_like(command)
-        for places, law in self._stacked:
-            force[..., places, :] = law.force(command[..., places, :])
-        return force
-
-    def _command(self, angle: Array, size: Array) -> Array:
-        """Commands (N, m, 3) from the tables for directions and sizes (N, m) of the force."""
-        row = self._row
-        if self._even:
-            deflection = self._deflection[:, 0]
-        else:
-            place = (angle / TURN) % 1.0 * POINTS
-            cell = place.astype(np.intp) % POINTS
-            part, after = place - np.floor(place), (cell + 1) % POINTS
-            deflection = self._deflection[row, cell] * (1.0 - part) + self._deflection[row, after] * part
-            size = size / (self._gauge[row, cell] * (1.0 - part) + self._gauge[row, after] * part)
-        place = np.sqrt(np.minimum(size / self._largest, 1.0)) * POINTS
-        cell = np.minimum(place.astype(np.intp), POINTS - 1)
-        part = (place - cell)[..., None]
-        command = np.empty((*size.shape, 3))
-        beat = self._beat[row, cell]
-        command[..., :2] = beat + (self._beat[row, cell + 1] - beat) * part
-        turn = angle - deflection
-        command[..., 2] = np.clip(self._middle + wrapped(turn - self._middle), self._lower, self._upper)
-        return command
 
     def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law."""
@@ -139,16 +85,6 @@ class FinGroup(Group):
             command = table.box.best(paid, starts)
             result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
         return result
-
-    def reach(self, lower: Array, upper: Array) -> Array:
-        """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
-        command = lower + _SHARES * (upper - lower)
-        force = self._force(command)
-        size, row = np.hypot(force[..., 1], force[..., 2]), self._row
-        middle, most = command[0, :, 2], size.argmax(axis=0)
-        angle = middle + wrapped(np.arctan2(force[most, row, 2], force[most, row, 1]) - middle)
-        size = size / self._gauge[row, np.rint(angle / TURN * POINTS).astype(np.intp) % POINTS]
-        return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
 _LOCK = Lock()

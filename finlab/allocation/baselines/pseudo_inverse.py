@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Line, Plane, Response
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import Settings, number
@@ -35,23 +35,20 @@ class PseudoInverse:
     Forces are along each actuator's own two directions; the second one of a line is 0."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
-        self.plant, inflow = plant, plant.inflow(None)
-        self.groups = [
-            (places, group.at(None if inflow is None else inflow[places]))
-            for places, group in groups_of(plant.layout.actuators, plant.effectiveness)
-        ]
-        """What the actuators can do, and by which commands."""
+        self.plant = plant
+        compiled = Compiled(plant.layout, plant, sigma).at(plant.inflow(None))
+        self.groups, self._core = compiled.groups, compiled.robot.core
+        """What the actuators can do."""
         self.places = sorted(
             (int(i), k, j) for k, (own, _) in enumerate(self.groups) for j, i in enumerate(own)
         )
         """Of each actuator, in order: itself, its group, and its place there."""
-        self.responses: list[Response] = [self.groups[k][1].responses[j] for _, k, j in self.places]
+        self.responses: list[Response] = compiled.robot.responses
         """What each offers."""
-        self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
+        self.beside = compiled.beside
         """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils."""
-        along = [np.reshape(each.effectiveness, (-1, 6)) for each in self.responses]
-        both = [np.concatenate([rows, np.zeros((2 - len(rows), 6))]) for rows in along]
-        self.effectiveness: Array = np.concatenate(both).T
+        along = compiled.robot.effectiveness * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
+        self.effectiveness: Array = along.reshape(-1, 6).T
         """Wrench (6, 2 n) per newton along each actuator's directions."""
         self.largest = np.array([_largest(each) for each in self.responses])
         """The largest force (n,) of each in any direction [N]."""
@@ -79,10 +76,7 @@ class PseudoInverse:
         size = np.hypot(force[..., 0], force[..., 1]) * np.cos(excess)
         angle = self._middle + held
         inside = size[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        command = np.empty((*size.shape, 3))
-        for places, group in self.groups:
-            command[:, places] = group.commands(inside[:, places])
-        return self.plant.feasible(command)
+        return self.plant.feasible(self._core.commands(inside))
 
 
 def _largest(response: Response) -> float:

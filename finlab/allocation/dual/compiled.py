@@ -5,10 +5,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Line, Plane, Response, with_square
+from finlab.actuators.response import Group, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -21,7 +20,12 @@ class Compiled:
     """The actuators of one robot, ready for prices."""
 
     def __init__(
-        self, layout: Layout, plant: Plant, yardstick: Array, period_s: float, doubt: Array | None = None
+        self,
+        layout: Layout,
+        plant: Plant,
+        yardstick: Array,
+        period_s: float = 0.1,
+        doubt: Array | None = None,
     ) -> None:
         """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick (6,)
         and ticks of a period; what a squared force costs beside its power is `doubt`, see `price_of_doubt`.

@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.drag import EXACT, Search
@@ -105,7 +104,7 @@ class Dual(Method):
             return settled(self, targets, policy, previous, prices)
         forces = self.forces(targets, policy, self.begin(prices), previous)
         found = forces.found
-        aim, command = found.aim, self.exact(forces, previous)
+        command, aim = self.exact(forces, previous), targets if found.within.all() else found.aim
         notes = {ENDED} if found.ended else set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
@@ -133,9 +132,7 @@ class Dual(Method):
         other.__dict__["search"], other.__dict__["rates"] = self.search, self.rates
         return other
 
-    def _kept_on_the_ray(
-        self, target: Array, row: int, found: Found, command: Array
-    ) -> str:
+    def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
         along, aim = target / self.scale, found.aim

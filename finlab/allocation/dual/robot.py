@@ -36,7 +36,9 @@ class DualRobot:
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.lines = np.array([isinstance(each, Line) for each in responses])
         """Which have one direction (n,)."""
-        speeds = [each.speed if isinstance(each, Line) and each.drag is not None else 0.0 for each in responses]
+        speeds = [
+            each.speed if isinstance(each, Line) and each.drag is not None else 0.0 for each in responses
+        ]
         self.speed = np.array(speeds)
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
         sizes, self._gain = np.abs(self.ends).max(axis=1), np.zeros((len(responses), 2))
@@ -76,7 +78,9 @@ class DualRobot:
     @cached_property
     def largest_power(self) -> float:
         """Power [W] of all actuators at the dearer ends of their sets."""
-        return float(sum(power_of(each, ends).max() for each, ends in zip(self.responses, self.ends, strict=True)))
+        return float(
+            sum(power_of(each, ends).max() for each, ends in zip(self.responses, self.ends, strict=True))
+        )
 
     def wrench(self, force: Array) -> Array:
         """Wrenches (..., 6) [N, N m] of forces (..., n, 2) [N]."""
@@ -88,7 +92,11 @@ class DualRobot:
 
     def _drag(self, i: int, force: float) -> float:
         line = self.responses[i]
-        return (float(power_of(line, np.array(force))) - line.table.rest) / self.speed[i] if self.speed[i] > 0.0 else 0.0
+        return (
+            (float(power_of(line, np.array(force))) - line.table.rest) / self.speed[i]
+            if self.speed[i] > 0.0
+            else 0.0
+        )
 
     def _block(self) -> Array:
         """The numbers of finlab/core/core.h."""
@@ -106,7 +114,19 @@ class DualRobot:
             least = 0.0 if isinstance(each, Plane) and _needs_no_reverse(each) else low
             arc = (each.middle, each.half) if isinstance(each, Plane) else (0.0, 0.0)
             rows = 2.0 if plane or self.speed[i] > 0.0 else 1.0
-            own = [rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band, self.speed[i]]
+            own = [
+                rows,
+                ahead,
+                back,
+                *each.table.origin[1:],
+                gauge,
+                low,
+                high,
+                least,
+                *arc,
+                each.band,
+                self.speed[i],
+            ]
             parts += [np.array(own), self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()]
             lower, upper, step, turns = (values[i] for values in self._limits)
             sign, *numbers = form.numbers

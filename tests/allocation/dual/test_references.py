@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from finlab.actuators.form import Form
 from finlab.actuators.response import Line, RadialTable, price_grid
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
-from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.axes import AXES
+from finlab.core.calls import MET
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
@@ -98,11 +99,15 @@ def _table(watts: float, most: float) -> RadialTable:
 
 def test_costly_reverse_is_within_reach() -> None:
     lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
-    robot = DualRobot(lines)
-    target = robot.basis.T @ (np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0]) / robot.scale)
-    found = solve(robot, target[:, None])
-    assert found.solved[0] and not found.beyond[0]
-    np.testing.assert_allclose(found.value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
+    limits = [np.array([end] * 3) for end in ([-10.0, 0, 0], [10.0, 0, 0], [np.inf] * 3, [0.0] * 3)]
+    own = np.zeros((3, 3, 6))
+    own[:, 0] = np.eye(6)[:3]
+    robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
+    wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
+    found, inner, status = robot.core.one(wrench, None)
+    assert status == MET and found.within[0]
+    np.testing.assert_allclose(robot.core.look(wrench, inner)[1], 3 * 5.0 * 9.0**1.5, rtol=1e-9)
+    np.testing.assert_allclose(found.command[0, :, 0], -9.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2])
