@@ -128,8 +128,8 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     } else
       within &= status == FL_MET;
   }
-  out->within = within;
-  if (policy && (!within || policy->always)) in_its_place(block, work, wrench, policy, out);
+  out->within = within && !(policy && policy->always);
+  if (!out->within && policy) in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
 }
 
