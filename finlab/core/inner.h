@@ -16,6 +16,8 @@ typedef fl_real real;
 #define FLOOR floorf
 #define FABS fabsf
 #define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
+#define ENOUGH R(1e-4) /* the same where Newton's method stands still for IDLE steps; commands make up for it */
+#define IDLE 6
 #define ROUNDING R(1e-6)
 #define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
 #define TINY R(1e-30)
@@ -29,6 +31,8 @@ typedef fl_real real;
 #define FLOOR floor
 #define FABS fabs
 #define TOLERANCE 1e-10
+#define ENOUGH TOLERANCE
+#define IDLE MOST_STEPS
 #define ROUNDING 1e-12
 #define CLOSE_BY 1e-9
 #define TINY 1e-300

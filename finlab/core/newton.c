@@ -151,10 +151,13 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   if (!price) first_price(block, work, target, first, &ridge);
   look(block, work, target, price ? price : first, s);
   work->now = s;
-  for (int k = 0;; k++) {
+  real value = s->value, size = s->size; /* when it last got better by more than rounding */
+  for (int k = 0, idle = 0;; k++) {
     if (s->size <= TOLERANCE) return FL_MET;
     if (s->value > most) return FL_BEYOND;
-    if (k >= most_steps || !(ridge <= 1 / ROUNDING)) return FL_STUCK;
+    if (s->value > value + ROUNDING * FABS(value) || s->size < R(0.9) * size)
+      value = s->value, size = s->size, idle = 0;
+    if (k >= most_steps || idle++ > IDLE || !(ridge <= 1 / ROUNDING)) return s->size <= ENOUGH ? FL_MET : FL_STUCK;
     work->steps++;
     if (!step_of(work, s, ridge, r, step)) {
       ridge *= 10;
