@@ -19,11 +19,11 @@ from finlab.analysis.goals import UNREACHED
 from finlab.analysis.moves import Moves
 from finlab.arrays import Array
 from finlab.forces.force_sets import ForceSets
-from finlab.forces.reach import COARSE, max_wrench_along, singular_values
+from finlab.forces.reach import COARSE, Largest, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness
 from finlab.physics.objective import REACHED
 
-KEPT, DRAWN = 48, 10
+KEPT, DRAWN = 40, 8
 """Most faces that are followed, and random directions, both ways, that look for further ones in each look."""
 ALIKE = 1.0 - 1e-5  # cosine between the normals of one face
 NUDGE = 1e-6  # share of the bounds by which numbers change for a slope
@@ -99,20 +99,20 @@ class Directions:
             sets = sets.repeat(len(self._lost))
             sets.lose(self._lost, self._lost)
         axes, robots = len(self._places), len(sets.radius)
-        drawn = self._drawn.standard_normal((robots, DRAWN if before else 2 * DRAWN, axes))
-        fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
-        starts = np.concatenate([drawn, fixed, singular_values(sets)[1].swapaxes(-1, -2)], axis=1)
+        starts = self._drawn.standard_normal((robots, DRAWN, axes))
+        if before is None:
+            fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
+            vectors = singular_values(sets)[1].swapaxes(-1, -2)
+            starts = np.concatenate([starts, starts[:, ::-1, ::-1], fixed, vectors], axis=1)
         starts = np.concatenate([starts, -starts], axis=1)
         robot = np.repeat(np.arange(robots), starts.shape[1])
-        ends = starts.reshape(-1, axes)
+        ends = self._walked(sets.take(robot), starts.reshape(-1, axes), 1 if before else 3).normal
         if before is not None:
             robot = np.append(robot, before.seen.robot)
             ends = np.concatenate([ends, before.seen.normal])
         rows = sets.take(robot)
-        for _ in range(2 if before else 4):
-            found = max_wrench_along(rows, ends / np.linalg.norm(ends, axis=-1, keepdims=True), COARSE)
-            ends = found.normal
-        ends = ends / np.linalg.norm(ends, axis=-1, keepdims=True)
+        found = self._walked(rows, ends, 1)
+        ends = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
         distance = rows.farthest(ends)[0]
         kept: list[int] = []
         for k in np.argsort(distance, kind="stable"):
@@ -123,6 +123,14 @@ class Directions:
                 break
         faces = _Faces(robot[kept], ends[kept], distance[kept], found.force[kept])
         return Look(vector, float(distance[kept[0]]), faces)
+
+    @staticmethod
+    def _walked(rows: ForceSets, ends: Array, times: int) -> Largest:
+        """The faces that lie along directions, or along the normals of those."""
+        for _ in range(times):
+            found = max_wrench_along(rows, ends / np.linalg.norm(ends, axis=-1, keepdims=True), COARSE)
+            ends = found.normal
+        return found
 
     def slopes(self, look: Look) -> Slopes:
         """See `Hill`."""
@@ -200,22 +208,22 @@ class Climb:
         if vector is None:
             self.radius *= 0.3
             return
-        trial = self.hill.look(vector, self.at)
+        trial, slopes = self.hill.look(vector, self.at), None
         won = trial.value - self.at.value
         if self._curve is not None:
-            self._bend((vector - self.at.vector) / width, trial)
+            slopes = self.hill.slopes(trial)
+            self._bend((vector - self.at.vector) / width, self._slopes.slope[0] - slopes.slope[0])
         if won > 0.1 * gain or won > 10.0 * SETTLED * abs(self.at.value):
             self.radius = min(2.0 * self.radius, WIDEST) if won > 0.5 * gain else self.radius
-            self.at, self._slopes = trial, self.hill.slopes(trial)
+            self.at, self._slopes = trial, slopes
         else:
             self.radius *= 0.4
             if self._curve is None:  # faces that were seen there first count here, too
                 self.at, self._slopes = self.hill.look(self.at.vector, trial), None
 
-    def _bend(self, step: Array, trial: Look) -> None:
-        """Learn the curvature (BFGS, damped)."""
-        assert self._slopes is not None and self._curve is not None
-        turn = self._slopes.slope[0] - self.hill.slopes(trial).slope[0]
+    def _bend(self, step: Array, turn: Array) -> None:
+        """Learn the curvature (BFGS, damped) from a step and how much less it is worth at its end."""
+        assert self._curve is not None
         if not self._curve.any():
             self._curve = np.eye(len(step)) * max(float(turn @ step / (step @ step)), 1e-3)
         ahead = self._curve @ step
