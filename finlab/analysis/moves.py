@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 
 from finlab.actuators.actuator import Actuator
+from finlab.actuators.kinds import laws_of
 from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
 from finlab.axes import MIRROR
@@ -136,9 +138,19 @@ class Moves:
             raise LayoutError("the bounds leave nothing free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
-        self._step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
+        self.bends = flow is not None and any(law.feels_flow for _, law in laws_of(layout.actuators))
+        """Whether what actuators push changes as they move."""
+        self.step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
+        """Steps (D,) of the grid, 0 for any number."""
         self.start = self._held[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
+
+    @property
+    def smooth(self) -> Moves:
+        """The same moves without a grid."""
+        moves = copy(self)
+        moves.step = np.zeros_like(self.step)
+        return moves
 
     def keep_alone(self, axes: Sequence[str]) -> None:
         """Holds the free numbers that cost one of some axes, which are pushed alone now, when they change by
@@ -150,7 +162,7 @@ class Moves:
         if kept.any():
             self._free[np.flatnonzero(self._free)[~kept]] = False
             self.lower, self.upper, self.start = self.lower[kept], self.upper[kept], self.start[kept]
-            self._step = self._step[kept]
+            self.step = self.step[kept]
 
     def positions(self, vectors: Array) -> Array:
         """Returns positions (P, n, 3) [m] of vectors (P, D)."""
@@ -160,7 +172,9 @@ class Moves:
         """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
         moved = self._numbers(vectors)
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
-        turned = _turned(self.layout.frames[self._lead, 0], moved[..., 3] - self._angle[self._lead], moved[..., 4])
+        turned = _turned(
+            self.layout.frames[self._lead, 0], moved[..., 3] - self._angle[self._lead], moved[..., 4]
+        )
         frames[:, self._lead] = frames[:, self._lead] @ turned
         follows, twin = self._twin >= 0, self._twin[self._twin >= 0]
         frames[:, twin] = frames[:, twin] @ (turned[:, follows] * MIRROR * MIRROR[:, None])
@@ -181,10 +195,10 @@ class Moves:
 
     def on_grid(self, vectors: Array) -> Array:
         """Returns vectors (P, D) whose numbers are multiples of their steps, within bounds."""
-        step = np.where(self._step > 0.0, self._step, 1.0)
+        step = np.where(self.step > 0.0, self.step, 1.0)
         low, high = np.ceil(self.lower / step - 1e-9), np.floor(self.upper / step + 1e-9)
         rounded = np.clip(np.round(vectors / step), low, high) * step
-        return np.where((self._step > 0.0) & (low <= high), rounded, vectors)
+        return np.where((self.step > 0.0) & (low <= high), rounded, vectors)
 
     def sets(self, vectors: Array) -> ForceSets:
         """Returns what the actuators can push once moved by vectors (P, D)."""
@@ -210,7 +224,9 @@ def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
     then turn them about the vertical by others; those that are vertical tilt towards x."""
     level = np.hypot(axis[:, 0], axis[:, 1])[:, None]
     upright = np.stack([np.zeros(len(axis)), np.sign(axis[:, 2]), np.zeros(len(axis))], axis=-1)
-    sideways = np.stack([axis[:, 1], -axis[:, 0], np.zeros(len(axis))], axis=-1) / np.maximum(level, MIRROR_TOLERANCE)
+    sideways = np.stack([axis[:, 1], -axis[:, 0], np.zeros(len(axis))], axis=-1) / np.maximum(
+        level, MIRROR_TOLERANCE
+    )
     across = np.where(level > MIRROR_TOLERANCE, sideways, upright)
     return _about(across, tilt) @ _about(np.eye(3)[2:], turn)
 

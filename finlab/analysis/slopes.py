@@ -1,0 +1,162 @@
+"""Slopes of the goals of improving a layout.
+
+A goal of directions is the least of the distances of all faces of the set of wrenches, each of which changes
+with the effectiveness matrix by the product of its normal and the forces at its foot. Least power changes by
+the product of the prices of a wrench and the forces that give it (the envelope theorem, both).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finlab.allocation import Allocator
+from finlab.analysis.authority import named_axes
+from finlab.analysis.goals import UNREACHED
+from finlab.analysis.moves import Moves
+from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH
+from finlab.forces.force_sets import ForceSets
+from finlab.forces.reach import COARSE, Largest, max_wrench_along, singular_values
+from finlab.layout.effectiveness import moved_effectiveness
+from finlab.physics.objective import REACHED
+
+KEPT, DRAWN = 40, 8
+"""Most faces that are followed, and random directions, both ways, that look for further ones in each look."""
+ALIKE = 1.0 - 1e-5  # cosine between the normals of one face
+NUDGE = 1e-6  # share of the bounds by which numbers change for a slope
+
+
+class Look(NamedTuple):
+    """A goal at one vector."""
+
+    vector: Array
+    value: float
+    seen: Any
+    """What its slopes are made of."""
+
+
+def nudged(moves: Moves, vector: Array) -> Array:
+    """Vectors (2 D, D) about one, each number up, then each down."""
+    change = NUDGE * np.diag(moves.upper - moves.lower)
+    return np.concatenate([vector + change, vector - change])
+
+
+def difference(values: Array) -> Array:
+    """Slopes (D, ...) of values (2 D, ...) at `nudged` vectors."""
+    half = len(values) // 2
+    return np.asarray((values[:half] - values[half:]) / (2.0 * NUDGE))
+
+
+class _Faces(NamedTuple):
+    """Some faces of the sets of wrenches of one robot or, after each loss, of several."""
+
+    robot: Array
+    normal: Array
+    distance: Array
+    force: Array
+
+
+class Directions:
+    """The weakest direction, after the worst loss or with all working."""
+
+    def __init__(self, moves: Moves, axes: Sequence[str], after_loss: bool) -> None:
+        self._moves, self._places = moves, [WRENCH.index(axis) for axis in named_axes(axes)]
+        self._lost = np.arange(moves.layout.n) if after_loss else None
+        self._drawn = np.random.default_rng(0)
+
+    def _sets(self, vectors: Array) -> ForceSets:
+        return self._moves.sets(vectors).along(self._places)
+
+    def look(self, vector: Array, before: Look | None = None) -> Look:
+        """Returns the goal at a vector (D,), with the faces that were seen at another."""
+        sets = self._sets(vector[None])
+        if self._lost is not None:
+            sets = sets.repeat(len(self._lost))
+            sets.lose(self._lost, self._lost)
+        axes, robots = len(self._places), len(sets.radius)
+        starts = self._drawn.standard_normal((robots, DRAWN, axes))
+        if before is None:
+            fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
+            vectors = singular_values(sets)[1].swapaxes(-1, -2)
+            starts = np.concatenate([starts, starts[:, ::-1, ::-1], fixed, vectors], axis=1)
+        starts = np.concatenate([starts, -starts], axis=1)
+        robot = np.repeat(np.arange(robots), starts.shape[1])
+        ends = self._walked(sets.take(robot), starts.reshape(-1, axes), 1 if before else 3).normal
+        if before is not None:
+            robot = np.append(robot, before.seen.robot)
+            ends = np.concatenate([ends, before.seen.normal])
+        rows = sets.take(robot)
+        found = self._walked(rows, ends, 1)
+        ends = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
+        distance = rows.farthest(ends)[0]
+        kept: list[int] = []
+        for k in np.argsort(distance, kind="stable"):
+            same = [j for j in kept if robot[j] == robot[k]]
+            if not same or (ends[same] @ ends[k]).max() < ALIKE:
+                kept.append(int(k))
+            if len(kept) == KEPT:
+                break
+        faces = _Faces(robot[kept], ends[kept], distance[kept], found.force[kept])
+        return Look(vector, float(distance[kept[0]]), faces)
+
+    @staticmethod
+    def _walked(rows: ForceSets, ends: Array, times: int) -> Largest:
+        """The faces that lie along directions, or along the normals of those."""
+        for _ in range(times):
+            found = max_wrench_along(rows, ends / np.linalg.norm(ends, axis=-1, keepdims=True), COARSE)
+            ends = found.normal
+        return found
+
+    def slopes(self, look: Look) -> tuple[Array, Array]:
+        """Returns the goal about a vector as the least of K linear functions of the change, a share of the
+        bounds: values (K,) and slopes (K, D)."""
+        faces = look.seen
+        change = difference(self._sets(nudged(self._moves, look.vector)).effectiveness)
+        slope = np.einsum("kia,Diam,km->kD", faces.force, change, faces.normal, optimize=True)
+        return faces.distance, slope
+
+
+class Power:
+    """Minus the mean least power of some wrenches (N, 6)."""
+
+    def __init__(self, moves: Moves, mission: ArrayLike, flow: Array | None) -> None:
+        self._moves, self._mission, self._flow = moves, np.asarray(mission, np.float64), flow
+
+    def look(self, vector: Array, before: Look | None = None) -> Look:
+        """Returns the goal at a vector (D,)."""
+        robot = Allocator(self._moves.moved(vector))
+        answers = [robot.allocate(wrench, flow=self._flow) for wrench in self._mission]
+        costs = [a.power if a.reachable else UNREACHED * (1.0 + a.err_norm) for a in answers]
+        return Look(vector, -float(np.mean(costs)), answers)
+
+    def slopes(self, look: Look) -> tuple[Array, Array]:
+        """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, by how far its
+        direction is gone."""
+        moves, total = self._moves, np.zeros(len(look.vector))
+        frames = moves.geometry(look.vector[None])[1][0]
+        change = difference(moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, look.vector))))
+        for wrench, answer in zip(self._mission, look.seen, strict=True):
+            if answer.prices is None:
+                continue
+            own = np.einsum("nj,nij->ni", answer.forces, frames)
+            gain = np.einsum("ni,Dnim,m->D", own, change, np.nan_to_num(answer.prices), optimize=True)
+            if not answer.reachable:
+                worth = float(np.nan_to_num(answer.prices) @ np.nan_to_num(wrench))
+                size = UNREACHED * float(np.linalg.norm(np.nan_to_num(wrench) / answer.scale))
+                gain = gain * (size / worth) if abs(worth) > 1e-9 else 0.0 * gain
+            total += gain / len(self._mission)
+        return np.array([look.value]), total[None]
+
+
+Hill = Directions | Power
+
+
+def hill_of(goal: str, moves: Moves, mission: ArrayLike, axes: Sequence[str], flow: Array | None) -> Hill:
+    """Returns the slopes of a goal; arguments as for `make_goal`, of a goal that this knows."""
+    if goal == "mission_power":
+        return Power(moves, mission, flow)
+    return Directions(moves, axes, goal == "worst_single_failure")
