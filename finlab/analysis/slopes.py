@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import Allocator
 from finlab.analysis.authority import named_axes
@@ -20,12 +20,13 @@ from finlab.analysis.moves import Moves
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.forces.force_sets import ForceSets
-from finlab.forces.reach import COARSE, Largest, max_wrench_along, singular_values
+from finlab.forces.reach import COARSE, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness
-from finlab.physics.objective import REACHED
 
-KEPT, DRAWN = 40, 8
+KEPT, DRAWN = 60, 8
 """Most faces that are followed, and random directions, both ways, that look for further ones in each look."""
+FREE = 1e-3  # share of the largest effect on a face's distance up to which a force counts as free
+FIRST_WALKS = 4  # walks from face to face in the first look; in those that follow it is one
 ALIKE = 1.0 - 1e-5  # cosine between the normals of one face
 NUDGE = 1e-6  # share of the bounds by which numbers change for a slope
 
@@ -52,12 +53,24 @@ def difference(values: Array) -> Array:
 
 
 class _Faces(NamedTuple):
-    """Some faces of the sets of wrenches of one robot or, after each loss, of several."""
+    """K faces of the sets of wrenches of one robot or, after each loss, of several."""
 
-    robot: Array
+    robot: NDArray[np.intp]
+    sets: ForceSets
     normal: Array
     distance: Array
     force: Array
+    """Planar forces (K, n, 2) [N] that give a wrench on the face."""
+
+    def foot_force(self) -> Array:
+        """Planar forces (K, n, 2) [N], of which those that the face leaves free may exceed their limits, that
+        give the wrench at the face's foot: the slope of its distance is as if its normal did not turn."""
+        effect = np.linalg.norm(self.sets.pull(self.normal), axis=-1) * self.sets.radius
+        free = effect <= FREE * effect.max(-1, keepdims=True)
+        columns = (self.sets.effectiveness * free[..., None, None]).reshape(len(free), -1, self.normal.shape[-1])
+        missing = self.distance[:, None] * self.normal - self.sets.wrench(self.force)
+        rest = missing[:, None] @ np.linalg.pinv(columns, rcond=FREE)
+        return self.force + rest.reshape(self.force.shape)
 
 
 class Directions:
@@ -78,20 +91,21 @@ class Directions:
             sets = sets.repeat(len(self._lost))
             sets.lose(self._lost, self._lost)
         axes, robots = len(self._places), len(sets.radius)
-        starts = self._drawn.standard_normal((robots, DRAWN, axes))
+        starts = self._drawn.standard_normal((robots, DRAWN if before else 2 * DRAWN, axes))
         if before is None:
             fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
-            vectors = singular_values(sets)[1].swapaxes(-1, -2)
-            starts = np.concatenate([starts, starts[:, ::-1, ::-1], fixed, vectors], axis=1)
-        starts = np.concatenate([starts, -starts], axis=1)
-        robot = np.repeat(np.arange(robots), starts.shape[1])
-        ends = self._walked(sets.take(robot), starts.reshape(-1, axes), 1 if before else 3).normal
+            starts = np.concatenate([starts, fixed, singular_values(sets)[1].swapaxes(-1, -2)], axis=1)
+        ends = np.concatenate([starts, -starts], axis=1).reshape(-1, axes)
+        robot = np.repeat(np.arange(robots), len(ends) // robots)
         if before is not None:
             robot = np.append(robot, before.seen.robot)
             ends = np.concatenate([ends, before.seen.normal])
         rows = sets.take(robot)
-        found = self._walked(rows, ends, 1)
-        ends = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
+        for _ in range(1 if before else FIRST_WALKS):
+            ends /= np.linalg.norm(ends, axis=-1, keepdims=True)
+            found = max_wrench_along(rows, ends, COARSE)
+            ends = found.normal
+        ends = ends / np.linalg.norm(ends, axis=-1, keepdims=True)
         distance = rows.farthest(ends)[0]
         kept: list[int] = []
         for k in np.argsort(distance, kind="stable"):
@@ -100,23 +114,15 @@ class Directions:
                 kept.append(int(k))
             if len(kept) == KEPT:
                 break
-        faces = _Faces(robot[kept], ends[kept], distance[kept], found.force[kept])
+        faces = _Faces(robot[kept], rows.take(np.array(kept)), ends[kept], distance[kept], found.force[kept])
         return Look(vector, float(distance[kept[0]]), faces)
-
-    @staticmethod
-    def _walked(rows: ForceSets, ends: Array, times: int) -> Largest:
-        """The faces that lie along directions, or along the normals of those."""
-        for _ in range(times):
-            found = max_wrench_along(rows, ends / np.linalg.norm(ends, axis=-1, keepdims=True), COARSE)
-            ends = found.normal
-        return found
 
     def slopes(self, look: Look) -> tuple[Array, Array]:
         """Returns the goal about a vector as the least of K linear functions of the change, a share of the
         bounds: values (K,) and slopes (K, D)."""
         faces = look.seen
         change = difference(self._sets(nudged(self._moves, look.vector)).effectiveness)
-        slope = np.einsum("kia,Diam,km->kD", faces.force, change, faces.normal, optimize=True)
+        slope = np.einsum("kia,Diam,km->kD", faces.foot_force(), change, faces.normal, optimize=True)
         return faces.distance, slope
 
 
