@@ -15,7 +15,7 @@ PENALTY = 1e3  # cost of actuators that are too close or break another rule, per
 ROUNDING = 1e-9  # distance [m] that counts for nothing
 FIRST, WIDEST, LEAST = 0.1, 0.3, 2e-4
 """Radii of the trust region, shares of the bounds: at first, at most, and where a climb ends."""
-SETTLED = 2e-3  # gain of a step, as a share of the value and the radius, at which a climb ends
+SETTLED = 2e-5  # gain of a step, as a share of the value, at which a climb ends
 
 Rule = Callable[[Array, Array], Array]
 """How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they
@@ -74,7 +74,7 @@ class Climb:
         if self._slopes is None:
             self._slopes = self.hill.slopes(self.at)
         move, gain = self._best(*self._slopes)
-        if gain <= SETTLED * self.radius * abs(self.at.value):
+        if gain <= SETTLED * abs(self.at.value):
             self.radius = 0.0
             return
         vector = self._keeping(np.clip(self.at.vector + move * self._width, self._low, self._high))

@@ -21,9 +21,11 @@ from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
+RANK, FINALISTS = 6, 5
+LEAST_STARTS, MOST_STARTS = 2, 12
 STEPS = 5  # steps of a climb in a round
-STARTS, DRAWS = 96, 64  # starts of climbs in all, times free numbers; and vectors of which they are the best
-FIRST_STEPS, MOST_STEPS = 15, 60  # of each climb, and of the best one
+STARTS, DRAWS = 3200, 64  # starts of climbs in all, times free numbers; and vectors of which they are the best
+FIRST_STEPS, MOST_STEPS = 8, 50  # of each climb, and of the best one
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ class _Search:
                 break
         else:
             climbs.sort(key=lambda one: -one.at.value)
-            for climb in climbs[:1]:
+            for climb in climbs[: max(1, len(climbs) // FINALISTS)]:
                 self._climbed(climb, MOST_STEPS)
         if self._moves.step.any() and self.gained:
             self.best, self.vector, self.gained = best, self._moves.start, False
@@ -198,10 +200,12 @@ class _Search:
         if self._rules.broken(moves.start[None])[0] <= 0.0:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
-        drawn = moves.start + random.uniform(0.2, 1.0, (DRAWS, 1)) * (drawn - moves.start)
-        count = max(1, round(STARTS / len(moves.start)) - 1)
-        looks = [hill.look(one) for one in drawn[self._rules.broken(drawn) <= 0.0][: 3 * count]]
-        yield from sorted(looks, key=lambda look: -look.value)[:count]
+        nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
+        kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
+        count = int(np.clip(round(STARTS / len(moves.start) ** 2), LEAST_STARTS, MOST_STARTS)) - 1
+        drawn = np.concatenate(kept)[: RANK * count]
+        for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
+            yield hill.look(drawn[k])
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Whether the search has to stop."""

@@ -19,8 +19,8 @@ from finlab.analysis.goals import UNREACHED
 from finlab.analysis.moves import Moves
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
-from finlab.forces.force_sets import ForceSets
-from finlab.forces.reach import COARSE, max_wrench_along, singular_values
+from finlab.forces.force_sets import SCALE, ForceSets
+from finlab.forces.reach import COARSE, RANK_TOLERANCE, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness
 
 KEPT, DRAWN = 60, 8
@@ -84,12 +84,21 @@ class Directions:
     def _sets(self, vectors: Array) -> ForceSets:
         return self._moves.sets(vectors).along(self._places)
 
+    def guess(self, vectors: Array) -> Array:
+        """Returns what vectors (P, D) promise (P,): smallest singular values."""
+        sets = self._left(self._sets(vectors))
+        return np.asarray(singular_values(sets)[0][:, -1].reshape(len(vectors), -1).min(-1))
+
+    def _left(self, sets: ForceSets) -> ForceSets:
+        """Of P robots, what is left after each loss, if that counts."""
+        if self._lost is not None:
+            robots, sets = len(sets.radius), sets.repeat(len(self._lost))
+            sets.lose(np.arange(len(sets.radius)), np.tile(self._lost, robots))
+        return sets
+
     def look(self, vector: Array, before: Look | None = None) -> Look:
         """Returns the goal at a vector (D,), with the faces that were seen at another."""
-        sets = self._sets(vector[None])
-        if self._lost is not None:
-            sets = sets.repeat(len(self._lost))
-            sets.lose(self._lost, self._lost)
+        sets = self._left(self._sets(vector[None]))
         axes, robots = len(self._places), len(sets.radius)
         starts = self._drawn.standard_normal((robots, DRAWN if before else 2 * DRAWN, axes))
         if before is None:
@@ -131,6 +140,15 @@ class Power:
 
     def __init__(self, moves: Moves, mission: ArrayLike, flow: Array | None) -> None:
         self._moves, self._mission, self._flow = moves, np.asarray(mission, np.float64), flow
+
+    def guess(self, vectors: Array) -> Array:
+        """Returns what vectors (P, D) promise (P,): minus the squares of what is missing, far ahead of those of
+        the least shares of the largest forces."""
+        full = self._moves.sets(vectors).full_effectiveness()
+        wanted = np.nan_to_num(self._mission) / SCALE
+        share = wanted @ np.linalg.pinv(full, rcond=RANK_TOLERANCE)
+        missing = wanted - share @ full
+        return np.asarray(-(share**2).sum((-1, -2)) - (missing**2).sum((-1, -2)) / NUDGE)
 
     def look(self, vector: Array, before: Look | None = None) -> Look:
         """Returns the goal at a vector (D,)."""
