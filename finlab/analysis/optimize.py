@@ -21,11 +21,11 @@ from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
-RANK, FINALISTS = 6, 5
-LEAST_STARTS, MOST_STARTS = 2, 12
 STEPS = 5  # steps of a climb in a round
-STARTS, DRAWS = 3200, 64  # starts of climbs in all, times free numbers; and vectors of which they are the best
-FIRST_STEPS, MOST_STEPS = 8, 50  # of each climb, and of the best one
+DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
+STARTS, FEWEST, MOST = 3200, 2, 12  # climbs, times the square of the free numbers; at least and at most
+FIRST_STEPS, MOST_STEPS = 8, 50  # of each climb, and of those that go on
+FINALISTS = 5  # of so many climbs the best one goes on
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,8 @@ class _Search:
         self._moves, self._rules, self._before, self._rounds = moves, rules, before, rounds
         self._progress, self._cancelled = progress, cancelled or (lambda: False)
         self.vector, self.best, self.gained, self.stopped = moves.start, before, False, False
-        if rules.broken(moves.start[None])[0] > 0.0:
+        self._kept = rules.broken(moves.start[None])[0] <= 0.0
+        if not self._kept:
             self.best = -np.inf
         self._done = 0
 
@@ -179,9 +180,9 @@ class _Search:
 
     def climb(self, hill: Hill, seed: int) -> None:
         """Climb a little from several starts, then on from the best of them; round what was found."""
-        best, self._left = self.best, STEPS
+        best, self._left, self.stopped = self.best, STEPS, self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(hill, seed):
+        for start in self._starts(hill, seed) if not self.stopped else ():
             climbs.append(Climb(hill, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
@@ -197,12 +198,12 @@ class _Search:
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
         """The present vector and the best of some random ones, of those that keep all rules."""
         moves, random = self._moves, np.random.default_rng(seed)
-        if self._rules.broken(moves.start[None])[0] <= 0.0:
+        if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
         nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
         kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
-        count = int(np.clip(round(STARTS / len(moves.start) ** 2), LEAST_STARTS, MOST_STARTS)) - 1
+        count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
         drawn = np.concatenate(kept)[: RANK * count]
         for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
             yield hill.look(drawn[k])

@@ -67,7 +67,9 @@ class _Faces(NamedTuple):
         give the wrench at the face's foot: the slope of its distance is as if its normal did not turn."""
         effect = np.linalg.norm(self.sets.pull(self.normal), axis=-1) * self.sets.radius
         free = effect <= FREE * effect.max(-1, keepdims=True)
-        columns = (self.sets.effectiveness * free[..., None, None]).reshape(len(free), -1, self.normal.shape[-1])
+        columns = (self.sets.effectiveness * free[..., None, None]).reshape(
+            len(free), -1, self.normal.shape[-1]
+        )
         missing = self.distance[:, None] * self.normal - self.sets.wrench(self.force)
         rest = missing[:, None] @ np.linalg.pinv(columns, rcond=FREE)
         return self.force + rest.reshape(self.force.shape)
