@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import LinearConstraint, linprog, minimize
+from scipy.optimize import Bounds, LinearConstraint, linprog, minimize
 
 from finlab.analysis.moves import Moves
 from finlab.analysis.slopes import Hill, Look, difference, nudged
@@ -23,7 +23,7 @@ keep it."""
 
 
 class Rules:
-    """What vectors have to keep beside their bounds: distances between actuators, and a rule of the caller."""
+    """What vectors have to keep beside their bounds: distances between actuators, a rule of the caller."""
 
     def __init__(self, moves: Moves, rule: Rule | None) -> None:
         self.moves, self._rule = moves, rule
@@ -42,7 +42,7 @@ class Rules:
     def broken(self, vectors: Array) -> Array:
         """Returns how far vectors (P, D) break the rules (P,) [m]."""
         close = np.maximum(-self.gaps(vectors) - ROUNDING, 0.0).sum(-1)
-        return close if self._rule is None else np.asarray(close + self._rule(*self.moves.geometry(vectors)))
+        return np.asarray(close if self._rule is None else close + self._rule(*self.moves.geometry(vectors)))
 
 
 @dataclass
@@ -62,11 +62,6 @@ class Climb:
     def __post_init__(self) -> None:
         moves = self.rules.moves
         self._low, self._high, self._width = moves.lower, moves.upper, moves.upper - moves.lower
-
-    @property
-    def done(self) -> bool:
-        """Whether no step is left that gains."""
-        return self.radius < LEAST
 
     def step(self) -> None:
         """Take one step, if it gains; else make the trust region smaller."""
@@ -154,13 +149,14 @@ class Climb:
         curve: Array, slope: Array, box: tuple[Array, Array], apart: Array, left: Array
     ) -> tuple[Array, float]:
         """The same of one slope whose curvature is known."""
+        rules = [LinearConstraint(apart, -left, np.inf)] if len(left) else []
         best = minimize(
             lambda p: (0.5 * p @ curve @ p - slope @ p, curve @ p - slope),
             np.zeros(len(slope)),
             jac=True,
-            method="SLSQP" if len(left) else "L-BFGS-B",
-            bounds=np.transpose(box),
-            constraints=[LinearConstraint(apart, -left, np.inf)] if len(left) else (),
+            method="SLSQP" if rules else "L-BFGS-B",
+            bounds=Bounds(*box),
+            constraints=rules,
         )
         return np.clip(best.x, *box), -float(best.fun)
 

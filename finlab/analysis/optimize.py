@@ -10,11 +10,11 @@ from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import commanded_axes, named_axes
-from finlab.analysis.climb import PENALTY, Climb, Rule, Rules
+from finlab.analysis.climb import LEAST, PENALTY, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
-from finlab.analysis.slopes import Hill, Look, hill_of
+from finlab.analysis.slopes import Directions, Hill, Look, Power
 from finlab.arrays import Array
 from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
@@ -23,9 +23,9 @@ from finlab.layout import Layout
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 5  # steps of a climb in a round
 DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
-STARTS, FEWEST, MOST = 3200, 2, 12  # climbs, times the square of the free numbers; at least and at most
+STARTS, FEWEST, MOST = 2800, 2, 12  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 8, 50  # of each climb, and of those that go on
-FINALISTS = 5  # of so many climbs the best one goes on
+FINALISTS = 4  # of so many climbs the best one goes on
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,12 @@ def optimize_layout(
     before = measured(layout)
     search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled)
     if not moves.bends:
-        search.climb(hill_of(goal, moves.smooth, mission, axes or commanded_axes(layout), water), seed)
+        search.climb(
+            Power(moves.smooth, mission, water)
+            if goal == "mission_power"
+            else Directions(moves.smooth, axes or commanded_axes(layout), goal == "worst_single_failure"),
+            seed,
+        )
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
@@ -210,7 +215,7 @@ class _Search:
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Whether the search has to stop."""
-        while not climb.done and climb.steps < steps:
+        while climb.radius >= LEAST and climb.steps < steps:
             climb.step()
             self._note(climb.at.value, climb.at.vector)
             self._left -= 1

@@ -144,8 +144,8 @@ class Power:
         self._moves, self._mission, self._flow = moves, np.asarray(mission, np.float64), flow
 
     def guess(self, vectors: Array) -> Array:
-        """Returns what vectors (P, D) promise (P,): minus the squares of what is missing, far ahead of those of
-        the least shares of the largest forces."""
+        """Returns what vectors (P, D) promise (P,): minus squares of what is missing, and far behind of the
+        least shares of the largest forces."""
         full = self._moves.sets(vectors).full_effectiveness()
         wanted = np.nan_to_num(self._mission) / SCALE
         share = wanted @ np.linalg.pinv(full, rcond=RANK_TOLERANCE)
@@ -179,10 +179,3 @@ class Power:
 
 
 Hill = Directions | Power
-
-
-def hill_of(goal: str, moves: Moves, mission: ArrayLike, axes: Sequence[str], flow: Array | None) -> Hill:
-    """Returns the slopes of a goal; arguments as for `make_goal`, of a goal that this knows."""
-    if goal == "mission_power":
-        return Power(moves, mission, flow)
-    return Directions(moves, axes, goal == "worst_single_failure")

@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -219,14 +218,13 @@ class RobotScene:
         drawn: Layout,
     ) -> None:
         shown = found if display.drawn != "none" and task == "Design" else None
-        if shown is not None and growing is not None and growing.kind == DRAWN[display.drawn]:
-            shown = replace(shown, now=growing, whole=shown.now)
-        self._attainable.refresh(shown, np.array(target), arrow_size(drawn))
+        better = growing if growing is not None and growing.kind == DRAWN[display.drawn] else None
+        self._attainable.refresh(shown, better, np.array(target), arrow_size(drawn))
 
     def _offer(
         self, better: Improvement | None, progress: Progress | None, layout: Layout, swims: bool
     ) -> None:
-        """The actuators that a search would put elsewhere, where it would put them, by what is known so far."""
+        """The actuators that a search would put elsewhere, where it would put them so far."""
         offer = progress if better is None or not better.improved else better
         other = None if offer is None or swims else offer.layout
         now = {part.name: (part.position, part.frame) for part in layout.actuators}
