@@ -37,7 +37,7 @@ class Rules:
     def gaps(self, vectors: Array) -> Array:
         """Returns by how much (P, pairs) [m] actuators moved by vectors (P, D) are farther apart than they
         have to be."""
-        return self._apart(self.moves.positions(vectors)) - self._needed
+        return np.asarray(self._apart(self.moves.positions(vectors)) - self._needed)
 
     def broken(self, vectors: Array) -> Array:
         """Returns how far vectors (P, D) break the rules (P,) [m]."""
