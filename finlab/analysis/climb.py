@@ -13,9 +13,9 @@ from finlab.arrays import Array
 CLEARANCE = 0.10  # least distance between two actuators [m]; those that are closer already need not part
 PENALTY = 1e3  # cost of actuators that are too close or break another rule, per metre; far beyond any goal
 ROUNDING = 1e-9  # distance [m] that counts for nothing
-FIRST, WIDEST, LEAST = 0.1, 0.3, 2e-4
+FIRST, WIDEST, LEAST = 0.1, 0.3, 2e-5
 """Radii of the trust region, shares of the bounds: at first, at most, and where a climb ends."""
-SETTLED = 2e-5  # gain of a step, as a share of the value, at which a climb ends
+SETTLED = 1e-5  # gain of a step, as a share of the value, at which a climb ends
 
 Rule = Callable[[Array, Array], Array]
 """How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they

@@ -160,21 +160,19 @@ class Power:
         return Look(vector, -float(np.mean(costs)), answers)
 
     def slopes(self, look: Look) -> tuple[Array, Array]:
-        """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, by how far its
-        direction is gone."""
+        """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, of what is
+        missing."""
         moves, total = self._moves, np.zeros(len(look.vector))
         frames = moves.geometry(look.vector[None])[1][0]
         change = difference(moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, look.vector))))
-        for wrench, answer in zip(self._mission, look.seen, strict=True):
-            if answer.prices is None:
-                continue
-            own = np.einsum("nj,nij->ni", answer.forces, frames)
-            gain = np.einsum("ni,Dnim,m->D", own, change, np.nan_to_num(answer.prices), optimize=True)
+        for answer in look.seen:
+            prices = answer.prices
             if not answer.reachable:
-                worth = float(np.nan_to_num(answer.prices) @ np.nan_to_num(wrench))
-                size = UNREACHED * float(np.linalg.norm(np.nan_to_num(wrench) / answer.scale))
-                gain = gain * (size / worth) if abs(worth) > 1e-9 else 0.0 * gain
-            total += gain / len(self._mission)
+                prices = UNREACHED * answer.unallocated / answer.scale**2 / answer.err_norm
+            if prices is not None:
+                own = np.einsum("nj,nij->ni", answer.forces, frames)
+                gain = np.einsum("ni,Dnim,m->D", own, change, np.nan_to_num(prices), optimize=True)
+                total += gain / len(look.seen)
         return np.array([look.value]), total[None]
 
 
