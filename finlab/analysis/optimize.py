@@ -21,9 +21,9 @@ from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
-STEPS = 8  # steps of a climb in a round
+STEPS = 10  # steps of a climb in a round
 DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
-STARTS, FEWEST, MOST = 2000, 2, 12  # climbs, times the square of the free numbers; at least and at most
+STARTS, FEWEST, MOST = 2800, 2, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
 FINALISTS = 3  # of so many climbs the best one goes on
 
