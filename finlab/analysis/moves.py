@@ -204,7 +204,7 @@ class Moves:
         """Returns what the actuators can push once moved by vectors (P, D)."""
         position, frames = self.geometry(vectors)
         effectiveness = moved_effectiveness(self.layout, position, frames) * self.layout.commanded
-        if self._flow is not None:
+        if self.bends:
             return assembled([shapes_of(self.moved(vector), self._flow) for vector in vectors], effectiveness)
         alike = assembled([self._shapes], effectiveness[:1]).repeat(len(vectors))
         directions = np.array([shape.directions for shape in self._shapes])

@@ -25,6 +25,7 @@ STEPS = 10  # steps of a climb in a round
 DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
 STARTS, FEWEST, MOST = 2800, 2, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
+LITTLE = 1e-4  # share of the goal that a climb has to gain to count
 FINALISTS = 3  # of so many climbs the best one goes on
 
 
@@ -171,7 +172,9 @@ class _Search:
     def _note(self, value: float, vector: Array) -> None:
         """A vector that keeps all rules."""
         if value > self.best:
-            self.best, self.vector, self.gained = value, vector, True
+            self.best, self.vector = value, vector
+        if not self._kept or value > self._before + LITTLE * abs(self._before):
+            self.gained = True
 
     def _after_round(self, *_: object) -> bool:
         """Says whether to stop."""
