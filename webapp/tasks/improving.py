@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,9 +79,10 @@ class Search:
 class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, drawn: Callable[[], str] = lambda: "none") -> None:
+        """`drawn` says of what the set is drawn, a key of `DRAWN`."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
-        self._session = context.session
+        self._drawn = drawn
         self.reach: AttainableSet | None = None
         """What the best layout so far attains, where a set is drawn; kept while it is offered."""
 
@@ -135,7 +136,7 @@ class Improver(Newest[Search, Improvement]):
 
     def _look(self, search: Search, layout: Layout) -> None:
         """What a layout attains, of the kind that is drawn."""
-        kind = DRAWN[self._session.display.drawn]
+        kind = DRAWN[self._drawn()]
         reach = None if kind is None else attainable_set(layout, kind, flow=search.state.flow)
         if search is self.question:
             self.reach = reach
