@@ -167,7 +167,7 @@ class _Search:
         self._kept = rules.broken(moves.start[None])[0] <= 0.0
         if not self._kept:
             self.best = -np.inf
-        self._done = 0
+        self._done = self._steps = 0
 
     def _note(self, value: float, vector: Array) -> None:
         """A vector that keeps all rules."""
@@ -188,7 +188,7 @@ class _Search:
 
     def climb(self, hill: Hill, seed: int) -> None:
         """Climb a little from several starts, then on from the best of them; round what was found."""
-        best, self._left, self.stopped = self.best, STEPS, self._cancelled()
+        best, self.stopped = self.best, self._cancelled()
         climbs = list[Climb]()
         for start in self._starts(hill, seed) if not self.stopped else ():
             climbs.append(Climb(hill, self._rules, start))
@@ -221,14 +221,10 @@ class _Search:
         while climb.radius >= LEAST and climb.steps < steps:
             climb.step()
             self._note(climb.at.value, climb.at.vector)
-            self._left -= 1
+            self._steps += 1
             self.stopped = self._cancelled()
-            if self.stopped:
+            if self.stopped or (self._steps % STEPS == 0 and self._after_round()):
                 return True
-            if self._left == 0:
-                self._left = STEPS
-                if self._after_round():
-                    return True
         return False
 
     def evolve(self, measure: Goal, seed: int) -> None:
