@@ -222,15 +222,18 @@ class Dual(Method):
         found, prices, status = core.one(wrench, None, inner)
         pushed = wrench - self.compiled.beside
         least = core.look(pushed, prices)[1] * (1.0 + FINE)
-        exact = status == MET and self.error(found.command, wrench[None])[0] <= EXACT
+        # With doubt the dual takes it for drag, and proves nothing.
+        exact = status == MET and self.compiled.doubt is None
+        exact = exact and bool(self.error(found.command, wrench[None])[0] <= EXACT)
         if exact and self.search.cost(found.command)[0] <= least:
             command = found.command
         else:
             first = core.look(pushed, core.first(pushed))[0][None]
+            starts = np.concatenate([core.commands(first), found.command])
             if inner is None:
-                near = self._padded(self.search.prices(core.commands(first)[0], self._directions))
+                near = self._padded(self.search.prices(starts[0], self._directions))
                 found, prices, status = core.one(wrench, None, near)
-            command, prices = self._near(wrench, found.force, first, prices, status)
+            command, prices = self._near(wrench, found.force, starts, prices, status)
         within = not np.isnan(command).any()
         if within:
             found = found._replace(command=command, aim=wrench[None])
@@ -245,16 +248,16 @@ class Dual(Method):
         return Forces(known, prices, command)
 
     def _near(
-        self, wrench: Array, force: Array, first: Array, prices: Array, status: int
+        self, wrench: Array, force: Array, starts: Array, prices: Array, status: int
     ) -> tuple[Array, Array]:
-        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN
-        where there is none; and its prices (6,)."""
+        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or other starts (S, n, 3),
+        NaN where there is none; and its prices (6,)."""
         search, core = self.search, self.compiled.robot.core
         begin, pushed = core.commands(force), wrench - self.compiled.beside
         if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
             return begin, prices
         value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
-        best = best_of(np.concatenate([begin, core.commands(first)]))
+        best = best_of(np.concatenate([begin, starts]))
         if best is not None:
             if status != MET:
                 tried = self._padded(search.prices(best.command, self._directions))
