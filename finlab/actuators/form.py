@@ -1,4 +1,4 @@
-"""How forces of actuators become commands, and commands forces, in numbers for the core (finlab/core/law.c)."""
+"""Numbers for the core (finlab/core/law.c): how forces of actuators become commands, and commands forces."""
 
 from collections.abc import Callable, Sequence
 from itertools import product
@@ -10,12 +10,12 @@ from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.arrays import Array
 from finlab.precision import NOTHING
 
-CELLS = (16, 1), (64, 1), (256, 1), (1024, 1), (16, 16), (64, 64)
+_CELLS = (16, 1), (64, 1), (256, 1), (1024, 1), (16, 16), (64, 64)
 """Cells of amplitude and frequency that are tried for the law of a fin."""
 
 
 class Form(NamedTuple):
-    """How a force of one actuator becomes a command, and a command a force, for the core (finlab/core/law.c)."""
+    """How a force of one actuator becomes a command, and a command a force."""
 
     kind: Literal["thruster", "pod", "fin", "foil"]
     """A force; an angle and a force; a beat of a fin; an angle of a foil."""
@@ -24,10 +24,10 @@ class Form(NamedTuple):
     law: Array | None = None
     """A grid of the law, see `grid_numbers`."""
     beat: Array | None = None
-    """Of a fin: (K + 1, 2) amplitudes and frequencies of the shares (j / K)^2 of its largest force. Of a foil:
-    coefficients of lift, rising, and angles (K, 2)."""
+    """Of a fin: amplitudes and frequencies (K + 1, 2) of the shares (j / K)^2 of its largest force. Of a
+    foil: coefficients of lift, rising, and angles (K, 2)."""
     deflection: Array | None = None
-    """Of a fin with a gauge: angles (POINTS,) [rad] from the direction of the command to that of the force."""
+    """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
     numbers: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     """Sign of a thruster's command; lean, unevenness and its angle of a fin, or the course of a foil as lean;
     pressure [N], angle without lift and drag there of a foil."""
@@ -43,12 +43,12 @@ def grid_numbers(
 
 
 def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Array) -> Array:
-    """Returns the size of a fin's force over amplitude and frequency within limits (3,) as a grid for the core,
-    on as few knots as say it: the size or its root, over amplitude or its product with frequency."""
+    """Returns the size of a fin's force over amplitude and frequency within limits (3,) as a grid for the
+    core, on as few knots as say it: the size or its root, over amplitude or its product with frequency."""
     share = np.random.default_rng(0).uniform(size=(300, 3))
     command = lower + share * (upper - lower)
     wanted, best, least = size(command[:, 0], command[:, 1]), np.empty(0), np.inf
-    for (cells, more), beat, root in product(CELLS, (False, True), (True, False)):
+    for (cells, more), beat, root in product(_CELLS, (False, True), (True, False)):
         ends = (lower[0] * lower[1], upper[0] * upper[1]) if beat else (lower[0], upper[0])
         # Of the product alone, the frequency does not matter; powers of it bend most near 0.
         axes = [_knots(*ends, cells, 2.0 if beat else 1.0), _knots(lower[1], upper[1], more, 1.0)]
@@ -74,7 +74,7 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
 
 
 def _knots(low: float, high: float, cells: int, power: float) -> Array:
-    """Knots between two ends, as dense towards the lower one as a power of equal steps, and one more on either
-    side: slopes at the ends are as good."""
+    """Knots between two ends, as dense towards the lower one as a power of equal steps, and one more on
+    either side: slopes at the ends are as good."""
     width, share = max(high - low, NOTHING), (np.arange(cells + 2.0) / cells) ** power
     return low + width * np.concatenate([[-share[1]], share])

@@ -12,17 +12,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.form import Form
 from finlab.actuators.thrust_model import lower_hull
 from finlab.arrays import Array
+from finlab.precision import NOTHING
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
-
-SAME = 1e-10
-"""Share of the largest force by which a table of fewer intervals may be off."""
 
 POINTS = 512
 """Directions around a circle, and sizes of a force, for which a fin is asked."""
@@ -135,8 +132,13 @@ class RadialTable:
 
     def _stands_for_all(self, step: int) -> bool:
         """Whether every `step`-th of the grid's prices says what all do."""
-        spline = CubicHermiteSpline(_GRID[::step], self.force[::step], self.top * self.slope[::step])
-        return bool(np.abs(spline(_GRID) - self.force).max() <= SAME * self.largest)
+        few = [values[::step] for values in (_GRID, self.force, self.top * self.slope)]
+        cell = np.minimum(np.arange(CELLS + 1) // step, CELLS // step - 1)
+        width = np.diff(few[0])[cell]
+        t = (_GRID - few[0][cell]) / width
+        m0, m1, rise = few[2][cell] * width, few[2][cell + 1] * width, np.diff(few[1])[cell]
+        found = few[1][cell] + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
+        return bool(np.abs(found - self.force).max() <= 0.1 * NOTHING * self.largest)
 
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before

@@ -96,7 +96,7 @@ class Core:
             np.ctypeslib.as_array(getattr(self._answer, name))[: width * count].reshape(1, count, width)
             for name, width in (("force", 2), ("command", 3))
         )
-        self._vectors = np.frombuffer(self._answer, np.float64, 20, 16 * MOST)
+        self._vectors = np.frombuffer(memoryview(self._answer), np.float64, 20, 16 * MOST)
         self._at, self._area = block.ctypes.data, ctypes.addressof(self._work)
         if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area):
             raise ValueError(f"the core takes the robot for {CODES[error]}")
@@ -109,9 +109,9 @@ class Core:
         previous: Array | None = None,
         always: bool = False,
     ) -> tuple[Found, Array, int]:
-        """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method ended
-        (`MET` ...). It begins at prices `inner`, where there are some; commands may follow `previous` ones
-        (n, 3); a policy is served where the wrench is out of reach, or `always`."""
+        """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method
+        ended (`MET` ...). It begins at prices `inner`, where there are some; commands may follow `previous`
+        ones (n, 3); a policy is served where the wrench is out of reach, or `always`."""
         question, answer = self._question, self._answer
         question.wrench[:] = wrench.tolist()
         question.policy = None if policy is None else ctypes.addressof(_policy(policy, always))
@@ -145,7 +145,7 @@ class Core:
         return Found(force, price, aim, value, within, command, error < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep those of `previous` (n, 3)."""
+        """Commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep `previous` ones (n, 3)."""
         force, command = np.ascontiguousarray(force), np.empty((len(force), self._count, 3))
         before = None if previous is None else np.ascontiguousarray(previous)
         start = None if before is None else before.ctypes.data

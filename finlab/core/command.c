@@ -2,8 +2,6 @@
    commands of the tick before. */
 #include "inner.h"
 
-#define DAMPING R(1e-6) /* of the first step */
-
 static int angle_of(const fl_actuator *a) { return a->form == FL_FIN ? 2 : a->form == FL_POD ? 0 : -1; }
 
 static real within(const fl_box *box, int i, int k, int angle, real value) {
@@ -132,7 +130,7 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
 /* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
   int n = COUNT(block);
-  real miss[6], cost = miss_of(block, work, box, aim, command, miss), damping = DAMPING;
+  real miss[6], cost = miss_of(block, work, box, aim, command, miss), damping = NEARLY;
   for (int k = 0; k < steps && cost > EXACT * EXACT; k++) {
     unsigned char held[FL_MOST][3] = {{0}};
     real step[FL_MOST][3], tried[FL_MOST][3], other[6], new_cost;

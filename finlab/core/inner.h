@@ -86,7 +86,7 @@ int undecided(const real *block, int i, const fl_set *set, const real *price, re
 
 /* newton.c */
 #define MOST_STEPS 200
-#define STEPS_WITH_DRAG 24 /* from the prices of commands near to a target */
+#define STEPS_WITH_DRAG (2 * ROUNDS) /* from the prices of commands near to a target */
 void sums_of(const real *block, fl_work *work);
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);

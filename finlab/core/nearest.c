@@ -7,7 +7,7 @@
 #include "inner.h"
 
 #define MOST_POINTS 400
-#define MOST_SHARES 60
+#define MOST_SHARES (5 * ROUNDS)
 
 /* The forces that are worth most at a normal (6,) in weighted axes, and the point (6,) that they give. */
 static void farthest(const real *block, const fl_work *work, const real *weight, const real *normal,

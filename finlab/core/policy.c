@@ -8,7 +8,6 @@
 
 #define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
 #define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
-#define STEPS_AT_RIM 60  /* Newton's steps after which a target at the rim is given up */
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                     real force[][2]) {
@@ -145,7 +144,7 @@ void cheapest(const real *block, fl_work *work, real force[][2], const real *ins
       out->aim[k] = tried == 0 ? wanted[k]
                                : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
     to_basis(block, out->aim, target);
-    int met = newton(block, work, target, 0, STEPS_AT_RIM) == FL_MET;
+    int met = newton(block, work, target, 0, STEPS_AT_KINK) == FL_MET;
     memcpy(out->inner, work->now->price, sizeof out->inner);
     if (met) {
       memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);

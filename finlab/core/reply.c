@@ -8,8 +8,7 @@
 #include "inner.h"
 
 #define SOFT R(0.2)
-#define TURNING R(1e-2) /* price, over the mean one of the least force, up to which a force turns round ... */
-#define TURNED R(1e-4)  /* ... and in a narrow arc */
+#define TURNING R(1e-2) /* price, over the mean one of the least force, up to which a force turns round; CLOSE in a narrow arc */
 
 static const real *table_of(const real *block, const fl_actuator *a, int back) {
   return block + (int)(back && a->back > 0 ? a->back : a->ahead);
@@ -32,7 +31,7 @@ void set_up(const real *block, int i, fl_set *set) {
   const fl_actuator *a = ACTUATOR(block, i);
   int plane = a->rows == 2 && a->speed == 0;
   real least = NOTHING * set->high_cost / MAX(set->high, TINY);
-  if (set->low > 0) least = MAX(least, (set->half <= NARROW ? TURNED : TURNING) * set->low_cost / set->low);
+  if (set->low > 0) least = MAX(least, (set->half <= NARROW ? CLOSE : TURNING) * set->low_cost / set->low);
   set->gap2 = least * least + TINY;
   set->cos_middle = COS(set->middle), set->sin_middle = SIN(set->middle);
   set->cos_half = COS(set->half), set->sin_half = SIN(set->half);

@@ -27,9 +27,9 @@ class Compiled:
         period_s: float = 0.1,
         doubt: Array | None = None,
     ) -> None:
-        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick (6,)
-        and ticks of a period; what a squared force costs beside its power is `doubt`, see `price_of_doubt`.
-        Errors as for `FinGroup`."""
+        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick
+        (6,) and ticks of a period; what a squared force costs beside its power is `doubt`, see
+        `price_of_doubt`. Errors as for `FinGroup`."""
         self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
         self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
         self._effectiveness = plant.effectiveness

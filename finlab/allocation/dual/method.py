@@ -1,16 +1,14 @@
 """The default method: least watts by the dual, exact by the actuators' own laws.
 
-Prices give forces (`finlab.core`), forces give commands (`compiled`), and what the compiled laws leave undone
-is asked for on top and removed by Levenberg-Marquardt steps on the commands. A wrench out of reach becomes the
-one that the policy asks for; from tick to tick, commands stay within what may follow the previous ones
-(`rates`).
+The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has compiled. What its
+tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the commands.
 """
 
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -31,9 +29,7 @@ from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
-HOLLOW = 1e-3
-"""Share of the limit ranges by which commands are turned aside at first where no small change helps."""
-ENDED = "the search for a better answer was ended by its limit of steps"
+_ENDED = "the search for a better answer was ended by its limit of steps"
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ class Dual(Method):
         forces = self.forces(targets, policy, self.begin(prices), previous)
         found = forces.found
         command, aim = self.exact(forces, previous), targets if found.within.all() else found.aim
-        notes = {ENDED} if found.ended else set()
+        notes = {_ENDED} if found.ended else set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
                 notes.add(self._kept_on_the_ray(targets[row], int(row), found, command))
@@ -223,26 +219,34 @@ class Dual(Method):
         robot, core = self.compiled.robot, self.compiled.robot.core
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
             return Forces(*core.one(wrench, policy, previous=previous)[:2])
-        first = core.look(wrench - self.compiled.beside, core.first(wrench - self.compiled.beside))[0][None]
-        if inner is None:
-            inner = self._padded(self.search.prices(core.commands(first)[0], self._directions))
         found, prices, status = core.one(wrench, None, inner)
-        command, prices = self._near(wrench, found.force, first, prices, status)
+        if status == MET and self.error(found.command, wrench[None])[0] <= EXACT:
+            command = found.command
+        else:
+            pushed = wrench - self.compiled.beside
+            first = core.look(pushed, core.first(pushed))[0][None]
+            if inner is None:
+                near = self._padded(self.search.prices(core.commands(first)[0], self._directions))
+                found, prices, status = core.one(wrench, None, near)
+            command, prices = self._near(wrench, found.force, first, prices, status)
         within = not np.isnan(command).any()
-        if not within and policy is not None:
+        if within:
+            found = found._replace(command=command, aim=wrench[None])
+        elif policy is not None:
             found, prices, _ = core.one(wrench, policy, inner, always=True)
+        if previous is not None and not self.rates.allow(previous, found.command[0]):
+            follows = core.one(found.aim[0], None, prices, previous)[0]
+            found = found._replace(command=follows.command)
         # What the tables prove leaves out what foils do beyond them.
         price = robot.price(prices)[None]
         known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
-        if within:
-            known = known._replace(command=command)
         return Forces(known, prices, command)
 
     def _near(
         self, wrench: Array, force: Array, first: Array, prices: Array, status: int
     ) -> tuple[Array, Array]:
-        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN where
-        there is none; and its prices (6,)."""
+        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN
+        where there is none; and its prices (6,)."""
         search, core = self.search, self.compiled.robot.core
         begin, pushed = core.commands(force), wrench - self.compiled.beside
         if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
@@ -274,8 +278,8 @@ class Dual(Method):
         return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
     def exact(self, forces: Forces, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as what
-        may follow the `previous` ones (n, 3) comes."""
+        """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
+        what may follow the `previous` ones (n, 3) comes."""
         found, command = forces.found, forces.found.command
         rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
         if not len(rough):
@@ -289,7 +293,7 @@ class Dual(Method):
             for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
-                shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
+                shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
                 starts = command[row] + shares * draw * self.search.problem.width
                 other = self.search.exact(found.aim[row] / self.scale, starts)
                 command[row] = command[row] if other is None else other.command
@@ -320,7 +324,7 @@ class Dual(Method):
 
 def _joined(each: Sequence[Forces]) -> Forces:
     """Those of single targets."""
-    *rows, ended = zip(*(one.found for one in each), strict=True)
-    commands = [one.command for one in each]
-    command = None if commands[0] is None else np.concatenate(commands)  # type: ignore[arg-type]
-    return Forces(Found(*map(np.concatenate, rows), any(ended)), None, command)
+    rows: Any = list(zip(*(one.found for one in each), strict=True))
+    columns: Any = [np.concatenate(parts) for parts in rows[:-1]] + [any(rows[-1])]
+    commands: Any = [one.command for one in each]
+    return Forces(Found(*columns), None, None if commands[0] is None else np.concatenate(commands))

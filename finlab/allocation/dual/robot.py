@@ -1,14 +1,15 @@
-"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and their tables."""
+"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and tables."""
 
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
 from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
-from finlab.arrays import Array
+from finlab.arrays import AnyArray, Array
 from finlab.axes import TURN
 from finlab.core.calls import MAGIC, Core
 from finlab.core.library import VERSION
@@ -22,7 +23,7 @@ class DualRobot:
         self,
         responses: list[Response],
         forms: list[Form],
-        limits: Sequence[Array],
+        limits: Sequence[AnyArray],
         effectiveness: Array,
         yardstick: Array,
         beside: Array | None = None,
@@ -49,7 +50,9 @@ class DualRobot:
         """Largest force (n, 2) [N] along each direction."""
         self._gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
         self._gain = self._gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
-        self._tables, self._places = _tables_of(responses, forms, _HEAD + _EACH * len(responses))
+        tables = _Tables(_HEAD + _EACH * len(responses))
+        self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
+        self._tables = tables.numbers
         self._span(np.array([each.rows for each in responses]), effectiveness)
 
     def _span(self, effectiveness: Array, own: Array) -> None:
@@ -80,25 +83,19 @@ class DualRobot:
     @cached_property
     def largest_power(self) -> float:
         """Power [W] of all actuators at the dearer ends of their sets."""
-        return float(
-            sum(power_of(each, ends).max() for each, ends in zip(self.responses, self.ends, strict=True))
-        )
-
-    def wrench(self, force: Array) -> Array:
-        """Wrenches (..., 6) [N, N m] of forces (..., n, 2) [N]."""
-        return np.asarray(np.einsum("...nk,nkw->...w", force, self.effectiveness))
+        pairs = zip(self.responses, self.ends, strict=True)
+        return float(sum(power_of(each, ends).max() for each, ends in pairs))
 
     def price(self, inner: Array) -> Array:
         """Prices (6,) [W/N, W/(N m)] of the wrench from those in the basis (6,) [W]."""
         return np.asarray(self.basis @ inner[: self.basis.shape[1]] / self.scale)
 
     def _drag(self, i: int, force: float) -> float:
-        line = self.responses[i]
-        return (
-            (float(power_of(line, np.array(force))) - line.table.rest) / self.speed[i]
-            if self.speed[i] > 0.0
-            else 0.0
-        )
+        """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
+        if self.speed[i] == 0.0:
+            return 0.0
+        cost, rest = power_of(self.responses[i], np.array(force)), self.responses[i].table.rest
+        return float((cost - rest) / self.speed[i])
 
     def _block(self) -> Array:
         rank, basis = self.basis.shape[1], np.zeros((6, 6))
@@ -107,83 +104,76 @@ class DualRobot:
         matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
         length = _HEAD + _EACH * len(self.responses) + len(self._tables)
         head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
-        parts = [head, self.scale, self.yardstick, self.beside, basis.ravel()]
-        for i, each in enumerate(self.responses):
-            (ahead, back, gauge, law, beat), form = self._places[i], self._forms[i]
+        parts: list[Any] = [head, self.scale, self.yardstick, self.beside, basis.ravel()]
+        for i, (each, form, places) in enumerate(zip(self.responses, self._forms, self._places, strict=True)):
+            ahead, back, gauge, law, beat = places
             low, high = self.ends[i]
-            plane = isinstance(each, Plane)
-            least = 0.0 if isinstance(each, Plane) and _needs_no_reverse(each) else low
-            arc = (each.middle, each.half) if isinstance(each, Plane) else (0.0, 0.0)
-            rows = 2.0 if plane or self.speed[i] > 0.0 else 1.0
-            own = [
-                rows,
-                ahead,
-                back,
-                *each.table.origin[1:],
-                gauge,
-                low,
-                high,
-                least,
-                *arc,
-                each.band,
-                self.speed[i],
-            ]
-            parts += [np.array(own), self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()]
+            least, rows, arc = low, 1.0 if self.speed[i] == 0.0 else 2.0, (0.0, 0.0)
+            if isinstance(each, Plane):
+                least, rows, arc = 0.0 if _needs_no_reverse(each) else low, 2.0, (each.middle, each.half)
             lower, upper, step, turns = (values[i] for values in self._limits)
-            sign, *numbers = form.numbers
-            parts += [[KINDS.index(form.kind)], lower, upper, np.minimum(step, 1e30)]
-            parts += [[turns.any(), law, beat, sign, *numbers]]
-        return np.concatenate([*parts, self._tables])
+            parts += [
+                *(rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band),
+                *(self.speed[i], self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()),
+                *(_KINDS.index(form.kind), lower, upper, np.minimum(step, 1e30), turns.any(), law, beat),
+                form.numbers,
+            ]
+        return np.hstack([*parts, self._tables]).astype(np.float64)
 
 
 _HEAD, _EACH = 59, 67
-KINDS = "thruster", "pod", "fin", "foil"
+_KINDS = "thruster", "pod", "fin", "foil"
 
 
-def _tables_of(
-    responses: list[Response], forms: list[Form], start: int
-) -> tuple[Array, list[tuple[int, ...]]]:
-    """Tables of a block that begin at a place, and each actuator's places: ahead, in reverse, gauge, law, beat."""
-    numbers: list[Array] = []
-    known: dict[int, int] = {}
-    end = start
+class _Tables:
+    """Tables at the end of a block, each once."""
 
-    def placed(key: object, new: Callable[[], Array]) -> int:
-        nonlocal end
+    def __init__(self, start: int) -> None:
+        self._numbers: list[Array] = []
+        self._known: dict[int, int] = {}
+        self._end = start
+
+    def place(self, key: object, make: Callable[[], Array]) -> int:
+        """The place of the table of a thing, 0 for None."""
         if key is None:
             return 0
-        if id(key) not in known:
-            numbers.append(new())
-            known[id(key)], end = end, end + len(numbers[-1])
-        return known[id(key)]
+        if id(key) not in self._known:
+            self._numbers.append(make())
+            self._known[id(key)] = self._end
+            self._end += len(self._numbers[-1])
+        return self._known[id(key)]
 
-    def table(own: RadialTable | None) -> int:
-        return 0 if own is None else placed(own.origin[0], lambda: own.origin[0].numbers)
+    def radial(self, table: RadialTable | None) -> int:
+        """The place of a table of force over price."""
+        return 0 if table is None else self.place(table.origin[0], lambda: table.origin[0].numbers)
 
-    places = []
-    for each, form in zip(responses, forms, strict=True):
-        gauge = each.gauge if isinstance(each, Plane) else None
-        curve, law = form.beat, form.law
-        places.append(
-            (
-                table(each.table),
-                table(each.reverse),
-                placed(gauge, lambda gauge=gauge, form=form: gauge_numbers(gauge, form.deflection)),
-                placed(law, lambda law=law: law),
-                placed(curve, lambda curve=curve, form=form: _curve_numbers(curve, form.kind)),
-            )
+    def of(self, response: Response, form: Form) -> tuple[int, ...]:
+        """Places of an actuator's tables: ahead, in reverse, gauge, law, beat."""
+        gauge = response.gauge if isinstance(response, Plane) else None
+        law, beat = form.law, form.beat
+        return (
+            self.radial(response.table),
+            self.radial(response.reverse),
+            self.place(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
+            self.place(law, lambda: cast(Array, law)),
+            self.place(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
-    return np.concatenate(numbers), places
+
+    @property
+    def numbers(self) -> Array:
+        """All of them, in order."""
+        return np.concatenate(self._numbers)
 
 
-def _curve_numbers(curve: Array, kind: str) -> Array:
-    """A curve or a beat: how many points, or cells, then these."""
-    return np.concatenate([[len(curve) - (kind == "fin")], curve.ravel()])
+def _counted(rows: Array, kind: str) -> Array:
+    """A curve, or a beat: how many points, or cells, then these."""
+    return np.concatenate([[len(rows) - (kind == "fin")], rows.ravel()])
 
 
 def gauge_numbers(gauge: Array, deflection: Array) -> Array:
     """A gauge (G,) as the core takes it: in each of POINTS directions the support function, its derivative,
-    the gauge and the deflection (POINTS,); the parabola through the best three directions stands for the gauge between them."""
+    the gauge and the deflection (POINTS,); the parabola through the best three directions stands for the
+    gauge between them."""
     count, angle = len(gauge), np.arange(POINTS) * TURN / POINTS
     step, psi = TURN / count, np.arange(count) * TURN / count
     worth = gauge * np.cos(angle[:, None] - psi)

@@ -200,9 +200,9 @@ def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]
 
 def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
     """Other forces (12, n, 2) to begin at than (n, 2): those of planes turned one way or the other, in the
-    patterns of Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in a
-    symmetric robot has no slope that would turn it aside, and which of two jets gives way is a choice between
-    minima."""
+    patterns of Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in
+    a symmetric robot has no slope that would turn it aside, and which of two jets gives way is a choice
+    between minima."""
     planes, rng = np.flatnonzero(~lines), np.random.default_rng(0)
     signs = WALSH[np.arange(len(planes)) % len(WALSH)]
     angle = np.zeros((len(WALSH) + 1 + RANDOM, len(lines)))
