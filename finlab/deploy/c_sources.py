@@ -120,19 +120,17 @@ def _header(layout: Layout) -> str:
 
 def _samples(layout: Layout, count: int) -> str:
     """Wrenches within reach, out of it by the policies that single precision serves, and ticks."""
-    allocator, rng = Allocator(layout), np.random.default_rng(0)
-    plant, previous = plant_of(layout), layout.lower
+    allocator, rng, plant = Allocator(layout), np.random.default_rng(0), plant_of(layout)
     before, rows = [], []
-    for k, wrench in enumerate(plant.wrench(plant.sample(rng, (count,)))):
+    for k, wrench in enumerate(plant.wrench(plant.sample(rng, (count,))) * layout.commanded):
         policy, far = (("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("closest", 0.6))[k % 4]
-        tick = k % 4 == 3
-        target = far * wrench * layout.commanded
-        answer = allocator.allocate(target, policy=policy, previous=previous if tick else None)
-        if tick:
-            before.append(f"static const fl_real previous_{k}[][3] = {{{', '.join(map(_row, previous))}}};")
-        vectors = f"{_row(target)}, {_row(answer.wrench * layout.commanded)}, {answer.err_norm if tick else 0.0!r}"
-        rows.append(f"  {{FL_{policy.upper()}, {vectors}, {f'previous_{k}' if tick else 0}}},")
-        previous = answer.command
+        tick = allocator.allocate(0.5 * wrench).command if k % 4 == 3 else None
+        answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
+        if tick is not None:
+            before.append(f"static const fl_real previous_{k}[][3] = {{{', '.join(map(_row, tick))}}};")
+        vectors = f"{_row(far * wrench)}, {_row(answer.wrench * layout.commanded)}"
+        error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
+        rows.append(f"  {{FL_{policy.upper()}, {vectors}, {error!r}, {last}}},")
     return "\n".join(
         [*before, "static const sample samples[] = {", *rows, "};", f"enum {{ SAMPLES = {count} }};", ""]
     )

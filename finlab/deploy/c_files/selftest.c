@@ -3,7 +3,6 @@
 #include "robot.h"
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 typedef struct { /* question and answer of the library: wrench that it gives, its error on the yardstick */
   int policy;
@@ -48,9 +47,10 @@ static int differs(const sample *s) {
   if (out.steps > most_steps) most_steps = out.steps;
   double away = s->policy == FL_DIRECTION ? apart(out.aim, s->aim)
                                           : apart(out.aim, s->wrench) - apart(s->aim, s->wrench);
-  if (getenv("DBG")) printf("   policy %d tick %d away %g error %g stored %g within %d\n", s->policy, s->previous != 0, away, (double)out.error, (double)s->error, out.within);
-  double most = TOLERANCE + (s->previous ? 1e-3 + 1.02 * (double)s->error : 0);
-  return !(away <= TOLERANCE && (double)out.error <= most);
+
+  static const fl_real rest[6];
+  double most = TOLERANCE * fmax(1, apart(s->wrench, rest));
+  return !(away <= most && (double)out.error <= most + (s->previous ? 1e-3 + 1.02 * (double)s->error : 0));
 }
 
 int robot_selftest(void) {
