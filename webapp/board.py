@@ -55,6 +55,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "run": jobs.comparison.run,
         "progress": jobs.improver.progress,
         "improving": jobs.improver.busy,
+        "growing": jobs.improver.reach,
         "fitting": jobs.fitting.progress,
         "swims": swimming.active,
         "swimmer": swimmer,

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from finlab.actuators.actuator import Actuator
+from finlab.actuators.kinds import laws_of
 from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
 from finlab.axes import MIRROR
 from finlab.errors import LayoutError
-from finlab.forces.force_sets import ForceSets, assembled, shapes_of
+from finlab.forces.force_sets import SCALE, ForceSets, assembled, shapes_of
 from finlab.layout import Layout
 from finlab.layout.effectiveness import moved_effectiveness
 
@@ -121,8 +122,8 @@ class Moves:
         if missing:
             raise LayoutError(f"{kind} {missing[0]} is to be moved but has no bounds; give it some")
         self.leaders = tuple(leaders)
-        self._lead = layout.indices(leaders)
-        self._twin = [layout.index(twins[name]) if name in twins else -1 for name in leaders]
+        self._lead = list(layout.indices(leaders))
+        self._twin = np.array([layout.index(twins[name]) if name in twins else -1 for name in leaders])
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
         """All that move, twins included, in the layout's order."""
         self._flow, self._shapes = flow, shapes_of(layout, flow)
@@ -137,9 +138,19 @@ class Moves:
             raise LayoutError("the bounds leave nothing free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
-        self._step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
+        self.bends = flow is not None and any(law.feels_flow for _, law in laws_of(layout.actuators))
+        """Whether what actuators push changes as they move."""
+        self.step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
+        """Steps (D,) of the grid, 0 for any number."""
         self.start = self._held[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
+
+    @property
+    def smooth(self) -> Moves:
+        """The same moves without a grid."""
+        moves = copy(self)
+        moves.step = np.zeros_like(self.step)
+        return moves
 
     def keep_alone(self, axes: Sequence[str]) -> None:
         """Holds the free numbers that cost one of some axes, which are pushed alone now, when they change by
@@ -151,39 +162,53 @@ class Moves:
         if kept.any():
             self._free[np.flatnonzero(self._free)[~kept]] = False
             self.lower, self.upper, self.start = self.lower[kept], self.upper[kept], self.start[kept]
-            self._step = self._step[kept]
+            self.step = self.step[kept]
+
+    def positions(self, vectors: Array) -> Array:
+        """Returns positions (P, n, 3) [m] of vectors (P, D)."""
+        return self._placed(self._numbers(vectors))
 
     def geometry(self, vectors: Array) -> tuple[Array, Array]:
         """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
-        numbers = np.tile(self._held, (len(vectors), 1))
-        numbers[:, self._free] = self._on_grid(vectors)
-        moved = numbers.reshape(len(vectors), len(self._lead), 5)
-        position = np.tile(self.start_position, (len(vectors), 1, 1))
+        moved = self._numbers(vectors)
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
-        for k, (lead, twin) in enumerate(zip(self._lead, self._twin, strict=True)):
-            turn = moved[:, k, 3] - self._angle[lead]
-            turned = _turned(self.layout.frames[lead, 0], turn, moved[:, k, 4])
-            position[:, lead] = moved[:, k, :3]
-            frames[:, lead] = frames[:, lead] @ turned
-            if twin >= 0:
-                position[:, twin] = moved[:, k, :3] * MIRROR
-                frames[:, twin] = frames[:, twin] @ (turned * MIRROR * MIRROR[:, None])
-        return position, frames
+        turned = _turned(
+            self.layout.frames[self._lead, 0], moved[..., 3] - self._angle[self._lead], moved[..., 4]
+        )
+        frames[:, self._lead] = frames[:, self._lead] @ turned
+        follows, twin = self._twin >= 0, self._twin[self._twin >= 0]
+        frames[:, twin] = frames[:, twin] @ (turned[:, follows] * MIRROR * MIRROR[:, None])
+        return self._placed(moved), frames
 
-    def _on_grid(self, vectors: Array) -> Array:
-        """Vectors (P, D) whose numbers are multiples of their steps, within bounds."""
-        step = np.where(self._step > 0.0, self._step, 1.0)
+    def _numbers(self, vectors: Array) -> Array:
+        """All numbers (P, leaders, 5) of vectors (P, D)."""
+        numbers = np.tile(self._held, (len(vectors), 1))
+        numbers[:, self._free] = self.on_grid(vectors)
+        return numbers.reshape(len(vectors), len(self._lead), 5)
+
+    def _placed(self, numbers: Array) -> Array:
+        position = np.tile(self.start_position, (len(numbers), 1, 1))
+        position[:, self._lead] = numbers[..., :3]
+        follows = self._twin >= 0
+        position[:, self._twin[follows]] = numbers[:, follows, :3] * MIRROR
+        return position
+
+    def on_grid(self, vectors: Array) -> Array:
+        """Returns vectors (P, D) whose numbers are multiples of their steps, within bounds."""
+        step = np.where(self.step > 0.0, self.step, 1.0)
         low, high = np.ceil(self.lower / step - 1e-9), np.floor(self.upper / step + 1e-9)
         rounded = np.clip(np.round(vectors / step), low, high) * step
-        return np.where((self._step > 0.0) & (low <= high), rounded, vectors)
+        return np.where((self.step > 0.0) & (low <= high), rounded, vectors)
 
     def sets(self, vectors: Array) -> ForceSets:
         """Returns what the actuators can push once moved by vectors (P, D)."""
         position, frames = self.geometry(vectors)
-        shapes = [self._shapes] * len(vectors)
-        if self._flow is not None:
-            shapes = [shapes_of(self.moved(vector), self._flow) for vector in vectors]
-        return assembled(shapes, moved_effectiveness(self.layout, position, frames) * self.layout.commanded)
+        effectiveness = moved_effectiveness(self.layout, position, frames) * self.layout.commanded
+        if self.bends:
+            return assembled([shapes_of(self.moved(vector), self._flow) for vector in vectors], effectiveness)
+        alike = assembled([self._shapes], effectiveness[:1]).repeat(len(vectors))
+        directions = np.array([shape.directions for shape in self._shapes])
+        return alike._replace(effectiveness=np.ascontiguousarray(directions @ effectiveness / SCALE))
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its actuators moved by a vector (D,)."""
@@ -195,14 +220,22 @@ class Moves:
 
 
 def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
-    """Matrices (P, 3, 3), from the right of rows, that raise a main axis (3,) and then turn it about the
-    vertical by angles (P,) [rad]; one that is vertical tilts towards x."""
-    x, y, z = axis
-    level = math.hypot(x, y)
-    across = np.array([y, -x, 0.0]) / level if level > MIRROR_TOLERANCE else np.array([0.0, np.sign(z), 0.0])
-    tilted = Rotation.from_rotvec(tilt[:, None] * across)
-    both = Rotation.from_rotvec(turn[:, None] * np.eye(3)[2]) * tilted
-    return np.asarray(both.as_matrix().swapaxes(1, 2))
+    """Matrices (P, L, 3, 3), from the right of rows, that raise main axes (L, 3) by angles (P, L) [rad] and
+    then turn them about the vertical by others; those that are vertical tilt towards x."""
+    level = np.hypot(axis[:, 0], axis[:, 1])[:, None]
+    upright = np.stack([np.zeros(len(axis)), np.sign(axis[:, 2]), np.zeros(len(axis))], axis=-1)
+    sideways = np.stack([axis[:, 1], -axis[:, 0], np.zeros(len(axis))], axis=-1) / np.maximum(
+        level, MIRROR_TOLERANCE
+    )
+    across = np.where(level > MIRROR_TOLERANCE, sideways, upright)
+    return _about(across, tilt) @ _about(np.eye(3)[2:], turn)
+
+
+def _about(axis: Array, angle: Array) -> Array:
+    """Rodrigues' matrices (P, L, 3, 3), from the right of rows, of turns about unit axes by angles (P, L)."""
+    cross = np.cross(np.eye(3), axis[:, None, :])
+    sine, rest = np.sin(angle)[..., None, None], 1.0 - np.cos(angle)[..., None, None]
+    return np.asarray(np.eye(3) - sine * cross + rest * (cross @ cross))
 
 
 def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Improve a layout: move chosen actuators within bounds until a goal is as good as it gets."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,21 +10,23 @@ from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import commanded_axes, named_axes
+from finlab.analysis.climb import LEAST, PENALTY, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
+from finlab.analysis.slopes import Directions, Hill, Look, Power
 from finlab.arrays import Array
 from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
-CLEARANCE = 0.10  # least distance between two actuators [m]; those that are closer already need not part
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
-PENALTY = 1e3  # cost of actuators that are too close or break another rule, per metre; far beyond any goal
-
-Rule = Callable[[Array, Array], Array]
-"""How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they
-keep it."""
+STEPS = 10  # steps of a climb in a round
+DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
+STARTS, FEWEST, MOST = 2800, 2, 20  # climbs, times the square of the free numbers; at least and at most
+FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
+LITTLE = 1e-4  # share of the goal that a climb has to gain to count
+FINALISTS = 3  # of so many climbs the best one goes on
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,8 @@ class Progress:
     n_rounds: int
     before: float  # the goal's measure at the start, more is better
     best: float  # the best so far, to about a percent
+    layout: Layout
+    """What has it."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ def optimize_layout(
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Improvement:
-    """Moves actuators to raise a goal, by SciPy's differential evolution.
+    """Moves actuators to raise a goal: by its slopes from several starts, and, where these find nothing
+    better or the flow changes what actuators push, by SciPy's differential evolution.
 
     The same arguments and seed give the same layout. The present layout is among the first candidates, so the
     result is never worse, unless the present one breaks the rule: then the best that keeps it is the result.
@@ -102,7 +107,6 @@ def optimize_layout(
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, known, pairs, grid, water)
-    broken = rule or (lambda position, frames: np.zeros(len(position)))
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
         if len(axes) < len(layout.axes):
@@ -115,18 +119,26 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    best_vector, stopped = _search(moves, quick, before, broken, rounds, seed, progress, cancelled)
-    best = moves.moved(best_vector)
+    search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled)
+    if not moves.bends:
+        search.climb(
+            Power(moves.smooth, mission, water)
+            if goal == "mission_power"
+            else Directions(moves.smooth, axes or commanded_axes(layout), goal == "worst_single_failure"),
+            seed,
+        )
+    if not search.gained and not search.stopped:
+        search.evolve(quick, seed)
+    best = moves.moved(search.vector)
     after = measured(best)
     best = replace(best, axes=start.axes)
-    wrong = [float(broken(robot.position[None], robot.frames[None])[0]) for robot in (layout, best)]
-    better = after > before + 1e-9 * abs(before)
-    improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
+    wrong = [0.0 if rule is None else rule(p.position[None], p.frames[None])[0] for p in (layout, best)]
+    improved = bool(wrong[1] <= 0.0 and (wrong[0] > 0.0 or after > before + 1e-9 * abs(before)))
     card = score_card(start, flow=water)
     return Improvement(
         layout=best if improved else start,
         improved=improved,
-        cancelled=stopped,
+        cancelled=search.stopped,
         goal=goal,
         value_before=before,
         value_after=after if improved else before,
@@ -137,67 +149,120 @@ def optimize_layout(
     )
 
 
-def _search(
-    moves: Moves,
-    measure: Goal,
-    before: float,
-    rule: Rule,
-    rounds: int,
-    seed: int,
-    progress: Callable[[Progress], None] | None,
-    cancelled: Callable[[], bool] | None,
-) -> tuple[Array, bool]:
-    """The best vector (D,), and whether the search was stopped."""
-    needed = np.minimum(_gaps(moves.start_position[None])[0], CLEARANCE)
-    best, least, best_vector, done, stopped = before, np.inf, moves.start, 0, False
+class _Search:
+    """One search: what is the best so far, and how long it has taken."""
 
-    def chunk_cost(effectiveness: Array) -> tuple[Array, float]:
-        """Costs (P,), and the best measure of a variant that keeps all rules."""
-        value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
-        position, frames = moves.geometry(effectiveness)
-        close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, frames)
-        return np.asarray(-value + PENALTY * close), float(value[close <= 0.0].max(initial=-np.inf))
+    def __init__(
+        self,
+        moves: Moves,
+        rules: Rules,
+        before: float,
+        rounds: int,
+        progress: Callable[[Progress], None] | None,
+        cancelled: Callable[[], bool] | None,
+    ) -> None:
+        self._moves, self._rules, self._before, self._rounds = moves, rules, before, rounds
+        self._progress, self._cancelled = progress, cancelled or (lambda: False)
+        self.vector, self.best, self.gained, self.stopped = moves.start, before, False, False
+        self._kept = rules.broken(moves.start[None])[0] <= 0.0
+        if not self._kept:
+            self.best = -np.inf
+        self._done = self._steps = 0
 
-    def cost(vectors: Array) -> Array:
-        nonlocal best, least, best_vector
-        rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
-        chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-        valued = map_parts(chunk_cost, chunks)
-        for chunk in chunks:
-            if cancelled is not None and cancelled():
-                return np.full(len(rows), np.inf)
-            some, fine = next(valued)
-            costs.append(some)
-            best = max(best, fine)
-            if some.min() < least:
-                least, best_vector = some.min(), chunk[np.argmin(some)]
-        return np.concatenate(costs)
+    def _note(self, value: float, vector: Array) -> None:
+        """A vector that keeps all rules."""
+        if value > self.best:
+            self.best, self.vector = value, vector
+        if not self._kept or value > self._before + LITTLE * abs(self._before):
+            self.gained = True
 
-    def after_round(vector: Array, convergence: float) -> bool:
-        nonlocal done, stopped
-        done += 1
-        if progress is not None:
-            progress(Progress(done, rounds, before, best))
-        stopped = cancelled is not None and cancelled()
-        return stopped
+    def _after_round(self, *_: object) -> bool:
+        """Says whether to stop."""
+        self._done += 1
+        if self._progress is not None:
+            best = max(self.best, self._before)
+            robot = self._moves.moved(self.vector)
+            self._progress(Progress(self._done, self._rounds, self._before, best, robot))
+        self.stopped = self._cancelled()
+        return self.stopped or self._done >= self._rounds
 
-    differential_evolution(
-        cost,  # type: ignore[arg-type]  # of all vectors at once, since it is vectorized
-        Box(moves.lower, moves.upper),
-        x0=moves.start,
-        popsize=max(4, -(-24 // len(moves.start))),
-        maxiter=rounds,
-        tol=1e-4,
-        seed=seed,
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-        callback=after_round,  # type: ignore[arg-type]  # True stops it
-    )
-    return best_vector, stopped  # rows that were not looked at any more count as bad, so not scipy's own
+    def climb(self, hill: Hill, seed: int) -> None:
+        """Climb a little from several starts, then on from the best of them; round what was found."""
+        best, self.stopped = self.best, self._cancelled()
+        climbs = list[Climb]()
+        for start in self._starts(hill, seed) if not self.stopped else ():
+            climbs.append(Climb(hill, self._rules, start))
+            if self._climbed(climbs[-1], FIRST_STEPS):
+                break
+        else:
+            climbs.sort(key=lambda one: -one.at.value)
+            for climb in climbs[: max(1, len(climbs) // FINALISTS)]:
+                self._climbed(climb, MOST_STEPS)
+        if self._moves.step.any() and self.gained:
+            self.best, self.vector, self.gained = best, self._moves.start, False
+            for climb in sorted(climbs, key=lambda one: -one.at.value)[:3]:
+                self._note(*climb.rounded(self._moves))
 
+    def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
+        """The present vector and the best of some random ones, of those that keep all rules."""
+        moves, random = self._moves, np.random.default_rng(seed)
+        if self._kept:
+            yield hill.look(moves.start)
+        drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
+        nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
+        kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
+        count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
+        drawn = np.concatenate(kept)[: RANK * count]
+        for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
+            yield hill.look(drawn[k])
 
-def _gaps(position: Array) -> Array:
-    """Distances (P, pairs) [m] between the actuators at positions (P, n, 3)."""
-    first, second = np.triu_indices(position.shape[1], k=1)
-    return np.asarray(np.linalg.norm(position[:, first] - position[:, second], axis=-1))
+    def _climbed(self, climb: Climb, steps: int) -> bool:
+        """Whether the search has to stop."""
+        while climb.radius >= LEAST and climb.steps < steps:
+            climb.step()
+            self._note(climb.at.value, climb.at.vector)
+            self._steps += 1
+            self.stopped = self._cancelled()
+            if self.stopped or (self._steps % STEPS == 0 and self._after_round()):
+                return True
+        return False
+
+    def evolve(self, measure: Goal, seed: int) -> None:
+        """Differential evolution, for goals and rules without slopes."""
+        moves, least = self._moves, np.inf
+
+        def chunk_cost(vectors: Array) -> tuple[Array, float]:
+            """Costs (P,), and the best measure of a variant that keeps all rules."""
+            value = measure(moves.sets(vectors), lambda row: moves.moved(vectors[row]))
+            close = self._rules.broken(moves.on_grid(vectors))
+            return np.asarray(-value + PENALTY * close), float(value[close <= 0.0].max(initial=-np.inf))
+
+        def cost(vectors: Array) -> Array:
+            nonlocal least
+            rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
+            chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
+            valued = map_parts(chunk_cost, chunks)
+            for chunk in chunks:
+                if self._cancelled():
+                    return np.full(len(rows), np.inf)
+                some, fine = next(valued)
+                costs.append(some)
+                self.best = max(self.best, fine)
+                if some.min() < least:
+                    least, self.vector = some.min(), chunk[np.argmin(some)]
+            return np.concatenate(costs)
+
+        self._done = 0
+        differential_evolution(
+            cost,  # type: ignore[arg-type]  # of all vectors at once, since it is vectorized
+            Box(moves.lower, moves.upper),
+            x0=moves.start,
+            popsize=max(4, -(-24 // len(moves.start))),
+            maxiter=self._rounds,
+            tol=1e-4,
+            seed=seed,
+            polish=False,
+            vectorized=True,
+            updating="deferred",
+            callback=self._after_round,  # type: ignore[arg-type]  # True stops it
+        )  # rows that were not looked at any more count as bad: the best is kept above, not scipy's own

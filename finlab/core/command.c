@@ -83,24 +83,32 @@ void rest_in_bands(const real *block, const fl_box *box, real command[][3]) {
   }
 }
 
-/* The miss (6,) of commands from an aim, on the yardstick; with slopes into the work area. Returns its square. */
-static real miss_of(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3],
-                    real *miss) {
+/* The miss (6,) of commands from an aim, on the yardstick. Returns its square. */
+static real miss_of(const real *block, const real *aim, real command[][3], real *miss) {
   const fl_head *h = HEAD(block);
   for (int k = 0; k < 6; k++) miss[k] = (aim[k] - h->beside[k]) / h->yard[k];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real force[3], by[3][3];
-    force_of(block, i, command[i], force, by);
+    real force[3];
+    force_of(block, i, command[i], force, 0);
     for (int k = 0; k < 6; k++)
       miss[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
+  }
+  return dot(miss, miss, 6);
+}
+
+/* The slopes of the wrench, into the work area. */
+static void slopes_of(const real *block, fl_work *work, const fl_box *box, real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    real force[3], by[3][3];
+    force_of(block, i, command[i], force, by);
     for (int c = 0; c < 3; c++) {
       real width = box->high[i][c] - box->low[i][c];
       for (int k = 0; k < 6; k++)
         work->slope[i][c][k] = width * (by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k]);
     }
   }
-  return dot(miss, miss, 6);
 }
 
 static int leaves(const real *block, const fl_box *box, int i, int c, const real *command, real step) {
@@ -130,11 +138,13 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
 /* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
   int n = COUNT(block);
-  real miss[6], cost = miss_of(block, work, box, aim, command, miss), damping = NEARLY;
+  real miss[6], cost = miss_of(block, aim, command, miss), damping = NEARLY;
+  int moved = 1;
   for (int k = 0; k < steps && cost > EXACT * EXACT; k++) {
     unsigned char held[FL_MOST][3] = {{0}};
     real step[FL_MOST][3], tried[FL_MOST][3], other[6], new_cost;
     int any = 0;
+    if (moved) slopes_of(block, work, box, command);
     change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
     for (int i = 0; i < n; i++)
       for (int c = 0; c < 3; c++) any |= held[i][c] = leaves(block, box, i, c, command[i], step[i][c]);
@@ -145,15 +155,13 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
         own = command[i][c] + own * (box->high[i][c] - box->low[i][c]);
         tried[i][c] = within(box, i, c, angle_of(ACTUATOR(block, i)), own);
       }
-    new_cost = miss_of(block, work, box, aim, tried, other);
-    if (new_cost <= cost) {
+    new_cost = miss_of(block, aim, tried, other);
+    if ((moved = new_cost <= cost)) {
       memcpy(command, tried, n * sizeof *tried);
       memcpy(miss, other, sizeof miss);
       cost = new_cost, damping *= R(0.3);
-    } else {
+    } else
       damping = damping * 30 + CLOSE;
-      miss_of(block, work, box, aim, command, other); /* the slopes of where it stays */
-    }
   }
   return SQRT(cost);
 }

@@ -80,9 +80,10 @@ typedef struct { /* prices, and what they give */
 #define FL_POINTS 8              /* of a mixture near to a point out of reach */
 #define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
 
-typedef struct {
+typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
   fl_real force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6], at[6];
-  int count;
+  fl_real q[FL_POINTS][6], r[FL_POINTS][FL_POINTS];
+  int count, done; /* points; how many of them the basis knows */
 } fl_mixture;
 
 #define FL_SCORES 6
@@ -106,7 +107,7 @@ typedef struct {
   fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
-  fl_real metric[6][6], factor[6][6], least_trace, most_cost, largest_power;
+  fl_real metric[6][6], factor[6][6], least_trace, most_cost, enough, largest_power;
   int quick, torn, drags, steps, ended;
 } fl_work;
 

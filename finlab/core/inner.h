@@ -63,7 +63,6 @@ static inline real dot(const real *a, const real *b, int n) {
 real wrapped(real angle);
 int cholesky(real a[6][6], real factor[6][6], int n);
 void solve(real factor[6][6], const real *right, real *x, int n);
-void affine(real point[][6], int count, const real *target, real *share);
 
 /* table.c */
 typedef struct { real force, slope, conjugate; } along;

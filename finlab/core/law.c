@@ -5,20 +5,25 @@
    slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
 typedef struct { real value[4], slope[4]; int first; } weights;
 
-static weights weights_at(const real *knot, int count, real period, real x) {
+static weights weights_at(const real *knot, int count, real period, real x, int slopes) {
   weights w = {{0, 1, 0, 0}, {0}, -1};
   if (count == 1) return w;
   int cells = period > 0 ? count : count - 1, low = 0, high = cells;
   real begin = knot[0], end = period > 0 ? begin + period : knot[count - 1], held;
   if (period > 0) x -= period * FLOOR((x - begin) / period);
   held = CLIP(x, begin, end);
-  while (high - low > 1) {
-    int between = (low + high) / 2;
-    if (knot[between] <= held)
-      low = between;
-    else
-      high = between;
-  }
+  int guess = (int)((held - begin) / (end - begin) * cells); /* mostly right, as most knots are even */
+  guess = CLIP(guess, 0, cells - 1);
+  if (knot[guess] <= held && (guess + 1 == cells || held < knot[guess + 1]))
+    low = guess;
+  else
+    while (high - low > 1) {
+      int between = (low + high) / 2;
+      if (knot[between] <= held)
+        low = between;
+      else
+        high = between;
+    }
   real from = knot[low], to = low + 1 < count ? knot[low + 1] : end, width = to - from, t = (held - from) / width;
   real before = low > 0 ? from - knot[low - 1] : period > 0 ? end - knot[count - 1] : 0;
   real after = low + 2 < count ? knot[low + 2] - to : low + 2 == count && period > 0 ? end - to : period > 0 ? knot[1] - knot[0] : 0;
@@ -27,7 +32,7 @@ static weights weights_at(const real *knot, int count, real period, real x) {
   real cubic[4] = {-early, 2 - late, early - 2, late};
   for (int k = 0; k < 4; k++) {
     w.value[k] = (k == 1) + t * (linear[k] + t * (square[k] + t * cubic[k]));
-    w.slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
+    if (slopes) w.slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
   }
   w.first = low - 1;
   return w;
@@ -35,14 +40,15 @@ static weights weights_at(const real *knot, int count, real period, real x) {
 
 /* A grid: counts of three axes, period of the third (0: none), whether the first axis is the product of the first
    two commands, columns c, whether the values are roots of what they stand for; then the knots of the axes, and c
-   values at each point. Values (c,) and their derivatives by each command (3, c). */
+   values at each point. Values (c,) and, where there is room for them, their derivatives by each command (3, c). */
 static void grid_at(const real *grid, const real *command, real *value, real (*slope)[3]) {
   int count[3] = {(int)grid[0], (int)grid[1], (int)grid[2]}, product = grid[4] != 0, columns = (int)grid[5];
   const real *knot = grid + 7, *values = knot + count[0] + count[1] + count[2];
   real at[3] = {product ? command[0] * command[1] : command[0], command[1], command[2]};
   weights w[3];
-  for (int k = 0; k < 3; knot += count[k++]) w[k] = weights_at(knot, count[k], count[k] > 1 && k == 2 ? grid[3] : 0, at[k]);
-  for (int c = 0; c < columns; c++) value[c] = slope[0][c] = slope[1][c] = slope[2][c] = 0;
+  for (int k = 0; k < 3; knot += count[k++]) w[k] = weights_at(knot, count[k], count[k] > 1 && k == 2 ? grid[3] : 0, at[k], slope != 0);
+  for (int c = 0; c < columns; c++) value[c] = 0;
+  if (slope) memset(slope, 0, 9 * sizeof **slope);
   for (int a = 0; a < 4; a++) {
     if (count[0] == 1 && a != 1) continue;
     int i = CLIP(w[0].first + a, 0, count[0] - 1);
@@ -58,28 +64,33 @@ static void grid_at(const real *grid, const real *command, real *value, real (*s
         const real *own = values + columns * (k + count[2] * (j + count[1] * i));
         for (int c = 0; c < columns; c++) {
           real v = own[c] * w[2].value[d];
-          value[c] += both * v, slope[0][c] += by_a * v, slope[1][c] += by_f * v;
-          slope[2][c] += both * own[c] * w[2].slope[d];
+          value[c] += both * v;
+          if (!slope) continue;
+          slope[0][c] += by_a * v, slope[1][c] += by_f * v, slope[2][c] += both * own[c] * w[2].slope[d];
         }
       }
     }
   }
-  if (product)
+  if (product && slope)
     for (int c = 0; c < columns; c++) {
       slope[1][c] += slope[0][c] * command[0];
       slope[0][c] *= command[1];
     }
   if (grid[6] != 0)
     for (int c = 0; c < columns; c++) {
-      for (int k = 0; k < 3; k++) slope[k][c] *= 2 * value[c];
+      for (int k = 0; slope && k < 3; k++) slope[k][c] *= 2 * value[c];
       value[c] *= value[c];
     }
 }
 
-/* Force along an actuator's own axes (3,) of a command (3,), and its derivatives (3 commands, 3 axes). */
+/* Force along an actuator's own axes (3,) of a command (3,), and, where there is room for them, its derivatives
+   (3 commands, 3 axes). */
 void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *grid = block + (int)a->law;
+  real none[3][3];
+  int steep = slope != 0;
+  if (!slope) slope = none;
   memset(force, 0, 3 * sizeof *force);
   memset(slope, 0, 9 * sizeof **slope);
   if (a->form == FL_THRUSTER)
@@ -89,21 +100,21 @@ void force_of(const real *block, int i, const real *command, real *force, real (
     force[1] = command[1] * c, force[2] = command[1] * s;
     slope[0][1] = -force[2], slope[0][2] = force[1], slope[1][1] = c, slope[1][2] = s;
   } else if (a->form == FL_FOIL) {
-    real at[3] = {0, 0, command[0] - a->lean}, by[3][3];
-    grid_at(grid, at, force, by);
+    real at[3] = {0, 0, command[0] - a->lean}, by[3][3] = {{0}};
+    grid_at(grid, at, force, steep ? by : 0);
     for (int k = 0; k < 2; k++) force[k] *= a->pressure, slope[0][k] = a->pressure * by[2][k];
     force[1] -= a->pressure * a->rest;
   } else if (grid[5] == 1) { /* a size along a direction */
-    real size, by[3][3], around = command[2] - a->uneven_at, uneven = 1 + a->uneven * COS(around);
+    real size, by[3][3] = {{0}}, around = command[2] - a->uneven_at, uneven = a->uneven != 0 ? 1 + a->uneven * COS(around) : 1;
     real c = COS(command[2] + a->lean), s = SIN(command[2] + a->lean);
-    grid_at(grid, command, &size, by);
+    grid_at(grid, command, &size, steep ? by : 0);
     real parts[3] = {by[0][0] * uneven, by[1][0] * uneven, -size * a->uneven * SIN(around)};
     size *= uneven;
     force[1] = size * c, force[2] = size * s;
     for (int k = 0; k < 3; k++) slope[k][1] = parts[k] * c, slope[k][2] = parts[k] * s;
     slope[2][1] -= force[2], slope[2][2] += force[1];
   } else
-    grid_at(grid, command, force, slope);
+    grid_at(grid, command, force, steep ? slope : 0);
 }
 
 /* Where an ascending column of a curve (count, 2) has a value: linear between its points. */
@@ -141,14 +152,14 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
   real angle = ATAN2(force[1], force[0]), size = SQRT(force[0] * force[0] + force[1] * force[1]), wanted = size;
-  real given[3], slope[3][3];
+  real given[3];
   for (int k = 0; k < 3; k++) { /* what the tables leave undone is asked for on top */
     real most = a->high * (gauge ? gauge_at(gauge, angle) : 1), lean = gauge ? lean_at(gauge, angle) : a->lean;
     beat_at(block + (int)a->beat, wanted / most, command);
     command[0] = in_limits(box, i, 0, command[0]), command[1] = in_limits(box, i, 1, command[1]);
     command[2] = angle_in(box, i, 2, angle - lean);
     if (k == 2) break;
-    force_of(block, i, command, given, slope);
+    force_of(block, i, command, given, 0);
     wanted = MAX(wanted + size - SQRT(given[1] * given[1] + given[2] * given[2]), 0);
     if (gauge && size > 0) angle += wrapped(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));
   }
@@ -201,12 +212,12 @@ void reach_of(const real *block, int i, const fl_box *box, real *limits) {
   if (a->form == FL_POD) return;
   limits[0] = R(1e30), limits[1] = -R(1e30);
   for (int j = 0; j < 25; j++) {
-    real force[3], slope[3][3], command[3] = {0, 0, limits[2]};
+    real force[3], command[3] = {0, 0, limits[2]};
     if (a->form == FL_FOIL)
       command[0] = low[0] + (real)j / 24 * (high[0] - low[0]);
     else
       command[0] = low[0] + (real)(j % 5) / 4 * (high[0] - low[0]), command[1] = low[1] + (real)(j / 5) / 4 * (high[1] - low[1]);
-    force_of(block, i, command, force, slope);
+    force_of(block, i, command, force, 0);
     real size = a->form == FL_FOIL ? force[0] : SQRT(force[1] * force[1] + force[2] * force[2]);
     if (size > limits[1]) best = ATAN2(force[2], force[1]);
     limits[0] = MIN(limits[0], size), limits[1] = MAX(limits[1], size);

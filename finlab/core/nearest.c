@@ -28,10 +28,46 @@ static void farthest(const real *block, const fl_work *work, const real *weight,
 }
 
 static void drop(fl_mixture *m, int k) {
-  m->count--;
+  m->count--, m->done = MIN(m->done, k);
   memmove(m->force + k, m->force + k + 1, (m->count - k) * sizeof m->force[0]);
   memmove(m->point + k, m->point + k + 1, (m->count - k) * sizeof m->point[0]);
   memmove(m->share + k, m->share + k + 1, (m->count - k) * sizeof m->share[0]);
+}
+
+/* Shares, which add up to 1, of the points that come nearest to a target; a point that depends on those before it
+   gets 0. By Gram-Schmidt, again where little is left, as points near to each other are nearly dependent. */
+static void affine(fl_mixture *m, const real *target, real *share) {
+  real right[FL_POINTS], rest[6];
+  for (int j = MAX(m->done, 1); j < m->count; j++) {
+    real *q = m->q[j], size;
+    for (int k = 0; k < 6; k++) q[k] = m->point[j][k] - m->point[0][k];
+    for (int i = 1; i < j; i++) m->r[i][j] = 0;
+    m->r[j][j] = size = SQRT(dot(q, q, 6));
+    for (int twice = 0; twice < 2 && !(twice && m->r[j][j] > R(0.1) * size); twice++) {
+      for (int i = 1; i < j; i++) {
+        real part = dot(m->q[i], q, 6);
+        m->r[i][j] += part;
+        for (int k = 0; k < 6; k++) q[k] -= part * m->q[i][k];
+      }
+      m->r[j][j] = SQRT(dot(q, q, 6));
+    }
+    if (m->r[j][j] <= ROUNDING * size) m->r[j][j] = 0;
+    real over = m->r[j][j] > 0 ? 1 / m->r[j][j] : 0;
+    for (int k = 0; k < 6; k++) q[k] *= over;
+  }
+  m->done = m->count;
+  for (int k = 0; k < 6; k++) rest[k] = target[k] - m->point[0][k];
+  for (int j = 1; j < m->count; j++) {
+    right[j] = dot(m->q[j], rest, 6);
+    for (int k = 0; k < 6; k++) rest[k] -= right[j] * m->q[j][k];
+  }
+  share[0] = 1;
+  for (int j = m->count - 1; j > 0; j--) {
+    real sum = right[j];
+    for (int k = j + 1; k < m->count; k++) sum -= m->r[j][k] * share[k];
+    share[j] = m->r[j][j] > 0 ? sum / m->r[j][j] : 0;
+    share[0] -= share[j];
+  }
 }
 
 /* Shares of the points whose mixture is nearest to a target; points without a share are left out. */
@@ -40,7 +76,7 @@ static void mix(fl_mixture *m, const real *target) {
   while (m->count > 1) {
     real step = 1, sum = 0;
     int least = 0, all = 1;
-    affine(m->point, m->count, target, wanted);
+    affine(m, target, wanted);
     for (int k = 0; k < m->count; k++)
       if (wanted[k] <= ROUNDING) {
         all = 0;
@@ -77,7 +113,7 @@ void nearest_point(const real *block, const fl_work *work, const real *weight, c
   real last = R(1e30);
   if (m->count == 0) {
     farthest(block, work, weight, target, m->force[0], m->point[0]);
-    m->count = 1, m->share[0] = 1;
+    m->count = 1, m->done = 0, m->share[0] = 1;
   }
   for (int k = 0; k < MOST_POINTS; k++) {
     miss_of(m, target);

@@ -48,7 +48,7 @@ int fl_prepare(const real *block, fl_work *work) {
     for (int k = 0; k <= j; k++)
       work->metric[j][k] = work->metric[k][j] = h[j][k] * r / trace + (j == k ? NEARLY : 0);
   for (int j = 0; j < r; j++) h[j][j] += NOTHING * trace;
-  work->least_trace = NEARLY * trace;
+  work->least_trace = NEARLY * trace, work->enough = TOLERANCE;
   sums_of(block, work);
   work->largest_power = work->most_cost;
   return cholesky(h, work->factor, r) ? 0 : FL_BAD_NUMBER;
@@ -153,7 +153,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   work->now = s;
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
   for (int k = 0, idle = 0;; k++) {
-    if (s->size <= TOLERANCE) return FL_MET;
+    if (s->size <= work->enough) return FL_MET;
     if (s->value > most) return FL_BEYOND;
     if (s->value > value + ROUNDING * FABS(value) || s->size < R(0.9) * size)
       value = s->value, size = s->size, idle = 0;

@@ -7,6 +7,7 @@
 #include "inner.h"
 
 #define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
+#define AT_RIM R(1e-7)   /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
@@ -58,6 +59,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
     real weight[6], target[6], got[6], missing[6], missed = 0;
     for (int k = 0; k < 6; k++) weight[k] = (HELD * held[k] + group[k]) / h->yard[k];
     for (int round = 0; round < (any ? ROUNDS : 1); round++) {
+      m->done = 0;
       for (int p = 0; p < m->count; p++) { /* the points so far, in the axes of this group */
         wrench_of(block, m->force[p], m->point[p]);
         for (int k = 0; k < 6; k++) m->point[p][k] *= weight[k];
@@ -130,8 +132,8 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
 
 /* The least power for a wrench that forces give, or hardly another one that is wanted; where Newton's method does
    not settle, at the rim, a little towards the wrench `inside`, else these forces. */
-void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
-              fl_answer *out) {
+static void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
+                     real enough, fl_answer *out) {
   const fl_head *h = HEAD(block);
   real wrench[6], target[6], size = 0;
   wrench_of(block, force, wrench);
@@ -139,15 +141,18 @@ void cheapest(const real *block, fl_work *work, real force[][2], const real *ins
     real way = (inside[k] - wrench[k]) / h->scale[k];
     size += way * way;
   }
-  for (int tried = wanted ? 0 : 1; tried < 3; tried++) {
+  for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
       out->aim[k] = tried == 0 ? wanted[k]
                                : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
     to_basis(block, out->aim, target);
+    work->enough = enough;
     int met = newton(block, work, target, 0, STEPS_AT_KINK) == FL_MET;
+    work->enough = TOLERANCE;
     memcpy(out->inner, work->now->price, sizeof out->inner);
     if (met) {
       memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+      if (work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
       return;
     }
   }
@@ -217,7 +222,7 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   wrench_of(block, force, wanted);
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
-  cheapest(block, work, force, inside, wanted, out);
+  cheapest(block, work, force, inside, wanted, policy->policy == FL_DIRECTION ? TOLERANCE : AT_RIM, out);
   memcpy(work->set, work->kept, sizeof work->set);
   sums_of(block, work);
   if (!may_have_gaps(block, work, out->force)) return;

@@ -15,7 +15,7 @@ static const real *table_of(const real *block, const fl_actuator *a, int back) {
 }
 
 static along at_price(const real *block, const fl_actuator *a, int back, real price) {
-  real per = a->share / a->worth;
+  real per = a->share == a->worth ? 1 : a->share / a->worth;
   along o = radial(table_of(block, a, back), price * per);
   return (along){o.force * a->share, o.slope * a->share * per, o.conjugate * a->worth};
 }

@@ -1,26 +1,31 @@
 /* Tables of force over price, cubic between their knots, and gauges of forces that differ by direction. */
 #include "inner.h"
 
+#define THIRD (R(1.0) / 3)
+
 static const real *knots(const real *table) { return table + 3; }
 
 /* Force, its derivative and the conjugate at a price from 0 on. */
 along radial(const real *table, real price) {
-  real top = table[0], share = price / top;
+  real top = table[0], per = 1 / top, t = price * per, scale = top;
   int cells = (int)table[1];
   const real *knot = knots(table);
-  if (!(share < 1)) {
+  if (!(price < top)) {
     knot += 3 * cells;
     return (along){knot[0], 0, knot[2] + (price - top) * knot[0]};
   }
-  int cell = MIN((int)(SQRT(SQRT(share)) * cells), cells - 1);
-  real first = (real)cell / cells, last = (real)(cell + 1) / cells;
-  first *= first, last *= last;
-  real begin = first * first, width = last * last - begin, t = (share - begin) / width, scale = top * width;
-  knot += 3 * cell;
+  if (cells > 1) {
+    int cell = MIN((int)(SQRT(SQRT(t)) * cells), cells - 1);
+    real each = (real)1 / cells, first = cell * each, last = (cell + 1) * each;
+    first *= first, last *= last;
+    real begin = first * first, width = last * last - begin, over = 1 / width;
+    t = (t - begin) * over, per *= over, scale *= width;
+    knot += 3 * cell;
+  }
   real m0 = knot[1] * scale, m1 = knot[4] * scale, rise = knot[3] - knot[0];
   real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
-  return (along){knot[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / scale,
-                 knot[2] + scale * t * (knot[0] + t * (m0 / 2 + t * (b / 3 + t * c / 4)))};
+  return (along){knot[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) * per,
+                 knot[2] + scale * t * (knot[0] + t * (m0 * R(0.5) + t * (b * THIRD + t * c * R(0.25))))};
 }
 
 /* Power of a size of force within the table, and the price at which it is given. */
@@ -40,7 +45,8 @@ real marginal(const real *table, real size, real *price) {
   knot += 3 * low;
   real m0 = knot[1] * scale, m1 = knot[4] * scale, rise = knot[3] - knot[0];
   real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
-  real t = rise > 0 ? (size - knot[0]) / rise : 0;
+  real t = rise > 0 ? MAX((size - knot[0]) / rise, 0) : 0;
+  if (low == 0) t = SQRT(t); /* as of costs ~ T^1.5 */
   for (int k = 0; k < ROUNDS; k++) { /* an error of the price counts squared in the power */
     real slope = m0 + t * (2 * b + 3 * t * c), before = t;
     if (slope > 0) t = CLIP(t - (knot[0] + t * (m0 + t * (b + t * c)) - size) / slope, 0, 1);

@@ -6,8 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.analysis import GOALS, Bounds, Progress, authority, least_power, mirror_pairs, optimize_layout
-from finlab.analysis.optimize import CHUNK
+from finlab.analysis import (
+    AXES,
+    GOALS,
+    Bounds,
+    Progress,
+    authority,
+    least_power,
+    mirror_pairs,
+    optimize_layout,
+)
+from finlab.analysis.moves import Moves
+from finlab.analysis.slopes import Directions, Hill, Power
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
@@ -60,7 +70,7 @@ def test_it_stops_within_a_round(shipped: Layouts) -> None:
         return np.zeros(len(position))
 
     found = optimize_layout(layout, layout.names, rule=rule, cancelled=lambda: bool(seen))
-    assert seen[0] <= CHUNK and sum(seen[1:]) == 2, "one chunk, and the layouts before and after"
+    assert seen == [1, 1, 1], "where it begins, and the layouts before and after"
     assert found.cancelled and found.value_after >= found.value_before
 
 
@@ -78,7 +88,7 @@ def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
 
 
 def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finlab.analysis.optimize.CLEARANCE", 0.2)
+    monkeypatch.setattr("finlab.analysis.climb.CLEARANCE", 0.2)
     layout = shipped("A")
     box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
     found = optimize_layout(layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1)
@@ -151,3 +161,62 @@ def test_what_a_robot_pushes_alone_is_not_given_for_the_weakest_direction(shippe
     found = optimize_layout(left, left.names, rounds=6)
     assert found.improved and found.axes == ("surge", "sway", "heave", "roll", "yaw")
     assert set(found.axes) <= set(found.card_after.authority.alone)
+
+
+def slopes_are_differences(hill: Hill, moves: Moves, rel: float) -> None:
+    """Along a random change, slopes agree with differences of the goal."""
+    random, width = np.random.default_rng(3), moves.upper - moves.lower
+    vector = random.uniform(moves.lower, moves.upper)
+    way = random.standard_normal(len(width))
+    way *= width / np.linalg.norm(way)
+    look = hill.look(vector)
+    for _ in range(8):
+        look = hill.look(vector, look)
+    values, slopes = hill.slopes(look)
+    ends = [hill.look(vector + sign * 1e-4 * way, look).value for sign in (1.0, -1.0)]
+    slope = float(slopes[values.argmin()] @ (way / width))
+    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=rel, abs=1e-3 * abs(look.value))
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "A", "turtle_hybrid", "catamaran", "fish", "hexa"])
+def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
+    layout = shipped(name)
+    moves = Moves(layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators})
+    axes = [axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts]
+    near, far = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]], [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
+    slopes_are_differences(Directions(moves, axes, False), moves, 0.02)
+    slopes_are_differences(Power(moves, near, None), moves, 0.02)
+    slopes_are_differences(Power(moves, far, None), moves, 0.1)  # the nearest point by other weights
+
+
+@pytest.mark.parametrize(("goal", "least"), [("weakest_direction", 112.0), ("mission_power", -1.2)])
+def test_eight_thrusters_find_their_places(shipped: Layouts, goal: str, least: float) -> None:
+    """The same arguments and seed give the same layout; what is proposed keeps its distance and its grid."""
+    layout, grid = shipped("bluerov2_heavy"), (0.001, np.radians(1.0))
+    bounds = {part.name: Bounds.around(part, 0.05, np.pi / 2) for part in layout.actuators}
+    seen: list[Progress] = []
+    found = optimize_layout(layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=seen.append)
+    assert found.value_after >= least
+    assert [one.round for one in seen] == list(range(1, len(seen) + 1))
+    assert all(later.best >= one.best for one, later in zip(seen, seen[1:], strict=False))
+    assert seen[-1].layout.names == layout.names and seen[-1].layout != layout
+    again = optimize_layout(layout, layout.names, bounds, goal, (), rounds=8, grid=grid)
+    assert again.layout == found.layout
+    places = found.layout.position
+    assert np.abs(places / grid[0] - np.round(places / grid[0])).max() < 1e-6
+    first, second = np.triu_indices(layout.n, k=1)
+    gaps, before = (np.linalg.norm(p[first] - p[second], axis=1) for p in (places, layout.position))
+    assert (gaps >= np.minimum(before, 0.1) - 1e-8).all()
+
+
+def test_a_wall_without_slope_is_kept(shipped: Layouts) -> None:
+    layout = shipped("bluerov2_heavy")
+    inner = np.abs(layout.position[:, 1]).max() + 0.01
+
+    def wall(position: Array, frames: Array) -> Array:
+        return 0.02 * (np.abs(position[..., 1]) > inner).sum(-1)
+
+    found, free = (optimize_layout(layout, layout.names, rounds=3, rule=rule) for rule in (wall, None))
+    assert np.abs(found.layout.position[:, 1]).max() <= inner
+    assert np.abs(free.layout.position[:, 1]).max() > inner
+    assert found.value_after > 1.1 * found.value_before

@@ -83,7 +83,7 @@ def add_improving(page: Page) -> None:
         "Search",
         lambda: improver.start(session.state, session.draft),
         icon=viser.Icon.SPARKLES,
-        hint="About a minute for eight actuators, longer for more.",
+        hint="Seconds for eight actuators, longer in a flow. The view shows the best so far.",
     )
     board.show(search, disabled=lambda improving: improving)
     bar = gui.add_progress_bar(0.0, visible=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from finlab.analysis import Improvement
+from finlab.analysis import AttainableSet, Improvement, Progress
 from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
@@ -20,7 +20,7 @@ from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
-from webapp.session.looking import Display
+from webapp.session.looking import DRAWN, Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.background import Context
@@ -209,14 +209,24 @@ class RobotScene:
         self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
 
     def _show_sets(
-        self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout
+        self,
+        found: Findings | None,
+        growing: AttainableSet | None,
+        display: Display,
+        target: tuple[float, ...],
+        task: str,
+        drawn: Layout,
     ) -> None:
         shown = found if display.drawn != "none" and task == "Design" else None
-        self._attainable.refresh(shown, np.array(target), arrow_size(drawn))
+        better = growing if growing is not None and growing.kind == DRAWN[display.drawn] else None
+        self._attainable.refresh(shown, better, np.array(target), arrow_size(drawn))
 
-    def _offer(self, better: Improvement | None, layout: Layout, swims: bool) -> None:
-        """The actuators that a search would put elsewhere, where it would put them."""
-        other = better.layout if better is not None and better.improved and not swims else None
+    def _offer(
+        self, better: Improvement | None, progress: Progress | None, layout: Layout, swims: bool
+    ) -> None:
+        """The actuators that a search would put elsewhere, where it would put them so far."""
+        offer = progress if better is None or not better.improved else better
+        other = None if offer is None or swims else offer.layout
         now = {part.name: (part.position, part.frame) for part in layout.actuators}
         parts = () if other is None or other.name != layout.name else other.actuators
         moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))

@@ -132,12 +132,16 @@ class AttainableNodes:
             "/robot/attainable/asked", 0.018, color=ASKED, visible=False, cast_shadow=False
         )
 
-    def refresh(self, findings: Findings | None, target: Array, size: float) -> None:
-        """Show the sets of findings, nothing for None, as large as `size` says; the ball marks what `target`
-        (6,) asks in them."""
+    def refresh(
+        self, findings: Findings | None, better: AttainableSet | None, target: Array, size: float
+    ) -> None:
+        """Show the sets of findings, nothing for None, as large as `size` says, or a better one around the
+        present one; the ball marks what `target` (6,) asks in them."""
         if findings is None and not (self._now.node.visible or self._whole.node.visible):
             return
         now, full = (None, None) if findings is None else (findings.now, findings.whole)
+        if now is not None and better is not None:
+            now, full = better, now
         scale = 1.0 if findings is None else set_scale(findings)
         for shape, body in ((self._now, now), (self._whole, full)):
             put(shape.node, visible=body is not None, scale=size)

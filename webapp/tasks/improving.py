@@ -2,19 +2,19 @@
 
 import math
 import threading
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
-from finlab.analysis import Bounds, Improvement, optimize_layout
+from finlab.analysis import AttainableSet, Bounds, Improvement, Progress, attainable_set, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
-from webapp.session.looking import GOAL_WORDS, SearchRequest
+from webapp.session.looking import DRAWN, GOAL_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.background import Context, Newest
 
@@ -28,6 +28,8 @@ APART_M = 0.02
 """Least distance between what two actuators sweep."""
 GRID = 0.001, math.radians(1.0)
 """What is proposed is round: steps of places [m] and angles [rad]."""
+REST_S = 0.3
+"""How long the view rests between two looks at the best layout so far [s]."""
 
 
 class Room:
@@ -77,8 +79,12 @@ class Search:
 class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, drawn: Callable[[], str] = lambda: "none") -> None:
+        """`drawn` says of what the set is drawn, a key of `DRAWN`."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
+        self._drawn = drawn
+        self.reach: AttainableSet | None = None
+        """What the best layout so far attains, where a set is drawn; kept while it is offered."""
 
     def start(self, state: State, request: SearchRequest) -> None:
         """Search from a layout for places of what works; mirror pairs stay mirror pairs. FinlabError: a
@@ -98,11 +104,20 @@ class Improver(Newest[Search, Improvement]):
         """The result has been taken or left, or the page has gone."""
         self.cancel()
         super().forget()
+        self.reach = None
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
         layout, state = search.state.layout, search.state
-        left = layout.without(state.failed)
+        left, rests = layout.without(state.failed), time.monotonic()
+
+        def report(progress: Progress) -> None:
+            nonlocal rests
+            if time.monotonic() >= rests:
+                self._look(search, progress.layout)
+                self.report(search, progress)
+                rests = time.monotonic() + REST_S
+
         improvement = optimize_layout(
             left,
             tuple(search.bounds),
@@ -111,9 +126,17 @@ class Improver(Newest[Search, Improvement]):
             rule=Room(left, APART_M).broken,
             grid=GRID,
             flow=state.flow,
-            progress=partial(self.report, search),
+            progress=report,
             cancelled=search.stop.is_set,
         )
+        self._look(search, improvement.layout)
         for part in improvement.layout.actuators:
             layout = layout.with_part(part)
         return replace(improvement, layout=layout)
+
+    def _look(self, search: Search, layout: Layout) -> None:
+        """What a layout attains, of the kind that is drawn."""
+        kind = DRAWN[self._drawn()]
+        reach = None if kind is None else attainable_set(layout, kind, flow=search.state.flow)
+        if search is self.question:
+            self.reach = reach

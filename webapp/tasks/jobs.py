@@ -155,7 +155,7 @@ class Jobs:
         self.ranging = Newest(loop, workers.marks, find_ranges, self._beside, REST_S)
         self.both = Newest(loop, workers.answers, context.solver.both, self._beside, REST_S)
         self.analyst = Newest(loop, workers.cards, find, context.changed, CARD_REST_S)
-        self.improver = Improver(context)
+        self.improver = Improver(context, lambda: context.session.display.drawn)
         self.fitting = Fitting(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context)

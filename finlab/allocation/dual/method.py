@@ -25,7 +25,7 @@ from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
 from finlab.core.calls import BEYOND, MET, Found
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
@@ -220,10 +220,12 @@ class Dual(Method):
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
             return Forces(*core.one(wrench, policy, previous=previous)[:2])
         found, prices, status = core.one(wrench, None, inner)
-        if status == MET and self.error(found.command, wrench[None])[0] <= EXACT:
+        pushed = wrench - self.compiled.beside
+        least = core.look(pushed, prices)[1] * (1.0 + FINE)
+        exact = status == MET and self.error(found.command, wrench[None])[0] <= EXACT
+        if exact and self.search.cost(found.command)[0] <= least:
             command = found.command
         else:
-            pushed = wrench - self.compiled.beside
             first = core.look(pushed, core.first(pushed))[0][None]
             if inner is None:
                 near = self._padded(self.search.prices(core.commands(first)[0], self._directions))
