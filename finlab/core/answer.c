@@ -42,7 +42,8 @@ static int is_grid(const real *block, real place, real length) {
   for (int k = 0, at = 7; k < 3; at += (int)grid[k++])
     for (int j = 1; j < (int)grid[k]; j++)
       if (!(grid[at + j] > grid[at + j - 1])) return 0;
-  return 1;
+  const real *last = grid + 7 + (int)knots - 1, *first = last + 1 - (int)grid[2];
+  return grid[3] == 0 || *first + grid[3] > *last;
 }
 
 /* Whether a block can be worked with; an error code. */
@@ -64,7 +65,7 @@ int fl_check(const real *block, int length) {
     if (a->gauge != 0 && !is_table(block, a->gauge, h->length, 0, 4, 0)) return FL_BAD_BLOCK;
     if (!(a->form >= FL_THRUSTER && a->form <= FL_FOIL && a->form == FLOOR(a->form))) return FL_BAD_BLOCK;
     if (a->form >= FL_FIN && !is_table(block, a->beat, h->length, 0, 2, a->form == FL_FIN)) return FL_BAD_BLOCK;
-    if (a->form >= FL_FIN && !is_grid(block, a->law, h->length)) return FL_BAD_BLOCK;
+    if (a->form >= FL_FIN ? !is_grid(block, a->law, h->length) : a->law != 0) return FL_BAD_BLOCK;
     for (int k = 0; k < 3; k++)
       if (!(a->lower[k] <= a->upper[k] && a->step[k] >= 0)) return FL_BAD_NUMBER;
     if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;

@@ -48,8 +48,8 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
   q->policy = below(4) ? policy : 0, q->price = below(4) ? 0 : price, q->previous = below(2) ? previous : 0;
 }
 
-static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators) {
-  for (int i = 0; i < ROBOT_COUNT; i++)
+static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators, int count) {
+  for (int i = 0; i < count; i++)
     for (int k = 0; k < 3; k++)
       if (!(out->command[i][k] >= actuators[i].lower[k] && out->command[i][k] <= actuators[i].upper[k])) return "command";
   for (int k = 0; k < 6; k++)
@@ -58,12 +58,8 @@ static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators
   return out->steps < 0 || out->steps > FL_BOUND ? "steps" : 0;
 }
 
-int main(int argc, char **argv) {
-  int cases = argc > 1 ? atoi(argv[1]) : 1000, refused = 0, answers = 0, most = 0;
-  state = 88172645463325252u + (argc > 2 ? (uint64_t)atoi(argv[2]) : 0);
-  fl_real *block = malloc((size_t)robot_length * sizeof *block); /* of this size, so that a sanitizer sees beyond */
-  fl_work *work = malloc(sizeof *work);
-  if (!block || !work) return 2;
+static int fuzz(int cases, fl_real *block, fl_work *work) {
+  int refused = 0, answers = 0, most = 0;
   memcpy(block, robot, (size_t)robot_length * sizeof *block);
   for (int n = 0; n < cases; n++) {
     int changed[4], changes = below(3) ? 1 + below(4) : 0, length = below(50) ? robot_length : below(robot_length + 1);
@@ -87,7 +83,7 @@ int main(int argc, char **argv) {
       ask(&q, &policy, price, previous, actuators);
       memset(&out, 0xff, sizeof out);
       int failed = fl_answer_one(block, work, &q, &out);
-      const char *wrong = failed ? 0 : wrong_with(&out, actuators);
+      const char *wrong = failed ? 0 : wrong_with(&out, actuators, (int)((fl_head *)block)->n);
       int bad = 0;
       for (int j = 0; j < 6; j++) bad |= !isfinite(q.wrench[j]);
       if (bad && !failed) wrong = "a wrench that is no number is answered";
@@ -98,6 +94,14 @@ int main(int argc, char **argv) {
     while (changes--) block[changed[changes]] = robot[changed[changes]];
   }
   printf("%d blocks, %d refused, %d answers, %d steps at most of %d\n", cases, refused, answers, most, FL_BOUND);
-  free(block), free(work);
   return 0;
+}
+
+int main(int argc, char **argv) {
+  state = 88172645463325252u + (argc > 2 ? (uint64_t)atoi(argv[2]) : 0);
+  fl_real *block = malloc((size_t)robot_length * sizeof *block); /* of this size, so that a sanitizer sees beyond */
+  fl_work *work = malloc(sizeof *work);
+  int failed = !block || !work ? 2 : fuzz(argc > 1 ? atoi(argv[1]) : 1000, block, work);
+  free(block), free(work);
+  return failed;
 }
