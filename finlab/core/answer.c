@@ -9,15 +9,17 @@ int fl_sizes(int which) {
   return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
 }
 
-static int is_finite(const real *values, int count) {
+static int are_within(const real *values, int count, real most) {
   for (int k = 0; k < count; k++)
-    if (!(FABS(values[k]) <= R(1e30))) return 0;
+    if (!(FABS(values[k]) <= most)) return 0;
   return 1;
 }
 
 static int is_place(real place, real length, int numbers) {
   return place == FLOOR(place) && place >= 0 && place + numbers <= length;
 }
+
+#define LARGEST R(1e12) /* wrench, price or command of a question */
 
 /* Whether there is a table, or a gauge, at a place: its cells, or points, are few enough to lie in the block. */
 static int is_table(const real *block, real place, real length, int counted, int each, int more) {
@@ -40,7 +42,8 @@ static int is_grid(const real *block, real place, real length) {
   for (int k = 0, at = 7; k < 3; at += (int)grid[k++])
     for (int j = 1; j < (int)grid[k]; j++)
       if (!(grid[at + j] > grid[at + j - 1])) return 0;
-  return 1;
+  const real *last = grid + 7 + (int)knots - 1, *first = last + 1 - (int)grid[2];
+  return grid[3] == 0 || *first + grid[3] > *last;
 }
 
 /* Whether a block can be worked with; an error code. */
@@ -48,7 +51,7 @@ int fl_check(const real *block, int length) {
   const int head = sizeof(fl_head) / sizeof(real), own = sizeof(fl_actuator) / sizeof(real);
   if (length < head || block[0] != FL_MAGIC || HEAD(block)->length != length) return FL_BAD_BLOCK;
   if (block[1] != FL_VERSION) return FL_BAD_VERSION;
-  if (!is_finite(block, length)) return FL_BAD_NUMBER;
+  if (!are_within(block, length, R(1e30))) return FL_BAD_NUMBER;
   const fl_head *h = HEAD(block);
   if (!(h->n >= 1 && h->n <= FL_MOST && h->n == FLOOR(h->n) && length >= head + own * (int)h->n)) return FL_BAD_BLOCK;
   if (!(h->range >= 0 && h->range <= 6 && h->range == FLOOR(h->range))) return FL_BAD_BLOCK;
@@ -62,7 +65,7 @@ int fl_check(const real *block, int length) {
     if (a->gauge != 0 && !is_table(block, a->gauge, h->length, 0, 4, 0)) return FL_BAD_BLOCK;
     if (!(a->form >= FL_THRUSTER && a->form <= FL_FOIL && a->form == FLOOR(a->form))) return FL_BAD_BLOCK;
     if (a->form >= FL_FIN && !is_table(block, a->beat, h->length, 0, 2, a->form == FL_FIN)) return FL_BAD_BLOCK;
-    if (a->form >= FL_FIN && !is_grid(block, a->law, h->length)) return FL_BAD_BLOCK;
+    if (a->form >= FL_FIN ? !is_grid(block, a->law, h->length) : a->law != 0) return FL_BAD_BLOCK;
     for (int k = 0; k < 3; k++)
       if (!(a->lower[k] <= a->upper[k] && a->step[k] >= 0)) return FL_BAD_NUMBER;
     if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;
@@ -151,7 +154,7 @@ static void in_a_tick(const real *block, fl_work *work, const fl_question *q, fl
   into_limits(block, out->command);
 }
 
-static int answered(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
+static void answered(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
   const fl_head *h = HEAD(block);
   real wrench[6];
   for (int k = 0; k < 6; k++) wrench[k] = q->wrench[k] - h->beside[k];
@@ -164,15 +167,22 @@ static int answered(const real *block, fl_work *work, const fl_question *q, fl_a
   rest_in_bands(block, &work->box, out->command);
   if (q->previous && !may_follow(block, q->previous, out->command)) in_a_tick(block, work, q, out);
   out->steps = work->steps, out->ended = work->ended;
-  return 0;
 }
 
 /* An answer to a question; an error code. */
 int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
-  if (!is_finite(q->wrench, 6) || (q->price && !is_finite(q->price, 6))) return FL_BAD_ARGUMENT;
+  const fl_policy *policy = q->policy;
+  if (!are_within(q->wrench, 6, LARGEST) || (q->price && !are_within(q->price, 6, LARGEST))) return FL_BAD_ARGUMENT;
+  if (policy) {
+    if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
+    if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
+    if (policy->policy == FL_CLOSEST && !are_within(policy->weight, 6, 1)) return FL_BAD_ARGUMENT;
+    if (policy->policy == FL_PRIORITY && sizeof(real) < sizeof(double)) return FL_NEEDS_DOUBLE;
+  }
   for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
-    if (FABS(q->previous[k]) > R(1e30)) return FL_BAD_ARGUMENT;
-  return answered(block, work, q, out);
+    if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
+  answered(block, work, q, out);
+  return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
 }
 
 /* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands

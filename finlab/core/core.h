@@ -19,6 +19,8 @@ typedef double fl_real;
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* of sets with gaps that are looked at for one target */
 #endif
+/* Newton's steps of one answer at most: two searches of two parts, each a dive and two for each cut. */
+#define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)))
 #define FL_VERSION 1
 #define FL_MAGIC 41721 /* first number of a block */
 
@@ -129,8 +131,8 @@ typedef struct {
   int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
 } fl_answer;
 
-/* Error codes; 0 is none. */
-enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
+/* Error codes; 0 is none. FL_PRIORITY needs double precision. */
+enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT, FL_NEEDS_DOUBLE };
 
 int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_work, fl_policy, fl_answer; then FL_MOST */

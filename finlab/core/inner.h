@@ -20,6 +20,7 @@ typedef fl_real real;
 #define IDLE 6
 #define ROUNDING R(1e-6)
 #define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
+#define STALLED R(2e-5) /* the same where planes across misses, by rounding, bound a ray no further */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -35,6 +36,7 @@ typedef fl_real real;
 #define IDLE MOST_STEPS
 #define ROUNDING 1e-12
 #define CLOSE_BY 1e-9
+#define STALLED R(1.0)
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)

@@ -149,8 +149,10 @@ void farthest_along(const real *block, const fl_work *work, const real *weight, 
     for (int j = 0; j < 6; j++) target[j] = share * ray[j];
     nearest_point(block, work, weight, target, CLOSE_BY, R(0.5), m);
     for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
-    if (share == 0 || SQRT(dot(normal, normal, 6)) <= 2 * CLOSE_BY || share >= last) return;
-    last = share;
+    real miss = SQRT(dot(normal, normal, 6));
+    if (share == 0 || miss <= 2 * CLOSE_BY || (share >= last && miss <= STALLED)) return;
+    last = share >= last ? share - miss / (2 * SQRT(dot(ray, ray, 6))) : share;
+    share = last;
   }
 }
 

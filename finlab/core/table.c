@@ -7,6 +7,7 @@ static const real *knots(const real *table) { return table + 3; }
 
 /* Force, its derivative and the conjugate at a price from 0 on. */
 along radial(const real *table, real price) {
+  price = MAX(price, 0); /* NaN is 0, too */
   real top = table[0], per = 1 / top, t = price * per, scale = top;
   int cells = (int)table[1];
   const real *knot = knots(table);
@@ -57,12 +58,18 @@ real marginal(const real *table, real size, real *price) {
   return paid * size - (knot[2] + scale * t * (knot[0] + t * (m0 / 2 + t * (b / 3 + t * c / 4))));
 }
 
+/* Where an angle lies among the points of a gauge; 0 where it is no number. */
+static real place_of(const real *gauge, real angle) {
+  real place = angle / (2 * PI);
+  place = gauge[0] * (place - FLOOR(place));
+  return place < gauge[0] ? place : 0;
+}
+
 /* Support function of a gauge in the direction (x, y) of the price, and its two derivatives by the angle. */
 support gauge_support(const real *gauge, real x, real y) {
   int points = (int)gauge[0];
-  real step = 2 * PI / points, place = ATAN2(y, x) / step;
-  if (place < 0) place += points;
-  int cell = (int)place % points, next = (cell + 1) % points;
+  real step = 2 * PI / points, place = place_of(gauge, ATAN2(y, x));
+  int cell = (int)place, next = (cell + 1) % points;
   real t = place - FLOOR(place);
   const real *a = gauge + 1 + 4 * cell, *z = gauge + 1 + 4 * next;
   real m0 = a[1] * step, m1 = z[1] * step, rise = z[0] - a[0];
@@ -74,9 +81,8 @@ support gauge_support(const real *gauge, real x, real y) {
 /* The gauge itself in a direction of the force. */
 real gauge_at(const real *gauge, real angle) {
   int points = (int)gauge[0];
-  real place = angle / (2 * PI) * points;
-  place -= points * FLOOR(place / points);
-  int cell = (int)place % points;
+  real place = place_of(gauge, angle);
+  int cell = (int)place;
   real t = place - FLOOR(place), at[4];
   for (int k = 0; k < 4; k++) at[k] = gauge[1 + 4 * ((cell + k - 1 + points) % points) + 2];
   real m0 = (at[2] - at[0]) / 2, m1 = (at[3] - at[1]) / 2, rise = at[2] - at[1];
@@ -86,9 +92,8 @@ real gauge_at(const real *gauge, real angle) {
 /* Angle from the command's direction to that of the force, in a direction of the force. */
 real lean_at(const real *gauge, real angle) {
   int points = (int)gauge[0];
-  real place = angle / (2 * PI) * points;
-  place -= points * FLOOR(place / points);
-  int cell = (int)place % points;
+  real place = place_of(gauge, angle);
+  int cell = (int)place;
   real first = gauge[1 + 4 * cell + 3], last = gauge[1 + 4 * ((cell + 1) % points) + 3];
   return first + wrapped(last - first) * (place - FLOOR(place));
 }

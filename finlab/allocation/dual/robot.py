@@ -67,7 +67,9 @@ class DualRobot:
         left, values, _ = np.linalg.svd((scaled / self.scale).T, full_matrices=False)
         self.basis = left[:, values > NOTHING * max(values[0], 1e-300)]
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
-        self.core = Core(self._block(), len(self.responses))
+        self.block = self._block()
+        """The numbers of finlab/core/core.h."""
+        self.core = Core(self.block, len(self.responses))
         """The robot in the core."""
 
     def tilted(self, effectiveness: Array, own: Array, beside: Array) -> "DualRobot":
@@ -96,7 +98,6 @@ class DualRobot:
         return float((cost - rest) / self.speed[i])
 
     def _block(self) -> Array:
-        """The numbers of finlab/core/core.h."""
         rank, basis = self.basis.shape[1], np.zeros((6, 6))
         basis[:, :rank] = self.basis
         matrix = np.zeros((len(self.responses), 2, 6))

@@ -1,0 +1,71 @@
+/* Asks what the library was asked at the export and compares the answers; `robot_selftest` says how many differ.
+   On a board call it from your own program, as examples/blink.ino does; define FL_NO_MAIN there. */
+#include "robot.h"
+#include <math.h>
+#include <stdio.h>
+
+typedef struct { /* question and answer of the library: wrench that it gives, its error on the yardstick */
+  int policy;
+  fl_real wrench[6], aim[6], error;
+  const fl_real (*previous)[3];
+} sample;
+#include "samples.h"
+
+#ifdef FL_SINGLE
+#define TOLERANCE 1e-4
+#else
+#define TOLERANCE 1e-6
+#endif
+
+static fl_work work;
+static fl_answer out;
+static int most_steps;
+
+static double apart(const fl_real *a, const fl_real *b) {
+  double sum = 0;
+  for (int k = 0; k < 6; k++) {
+    double way = ((double)a[k] - (double)b[k]) / (double)((const fl_head *)robot)->yard[k];
+    sum += way * way;
+  }
+  return sqrt(sum);
+}
+
+static int outside(void) {
+  for (int i = 0; i < ROBOT_COUNT; i++)
+    for (int k = 0; k < 3; k++)
+      if (!(out.command[i][k] >= ROBOT_ACTUATOR(i)->lower[k] && out.command[i][k] <= ROBOT_ACTUATOR(i)->upper[k])) return 1;
+  return 0;
+}
+
+/* Whether an answer is as near as the library's: `direction` gives one point, `closest` a distance; commands of a
+   tick, which takes few steps, may be a little farther. */
+static int differs(const sample *s) {
+  fl_policy policy = {s->policy, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  fl_question question = {{0}, &policy, 0, s->previous ? s->previous[0] : 0};
+  for (int k = 0; k < 6; k++) question.wrench[k] = s->wrench[k];
+  if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
+  if (out.steps > most_steps) most_steps = out.steps;
+  double away = s->policy == FL_DIRECTION ? apart(out.aim, s->aim)
+                                          : apart(out.aim, s->wrench) - apart(s->aim, s->wrench);
+
+  static const fl_real rest[6];
+  double most = TOLERANCE * fmax(1, apart(s->wrench, rest));
+  return !(away <= most && (double)out.error <= most + (s->previous ? 1e-3 + 1.02 * (double)s->error : 0));
+}
+
+int robot_selftest(void) {
+  fl_question broken = {{NAN}, 0, 0, 0};
+  int wrong = 0;
+  if (fl_check(robot, robot_length) || fl_prepare(robot, &work)) return SAMPLES;
+  for (int k = 0; k < SAMPLES; k++) wrong += differs(samples + k);
+  return wrong + (fl_answer_one(robot, &work, &broken, &out) != FL_BAD_ARGUMENT);
+}
+
+#if !defined(ARDUINO) && !defined(FL_NO_MAIN)
+int main(void) {
+  int wrong = robot_selftest();
+  printf("%d of %d answers differ from the library's; bytes: block %d, work %d, answer %d; Newton's steps: %d at most\n",
+         wrong, SAMPLES, robot_length * (int)sizeof *robot, (int)sizeof work, (int)sizeof out, most_steps);
+  return wrong != 0;
+}
+#endif
