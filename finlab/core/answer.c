@@ -131,6 +131,8 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     } else
       within &= status == FL_MET;
   }
+  for (int i = out->dragged = 0; work->drags && i < n; i++)
+    out->dragged |= out->force[i][1] > drag_of(block, i, out->force[i][0]) + NEARLY * ACTUATOR(block, i)->most[1];
   out->within = within && !(policy && policy->always);
   if (!out->within && policy) in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];

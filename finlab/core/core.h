@@ -129,6 +129,7 @@ typedef struct {
   fl_real command[FL_MOST][3];
   int status, within;        /* of Newton's method (FL_MET ...); within reach */
   int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
+  int dragged;               /* 1 where a foil is to drag more than its lift does */
 } fl_answer;
 
 /* Error codes; 0 is none. FL_PRIORITY needs double precision. */
