@@ -248,19 +248,3 @@ void fl_worth(const real *block, fl_work *work, const real *price, int count, re
     }
   }
 }
-
-/* Forces (count, n, 2) that are worth most at prices (count, 6) of the wrench, whatever their power. */
-void fl_support(const real *block, fl_work *work, const real *price, int count, real *force) {
-  const fl_head *h = HEAD(block);
-  int r = RANGE(block);
-  for (int k = 0; k < count; k++, price += 6) {
-    real inner[6] = {0};
-    for (int j = 0; j < r; j++)
-      for (int m = 0; m < 6; m++) inner[j] += h->basis[m][j] * h->scale[m] * price[m];
-    for (int i = 0; i < COUNT(block); i++, force += 2) {
-      const fl_actuator *a = ACTUATOR(block, i);
-      real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
-      farthest_of(block, i, work->set + i, own, force);
-    }
-  }
-}

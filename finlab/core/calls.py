@@ -177,10 +177,3 @@ class Core:
         worth = np.empty((len(price), self._count, 3))
         self._core.fl_worth(self._at, self._area, price.ctypes.data, len(price), worth.ctypes.data)
         return worth
-
-    def farthest(self, price: Array) -> Array:
-        """Forces (N, n, 2) [N] that are worth most at prices (N, 6) of the wrench, whatever their power."""
-        price = np.ascontiguousarray(price)
-        force = np.empty((len(price), self._count, 2))
-        self._core.fl_support(self._at, self._area, price.ctypes.data, len(price), force.ctypes.data)
-        return force
