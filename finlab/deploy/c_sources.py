@@ -15,17 +15,19 @@ import finlab
 from finlab import core
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.method import Dual, DualSettings
+from finlab.allocation.policy import Policy
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
-from finlab.physics import plant_of
 from finlab.physics.objective import yardstick
 from finlab.whole_file import write_together
 
 SAMPLES = 24
 """Questions of a self-test."""
+ALONE = 3e-7
+"""Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
@@ -44,7 +46,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
     sources["core.h"] = _sized(sources["core.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout)
-    sources["samples.h"] = _samples(layout, samples)
+    sources["samples.h"] = _samples(layout, method, samples)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
     law = max(sum(len(table) for _, table in row.values()) for row in tables_of(thin))
@@ -62,8 +64,8 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export there are replaced. DataError:
-    it has other C files, or cannot be written."""
+    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it has
+    other C files, or cannot be written."""
     path = Path(folder)
     try:
         path.joinpath("examples").mkdir(parents=True, exist_ok=True)
@@ -111,26 +113,33 @@ def _header(layout: Layout) -> str:
         '#ifndef ROBOT_H\n#define ROBOT_H\n#include "core.h"\n\nextern const fl_real robot[];\n'
         "extern const int robot_length;\n"
         "int robot_selftest(void); /* how many answers differ from the library's */\n"
-        "#define ROBOT_ACTUATOR(i) ((const fl_actuator *)(robot + sizeof(fl_head) / sizeof(fl_real)) + (i))\n\n"
+        "#define ROBOT_ACTUATOR(i) ((const fl_actuator *)((const fl_head *)robot + 1) + (i))\n\n"
         "enum { /* rows of commands, and their numbers */\n"
         + "\n".join(about)
         + "\n  ROBOT_COUNT\n};\n#endif\n"
     )
 
 
-def _samples(layout: Layout, count: int) -> str:
-    """Wrenches within reach, out of it by the policies that single precision serves, and ticks."""
-    allocator, rng, plant = Allocator(layout), np.random.default_rng(0), plant_of(layout)
-    before, rows = [], []
-    for k, wrench in enumerate(plant.wrench(plant.sample(rng, (count,))) * layout.commanded):
+def _samples(layout: Layout, method: Dual, count: int) -> str:
+    """Wrenches within reach, out of it by the policies that single precision serves, and ticks; where the
+    core leaves nothing to the library, which has more ways around gaps."""
+    allocator, rng = Allocator(layout), np.random.default_rng(0)
+    before: list[str] = []
+    rows: list[str] = []
+    for k in range(8 * count):
+        if len(rows) == count:
+            break
         policy, far = (("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("closest", 0.6))[k % 4]
+        wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
         tick = allocator.allocate(0.5 * wrench).command if k % 4 == 3 else None
         answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
-        if tick is not None:
-            before.append(f"static const fl_real previous_{k}[][3] = {{{', '.join(map(_row, tick))}}};")
-        vectors = f"{_row(far * wrench)}, {_row(answer.wrench * layout.commanded)}"
+        given = answer.wrench * layout.commanded
+        alone = method.forces(far * wrench[None], Policy(policy)).found.command
+        if tick is None and method.error(alone, given[None])[0] > ALONE:
+            continue
         error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
-        rows.append(f"  {{FL_{policy.upper()}, {vectors}, {error!r}, {last}}},")
-    return "\n".join(
-        [*before, "static const sample samples[] = {", *rows, "};", f"enum {{ SAMPLES = {count} }};", ""]
-    )
+        if tick is not None:
+            before.append(f"static const fl_real {last}[][3] = {{{', '.join(map(_row, tick))}}};")
+        rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {_row(given)}, {error!r}, {last}}},")
+    about = f"enum {{ SAMPLES = {len(rows)} }};"
+    return "\n".join([*before, "static const sample samples[] = {", *rows, "};", about, ""])

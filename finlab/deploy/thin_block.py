@@ -5,6 +5,7 @@ error is in the wrench, and it stays below TOLERANCE. Errors of other tables cos
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from finlab.arrays import Array
@@ -49,11 +50,12 @@ def _length(kind: int, at: Array, fin: bool) -> int:
 
 
 def thinned(block: Array) -> Array:
-    """Returns a block of the same robot with thinned tables, whose limits are numbers of single precision, not
-    outside those of before but for angles that turn freely."""
-    length, places, new = HEAD + EACH * int(block[3]), {0: 0}, []
+    """Returns a block of the same robot with thinned tables, whose limits are numbers of single precision,
+    none outside those of before but for angles that turn freely."""
+    new: list[Array] = []
+    length, places = HEAD + EACH * int(block[3]), {0: 0}
     for place, (kind, numbers) in {p: own for row in tables_of(block) for p, own in row.items()}.items():
-        places[place] = length + sum(map(len, new))
+        places[place] = length + sum(len(table) for table in new)
         new.append((_radial, _radial, _gauge, _grid, _curve)[kind](numbers))
     block = np.concatenate([block[:length], *new])
     block[2] = len(block)
@@ -102,7 +104,7 @@ def _grid(grid: Array) -> Array:
     return np.concatenate([[*map(len, axes)], grid[3:7], *axes, values.ravel()])
 
 
-def _angles(knot: Array, value: Array, period: float) -> Array:
+def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
     """Which knots (K,) of a period say all values (K, c) nearly: more and more, where most is missing."""
     kept = np.arange(0, len(knot), max(len(knot) // 16, 1))
     while len(kept) < min(2 * CELLS, len(knot)):
