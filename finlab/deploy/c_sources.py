@@ -64,8 +64,8 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it has
-    other C files, or cannot be written."""
+    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it
+    has other C files, or cannot be written."""
     path = Path(folder)
     try:
         path.joinpath("examples").mkdir(parents=True, exist_ok=True)
@@ -87,6 +87,10 @@ def _sized(header: str, count: int) -> str:
 
 def _row(values: Array) -> str:
     return "{" + ", ".join(repr(float(one)) for one in values) + "}"
+
+
+def _rows(values: Array) -> str:
+    return "{" + ", ".join(map(_row, values)) + "}"
 
 
 def _block(values: Array, number: Any) -> str:
@@ -139,7 +143,8 @@ def _samples(layout: Layout, method: Dual, count: int) -> str:
             continue
         error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
         if tick is not None:
-            before.append(f"static const fl_real {last}[][3] = {{{', '.join(map(_row, tick))}}};")
-        rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {_row(given)}, {error!r}, {last}}},")
+            before.append(f"static const fl_real {last}[][3] = {_rows(tick)};")
+        answered = f"{_row(given)}, {error!r}, {_rows(answer.command)}"
+        rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {answered}, {last}}},")
     about = f"enum {{ SAMPLES = {len(rows)} }};"
     return "\n".join([*before, "static const sample samples[] = {", *rows, "};", about, ""])
