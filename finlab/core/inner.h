@@ -21,6 +21,7 @@ typedef fl_real real;
 #define ROUNDING R(1e-6)
 #define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
 #define STALLED R(2e-5) /* the same where planes across misses, by rounding, bound a ray no further */
+#define SAME R(1e-4) /* misses of a policy that differ by less are the same */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -37,6 +38,7 @@ typedef fl_real real;
 #define ROUNDING 1e-12
 #define CLOSE_BY 1e-9
 #define STALLED R(1.0)
+#define SAME NEARLY
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)

@@ -82,7 +82,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
   }
 }
 
-static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
+static real rounded(real value) { return FLOOR(value / SAME + R(0.5)) * SAME; }
 
 /* Serves a policy within the sets of a part; how badly, the first number counting most. */
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real force[][2],

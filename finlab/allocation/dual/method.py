@@ -25,7 +25,7 @@ from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
 from finlab.core.calls import BEYOND, MET, Found
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
@@ -220,14 +220,12 @@ class Dual(Method):
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
             return Forces(*core.one(wrench, policy, previous=previous)[:2])
         found, prices, status = core.one(wrench, None, inner)
-        pushed = wrench - self.compiled.beside
-        least = core.look(pushed, prices)[1] * (1.0 + FINE)
         # With doubt the dual takes it for drag, and proves nothing.
-        exact = status == MET and self.compiled.doubt is None
-        exact = exact and bool(self.error(found.command, wrench[None])[0] <= EXACT)
-        if exact and self.search.cost(found.command)[0] <= least:
+        sure = status == MET and not found.dragged and self.compiled.doubt is None
+        if sure and self.error(found.command, wrench[None])[0] <= EXACT:
             command = found.command
         else:
+            pushed = wrench - self.compiled.beside
             first = core.look(pushed, core.first(pushed))[0][None]
             starts = np.concatenate([core.commands(first), found.command])
             if inner is None:
@@ -257,7 +255,10 @@ class Dual(Method):
         if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
             return begin, prices
         value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
-        best = best_of(np.concatenate([begin, starts]))
+        # Steps from a cheap start may end early: each has its own valley.
+        found = [best_of(np.concatenate([begin, starts[:1]])), best_of(starts[1:])]
+        ways = [way for way in found if way is not None]
+        best = min(ways, key=lambda way: way.cost, default=None)
         if best is not None:
             if status != MET:
                 tried = self._padded(search.prices(best.command, self._directions))
@@ -272,7 +273,7 @@ class Dual(Method):
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
         other = None if status == BEYOND else best_of(starts)
-        ways = [way for way in (best, other) if way is not None]
+        ways += [] if other is None else [other]
         command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
         return command[None], prices
 
@@ -286,6 +287,8 @@ class Dual(Method):
         """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
         what may follow the `previous` ones (n, 3) comes."""
         found, command = forces.found, forces.found.command
+        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
+            return self.plant.rested(forces.command)
         rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
         if not len(rough):
             return command
@@ -330,6 +333,6 @@ class Dual(Method):
 def _joined(each: Sequence[Forces]) -> Forces:
     """Those of single targets."""
     rows: Any = list(zip(*(one.found for one in each), strict=True))
-    columns: Any = [np.concatenate(parts) for parts in rows[:-1]] + [any(rows[-1])]
+    columns: Any = [np.concatenate(parts) for parts in rows[:-2]] + [any(flags) for flags in rows[-2:]]
     commands: Any = [one.command for one in each]
     return Forces(Found(*columns), None, None if commands[0] is None else np.concatenate(commands))
