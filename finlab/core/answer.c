@@ -131,6 +131,8 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     } else
       within &= status == FL_MET;
   }
+  for (int i = out->dragged = 0; work->drags && i < n; i++)
+    out->dragged |= out->force[i][1] > drag_of(block, i, out->force[i][0]) + NEARLY * ACTUATOR(block, i)->most[1];
   out->within = within && !(policy && policy->always);
   if (!out->within && policy) in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
@@ -243,22 +245,6 @@ void fl_worth(const real *block, fl_work *work, const real *price, int count, re
       real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
       along_of(block, i, work->set + i, own, worth, worth + 1);
       worth[2] = reply_of(block, i, work->set + i, own).conjugate;
-    }
-  }
-}
-
-/* Forces (count, n, 2) that are worth most at prices (count, 6) of the wrench, whatever their power. */
-void fl_support(const real *block, fl_work *work, const real *price, int count, real *force) {
-  const fl_head *h = HEAD(block);
-  int r = RANGE(block);
-  for (int k = 0; k < count; k++, price += 6) {
-    real inner[6] = {0};
-    for (int j = 0; j < r; j++)
-      for (int m = 0; m < 6; m++) inner[j] += h->basis[m][j] * h->scale[m] * price[m];
-    for (int i = 0; i < COUNT(block); i++, force += 2) {
-      const fl_actuator *a = ACTUATOR(block, i);
-      real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
-      farthest_of(block, i, work->set + i, own, force);
     }
   }
 }

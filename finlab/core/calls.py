@@ -34,6 +34,8 @@ class Found(NamedTuple):
     """Targets within reach (N,)."""
     command: Array
     """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
+    dragged: bool
+    """Whether a foil is to drag more than its lift does."""
     ended: bool
     """Whether a search ended at its bound of steps."""
 
@@ -70,6 +72,7 @@ class _Answer(ctypes.Structure):
         ("within", ctypes.c_int),
         ("steps", ctypes.c_int),
         ("ended", ctypes.c_int),
+        ("dragged", ctypes.c_int),
     ]
 
 
@@ -127,6 +130,7 @@ class Core:
             vectors[18:19],
             np.array([answer.within != 0]),
             self._command.copy(),
+            answer.dragged != 0,
             answer.ended != 0,
         )
         return found, vectors[6:12], answer.status
@@ -142,7 +146,7 @@ class Core:
         error = self._core.fl_answer_many(self._at, self._area, wrenches.ctypes.data, count, own, *outs)
         if error > 0:
             raise ValueError(f"the core got {CODES[error]}")
-        return Found(force, price, aim, value, within, command, error < 0)
+        return Found(force, price, aim, value, within, command, False, error < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep `previous` ones (n, 3)."""
@@ -173,10 +177,3 @@ class Core:
         worth = np.empty((len(price), self._count, 3))
         self._core.fl_worth(self._at, self._area, price.ctypes.data, len(price), worth.ctypes.data)
         return worth
-
-    def farthest(self, price: Array) -> Array:
-        """Forces (N, n, 2) [N] that are worth most at prices (N, 6) of the wrench, whatever their power."""
-        price = np.ascontiguousarray(price)
-        force = np.empty((len(price), self._count, 2))
-        self._core.fl_support(self._at, self._area, price.ctypes.data, len(price), force.ctypes.data)
-        return force

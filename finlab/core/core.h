@@ -69,7 +69,7 @@ enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
 typedef struct { /* what one actuator may give now */
   fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
-  int live, flipped, forked;
+  int flipped, forked;
 } fl_set;
 
 typedef struct { /* prices, and what they give */
@@ -81,7 +81,7 @@ typedef struct { /* prices, and what they give */
 #define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
 
 typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
-  fl_real force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6], at[6];
+  fl_real force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6];
   fl_real q[FL_POINTS][6], r[FL_POINTS][FL_POINTS];
   int count, done; /* points; how many of them the basis knows */
 } fl_mixture;
@@ -107,7 +107,7 @@ typedef struct {
   fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
-  fl_real metric[6][6], factor[6][6], least_trace, most_cost, enough, largest_power;
+  fl_real metric[6][6], factor[6][6], least_trace, most_cost, enough;
   int quick, torn, drags, steps, ended;
 } fl_work;
 
@@ -129,13 +129,14 @@ typedef struct {
   fl_real command[FL_MOST][3];
   int status, within;        /* of Newton's method (FL_MET ...); within reach */
   int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
+  int dragged;               /* 1 where a foil is to drag more than its lift does */
 } fl_answer;
 
 /* Error codes; 0 is none. FL_PRIORITY needs double precision. */
 enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT, FL_NEEDS_DOUBLE };
 
 int fl_version(void);
-int fl_sizes(int which); /* bytes of fl_real, fl_work, fl_policy, fl_answer; then FL_MOST */
+int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
 int fl_check(const fl_real *block, int length);
 int fl_prepare(const fl_real *block, fl_work *work);
 typedef struct {
@@ -150,7 +151,6 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, i
                    unsigned char *within);
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
-void fl_support(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *force);
 void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
 void fl_first(const fl_real *block, fl_work *work, const fl_real *wrench, fl_real *inner);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);

@@ -153,12 +153,12 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
   real angle = ATAN2(force[1], force[0]), size = SQRT(force[0] * force[0] + force[1] * force[1]), wanted = size;
   real given[3];
-  for (int k = 0; k < 3; k++) { /* what the tables leave undone is asked for on top */
+  for (int k = 0; k < 2; k++) { /* what the tables leave undone is asked for on top */
     real most = a->high * (gauge ? gauge_at(gauge, angle) : 1), lean = gauge ? lean_at(gauge, angle) : a->lean;
     beat_at(block + (int)a->beat, wanted / most, command);
     command[0] = in_limits(box, i, 0, command[0]), command[1] = in_limits(box, i, 1, command[1]);
     command[2] = angle_in(box, i, 2, angle - lean);
-    if (k == 2) break;
+    if (k == 1) break;
     force_of(block, i, command, given, 0);
     wanted = MAX(wanted + size - SQRT(given[1] * given[1] + given[2] * given[2]), 0);
     if (gauge && size > 0) angle += wrapped(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));

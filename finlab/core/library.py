@@ -19,7 +19,6 @@ SIGNATURES = {
     "fl_first": "vpppp",
     "fl_look": "rppppp",
     "fl_worth": "vpppip",
-    "fl_support": "vpppip",
 }
 """What each function returns and takes: i int, r real, p pointer, v nothing."""
 _TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "v": None}

@@ -50,7 +50,6 @@ int fl_prepare(const real *block, fl_work *work) {
   for (int j = 0; j < r; j++) h[j][j] += NOTHING * trace;
   work->least_trace = NEARLY * trace, work->enough = TOLERANCE;
   sums_of(block, work);
-  work->largest_power = work->most_cost;
   return cholesky(h, work->factor, r) ? 0 : FL_BAD_NUMBER;
 }
 

@@ -7,7 +7,7 @@
 #include "inner.h"
 
 #define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
-#define AT_RIM R(1e-7)   /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
+#define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,

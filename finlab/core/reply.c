@@ -42,7 +42,7 @@ void set_up(const real *block, int i, fl_set *set) {
 void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
   const fl_actuator *a = ACTUATOR(block, i);
   int plane = a->rows == 2 && a->speed == 0, back = plane && low < 0;
-  set->live = 1, set->flipped = back && high <= 0;
+  set->flipped = back && high <= 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
   set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;

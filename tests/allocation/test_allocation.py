@@ -202,7 +202,7 @@ def test_policies_answer_as_in_single_calls(method: str, policy: Policy | str) -
     for row, single in enumerate(singles):
         assert batch.layout == single.layout and batch.failed == single.failed
         if not single.reachable:
-            np.testing.assert_array_equal(batch.command[row], single.command)
+            np.testing.assert_allclose(batch.command[row], single.command, rtol=0.0, atol=1e-12)
             np.testing.assert_allclose(batch.err_norm[row], single.err_norm, rtol=1e-12)
             np.testing.assert_allclose(batch.power[row], single.power, rtol=1e-12)
 

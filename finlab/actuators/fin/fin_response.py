@@ -21,7 +21,7 @@ from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_g
 from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn, wrapped
 from finlab.errors import DataError
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
 GRID = 17, 33
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
@@ -123,19 +123,10 @@ def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
 
 
 def _form(law: FinLaw, box: "_Box", beat: Array, gauge: Array | None, deflection: Array) -> Form:
-    step = POINTS
-    while step > 1 and np.abs(_thinned(beat, step) - beat).max() > CLOSE * (box.upper - box.lower)[:2].max():
-        step //= 2
     uneven, lean = law.unevenness, float(deflection[0]) if gauge is None else float(law.offset)
     numbers = (1.0, lean, *uneven, 1.0, 0.0, 0.0)
     grid = law.grid_numbers(box.lower, box.upper)
-    return Form("fin", None, grid, beat[::step], None if gauge is None else deflection, numbers)
-
-
-def _thinned(beat: Array, step: int) -> Array:
-    """What every `step`-th row of a table (POINTS + 1, 2) says of all."""
-    place = np.arange(len(beat))
-    return np.stack([np.interp(place, place[::step], column[::step]) for column in beat.T], axis=-1)
+    return Form("fin", None, grid, beat, None if gauge is None else deflection, numbers)
 
 
 class _Box:

@@ -25,7 +25,7 @@ from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
 from finlab.core.calls import BEYOND, MET, Found
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
@@ -220,17 +220,18 @@ class Dual(Method):
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
             return Forces(*core.one(wrench, policy, previous=previous)[:2])
         found, prices, status = core.one(wrench, None, inner)
-        pushed = wrench - self.compiled.beside
-        least = core.look(pushed, prices)[1] * (1.0 + FINE)
-        exact = status == MET and self.error(found.command, wrench[None])[0] <= EXACT
-        if exact and self.search.cost(found.command)[0] <= least:
+        # With doubt the dual takes it for drag, and proves nothing.
+        sure = status == MET and not found.dragged and self.compiled.doubt is None
+        if sure and self.error(found.command, wrench[None])[0] <= EXACT:
             command = found.command
         else:
+            pushed = wrench - self.compiled.beside
             first = core.look(pushed, core.first(pushed))[0][None]
+            starts = np.concatenate([core.commands(first), found.command])
             if inner is None:
-                near = self._padded(self.search.prices(core.commands(first)[0], self._directions))
+                near = self._padded(self.search.prices(starts[0], self._directions))
                 found, prices, status = core.one(wrench, None, near)
-            command, prices = self._near(wrench, found.force, first, prices, status)
+            command, prices = self._near(wrench, found.force, starts, prices, status)
         within = not np.isnan(command).any()
         if within:
             found = found._replace(command=command, aim=wrench[None])
@@ -245,16 +246,16 @@ class Dual(Method):
         return Forces(known, prices, command)
 
     def _near(
-        self, wrench: Array, force: Array, first: Array, prices: Array, status: int
+        self, wrench: Array, force: Array, starts: Array, prices: Array, status: int
     ) -> tuple[Array, Array]:
-        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or the first ones, NaN
-        where there is none; and its prices (6,)."""
+        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or other starts (S, n, 3),
+        NaN where there is none; and its prices (6,)."""
         search, core = self.search, self.compiled.robot.core
         begin, pushed = core.commands(force), wrench - self.compiled.beside
         if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
             return begin, prices
         value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
-        best = best_of(np.concatenate([begin, core.commands(first)]))
+        best = best_of(np.concatenate([begin, starts]))
         if best is not None:
             if status != MET:
                 tried = self._padded(search.prices(best.command, self._directions))
@@ -283,6 +284,8 @@ class Dual(Method):
         """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
         what may follow the `previous` ones (n, 3) comes."""
         found, command = forces.found, forces.found.command
+        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
+            return self.plant.rested(forces.command)
         rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
         if not len(rough):
             return command
@@ -327,6 +330,6 @@ class Dual(Method):
 def _joined(each: Sequence[Forces]) -> Forces:
     """Those of single targets."""
     rows: Any = list(zip(*(one.found for one in each), strict=True))
-    columns: Any = [np.concatenate(parts) for parts in rows[:-1]] + [any(rows[-1])]
+    columns: Any = [np.concatenate(parts) for parts in rows[:-2]] + [any(flags) for flags in rows[-2:]]
     commands: Any = [one.command for one in each]
     return Forces(Found(*columns), None, None if commands[0] is None else np.concatenate(commands))

@@ -1,0 +1,92 @@
+"""The core as Python calls it: sizes of both languages, damaged blocks, arguments, one answer and many."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator, Policy
+from finlab.allocation.dual import robot
+from finlab.arrays import Array
+from finlab.core.calls import CODES, Core
+from finlab.core.library import library
+from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
+
+BLOCK, NUMBER = 1, 3
+"""Codes of the core: no block, a number out of range."""
+
+
+def core_of(allocator: Allocator) -> Core:
+    made: Core = allocator._whole.method.compiled.robot.core  # type: ignore[attr-defined]
+    return made
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Core:
+    return core_of(Allocator(load(bluerov2_heavy())))
+
+
+def test_both_languages_agree_on_what_a_block_is(heavy: Core) -> None:
+    core = library()
+    assert [core.fl_sizes(k) // 8 for k in (1, 2)] == [robot._HEAD, robot._EACH]
+    assert core.fl_check(heavy._block.ctypes.data, len(heavy._block)) == 0
+
+
+def checked(block: Array) -> int:
+    code: int = library().fl_check(block.ctypes.data, len(block))
+    return code
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "code"),
+    [
+        (0, 7.0, BLOCK),
+        (1, 9.0, 2),
+        (2, 1e6, BLOCK),
+        (3, 0.0, BLOCK),
+        (3, 65.0, BLOCK),
+        (4, 2.5, BLOCK),
+        (5, 0.0, NUMBER),
+        (100, np.nan, NUMBER),
+        (robot._HEAD, 3.0, BLOCK),
+        (robot._HEAD + 1, 1e9, BLOCK),
+        (robot._HEAD + 1, 0.5, BLOCK),
+        (robot._HEAD + 3, -1.0, NUMBER),
+    ],
+)
+def test_a_damaged_block_is_refused(heavy: Core, place: int, value: float, code: int) -> None:
+    block = heavy._block.copy()
+    block[place] = value
+    assert checked(block) == code
+    with pytest.raises(ValueError, match=CODES[code]):
+        Core(block, 8)
+
+
+def test_a_block_cut_short_is_refused(heavy: Core) -> None:
+    for length in (0, 1, robot._HEAD, len(heavy._block) - 1):
+        assert checked(heavy._block[:length].copy()) != 0
+
+
+def test_what_is_no_number_is_refused(heavy: Core) -> None:
+    wrench, prices = np.zeros(6), np.zeros(6)
+    for bad in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="argument"):
+            heavy.one(np.where(np.arange(6) == 2, bad, wrench), None)
+        with pytest.raises(ValueError, match="argument"):
+            heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices))
+    with pytest.raises(ValueError, match="argument"):
+        heavy.one(wrench, None, previous=np.full((8, 3), np.inf))
+    assert heavy.one(wrench, None, previous=np.full((8, 3), np.nan))[0].within[0]  # of nothing is known
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_and_many_are_the_same(kind: str) -> None:
+    core = core_of(Allocator(load(random_robot(kind, 1, 3))))
+    plant = random_plant(kind, 1, 3)
+    targets = np.array([within(plant, np.random.default_rng([3, k])) for k in range(6)])
+    targets[::2] *= 3.0
+    policy = Policy("direction")
+    many = core.many(targets, policy)
+    for row, target in enumerate(targets):
+        single = core.one(target, policy)[0]
+        np.testing.assert_array_equal(many.command[row], single.command[0])
+        np.testing.assert_array_equal(many.aim[row], single.aim[0])
+        assert many.within[row] == single.within[0]
