@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from finlab.allocation.dual.robot import EACH, HEAD
 from finlab.arrays import Array
 from finlab.precision import NOTHING
 
@@ -17,10 +18,8 @@ CELLS = 128
 """Cells of a table at most; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Directions of a gauge at most."""
-HEAD, EACH = 59, 67
-"""Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 PLACES = 1, 2, 5, 58, 59
-"""Where an actuator names its tables: ahead, in reverse, gauge, law, beat or curve."""
+"""Where an `fl_actuator` of finlab/core/core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
 LIMITS, TURNS, FORM, FIN = slice(48, 54), 57, 47, 2
 
 
