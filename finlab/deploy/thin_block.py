@@ -19,7 +19,7 @@ CELLS = 128
 POINTS = 64
 """Directions of a gauge at most."""
 PLACES = 1, 2, 5, 58, 59
-"""Where an `fl_actuator` of finlab/core/core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
+"""Where an `fl_actuator` of core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
 LIMITS, TURNS, FORM, FIN = slice(48, 54), 57, 47, 2
 
 
