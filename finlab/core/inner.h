@@ -38,7 +38,7 @@ typedef fl_real real;
 #define ROUNDING 1e-12
 #define CLOSE_BY 1e-9
 #define STALLED R(1.0)
-#define SAME 1e-6
+#define SAME NEARLY
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)

@@ -255,7 +255,10 @@ class Dual(Method):
         if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
             return begin, prices
         value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
-        best = best_of(np.concatenate([begin, starts]))
+        # Steps from a cheap start may end early: each has its own valley.
+        found = [best_of(np.concatenate([begin, starts[:1]])), best_of(starts[1:])]
+        ways = [way for way in found if way is not None]
+        best = min(ways, key=lambda way: way.cost, default=None)
         if best is not None:
             if status != MET:
                 tried = self._padded(search.prices(best.command, self._directions))
@@ -270,7 +273,7 @@ class Dual(Method):
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
         other = None if status == BEYOND else best_of(starts)
-        ways = [way for way in (best, other) if way is not None]
+        ways += [] if other is None else [other]
         command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
         return command[None], prices
 
