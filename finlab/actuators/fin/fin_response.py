@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import file_stamp, make_law
+from finlab.actuators.fin.bernstein_bound import TableBound
+from finlab.actuators.fin.fin_laws import TableLaw, file_stamp, make_law
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
 from finlab.actuators.form import Form
 from finlab.actuators.law import FinLaw, PlanarLaw
@@ -63,7 +64,7 @@ class FinGroup(Group):
         """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
         a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
-        self._tables = tables
+        self._tables, self._effectiveness = tables, effectiveness
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
@@ -75,15 +76,28 @@ class FinGroup(Group):
         return [table.form for table in self._tables]
 
     def radial_worth(self, price: Array, back: Array) -> Array:
-        """See `Group`: from the commands of the table on both sides of each price, by the law."""
-        result = np.empty(price.shape)
+        """See `Group`: from the commands of the table on both sides of each price, by the law; of fins that
+        were measured nothing."""
+        result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
+            if table.box.bound is not None:
+                continue
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(paid, starts)
             result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return result
+
+    def worth(self, price: Array) -> Array:
+        """See `Group`: a bound, of fins that were measured alone."""
+        result = np.full((len(price), len(self._tables)), np.nan)
+        for table in {id(table): table for table in self._tables}.values():
+            if (bound := table.box.bound) is not None:
+                places = [i for i, own in enumerate(self._tables) if own is table]
+                own = np.einsum("maw,nw->nma", self._effectiveness[places], price)
+                result[:, places] = bound(own.reshape(-1, 3)).reshape(len(price), -1)
         return result
 
 
@@ -159,6 +173,11 @@ class _Box:
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
         turns = np.linspace(low, high, POINTS + 1)
         return turns, self.strongest(turns)
+
+    @cached_property
+    def bound(self) -> TableBound | None:
+        """What its force is worth at most; None where a formula tells."""
+        return TableBound(self.law, self.lower, self.upper) if isinstance(self.law, TableLaw) else None
 
     def strongest(self, turns: Array) -> Array:
         """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""

@@ -186,17 +186,21 @@ class Dual(Method):
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
         wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
         bound = proved_power(self.compiled, wrench, price)
-        bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
+        if not self._measured:  # what stands for a table has another value
+            bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
         power = self.plant.power(command).sum(axis=-1)
         slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
     @cached_property
+    def _measured(self) -> bool:
+        return any(part.reads for part in self.layout.actuators)
+
+    @property
     def unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: with what doubt
-        costs, or of the smooth shape that stands for a measured table."""
-        measured = any(part.reads for part in self.layout.actuators)
-        return measured or self.compiled.doubt is not None
+        costs."""
+        return self.compiled.doubt is not None
 
     def forces(
         self, targets: Array, policy: Policy | None, inner: Array | None = None, previous: Array | None = None

@@ -1,0 +1,151 @@
+"""Upper bounds of what a fin with a measured table is worth at prices of its force.
+
+The interpolation of a table is cubic along each axis of a cell, and linear in the table's values: what a
+command is worth, price times force less power, is one such polynomial. The largest of its Bernstein
+coefficients bounds it from above. Cells that may hold more than the best corner are halved along all axes
+(de Casteljau), until bound and corner are close.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.actuators.fin.fin_laws import TableLaw
+from finlab.actuators.fin.hermite_grid import ROUNDING, closed_axes, shapes, with_neighbours
+from finlab.arrays import Array
+from finlab.axes import TURN
+from finlab.precision import NOTHING, ROUNDS
+
+GAP = 3e-5
+"""Share of the best corner's worth that may stay between it and the bound."""
+MOST_CELLS = 30_000
+"""Cells in work at once: a table with more is bounded price by price; where halving leads to more, it ends."""
+_HALVES = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
+_SPLIT = np.concatenate([_HALVES, _HALVES[::-1, ::-1]])
+"""Coefficients (4,) of a polynomial to those of both halves of its interval (2 * 4)."""
+_EIGHTHS = np.indices((2, 2, 2)).reshape(3, 8).T
+"""Which half of a cell each of its eighths is, along each axis (8, 3)."""
+
+
+class _Axis(NamedTuple):
+    """The cells of one axis within limits."""
+
+    near: NDArray[np.intp]
+    """Places (c, 4) of each cell's neighbours in a table with a rim."""
+    weight: Array
+    """Bernstein coefficients by the values there (c, 4, 4)."""
+    ends: Array
+    """Ends (c, 2); twice the first one where the table knows no change."""
+
+
+class TableBound:
+    """What commands of a fin with a table, within limits, are worth at most."""
+
+    def __init__(self, law: TableLaw, lower: Array, upper: Array) -> None:
+        """Takes limits (3,) [rad, Hz, rad]."""
+        self._values = with_neighbours(law.grid)
+        self._blade = None if law.has_power else law.blade
+        self._axes = [
+            _axis(knots, law.periodic and k == 2, float(lower[k]), float(upper[k]), k == 2)
+            for k, knots in enumerate(closed_axes(law.grid))
+        ]
+        shape = tuple(len(axis.near) for axis in self._axes)
+        place = np.indices(shape)
+        self._ends = np.stack([axis.ends[i] for axis, i in zip(self._axes, place, strict=True)], axis=-2)
+
+    def __call__(self, price: Array) -> Array:
+        """Returns powers (N,) [W] that no command's worth exceeds at prices (N, 3) [W/N] along own axes."""
+        step = 1 + MOST_CELLS // self._ends[..., 0, 0].size
+        return np.concatenate([self._block(price[k : k + step]) for k in range(0, len(price), step)])
+
+    def _block(self, price: Array) -> Array:
+        factor = price if self._blade else np.insert(price, 3, -1.0, axis=1)
+        part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
+        count, shape = len(price), [len(axis.near) for axis in self._axes]
+        for axis in self._axes:  # the first axis of three becomes cells and coefficients, and the last
+            around = part[:, axis.near]
+            own = axis.weight @ around.reshape(*around.shape[:3], -1)
+            part = np.moveaxis(own.reshape(count, -1, *part.shape[2:]), 1, 3)
+        pairs = part.reshape(count, shape[0], 4, shape[1], 4, shape[2], 4)
+        cells = pairs.transpose(0, 1, 3, 5, 2, 4, 6)
+        bound, corner = self._bounds(cells, self._ends)
+        best = corner.max(axis=(1, 2, 3))
+        slack = NOTHING * np.abs(part).max(axis=(1, 2, 3))
+        least = (best + GAP * np.abs(best) + slack)[:, None, None, None]
+        most = np.maximum(best, np.where(bound <= least, bound, -np.inf).max(axis=(1, 2, 3)))
+        row, *place = np.nonzero(bound > least)
+        bound, cells, ends = bound[row, *place], cells[row, *place], self._ends[*place]
+        for _ in range(ROUNDS):
+            if not 0 < 8 * len(row) <= MOST_CELLS:
+                break
+            cells, ends, row = _split(cells, ends, row)
+            bound, corner = self._bounds(cells, ends)
+            np.maximum.at(best, row, corner)
+            left = bound > (best + GAP * np.abs(best) + slack)[row]
+            np.maximum.at(most, row[~left], bound[~left])
+            cells, ends, row, bound = cells[left], ends[left], row[left], bound[left]
+        np.maximum.at(most, row, bound)
+        return np.maximum(most, best) + ROUNDING * slack / NOTHING
+
+    def _bounds(self, cells: Array, ends: Array) -> tuple[Array, Array]:
+        """Bounds (...) of cells with coefficients (..., 4, 4, 4) and ends (..., 3, 2), and their best corners
+        (...)."""
+        corner = cells[..., ::3, ::3, ::3]
+        if self._blade is None:
+            return cells.max(axis=(-3, -2, -1)), corner.max(axis=(-3, -2, -1))
+        # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
+        # tangent in the middle.
+        amplitude, frequency = ends[..., 0, :], ends[..., 1, :]
+        exact = self._blade.power(amplitude[..., None], frequency[..., None, :])
+        middle, one = amplitude.mean(axis=-1), np.ones(())
+        across = (amplitude[..., 1] - amplitude[..., 0])[..., None] * (np.arange(4) / 3.0 - 0.5)
+        slope = self._blade.power_gradient(middle, one)[0][..., None]
+        tangent = self._blade.power(middle, one)[..., None] + slope * across
+        cubed = frequency[..., :1] ** np.arange(3, -1, -1) * frequency[..., 1:] ** np.arange(4)
+        least = tangent[..., None] * cubed[..., None, :]
+        bound = (cells.max(axis=-1) - least).max(axis=(-2, -1))
+        return bound, (corner.max(axis=-1) - exact).max(axis=(-2, -1))
+
+
+def _split(cells: Array, ends: Array, row: Array) -> tuple[Array, Array, Array]:
+    """The eighths of cells, each once."""
+    for _ in range(3):
+        cells = np.tensordot(cells, _SPLIT, ([1], [1]))
+    cells = cells.reshape(-1, 2, 4, 2, 4, 2, 4).transpose(0, 1, 3, 5, 2, 4, 6).reshape(-1, 4, 4, 4)
+    first, last = ends[..., 0], ends[..., 1]
+    middle = 0.5 * (first + last)
+    halves = np.stack([np.stack([first, middle], -1), np.stack([middle, last], -1)], axis=-2)
+    once = ~((first == last)[:, None] & (_EIGHTHS == 1)).any(axis=-1).ravel()
+    ends = halves[:, np.arange(3), _EIGHTHS].reshape(-1, 3, 2)
+    return cells[once], ends[once], row.repeat(8)[once]
+
+
+def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) -> _Axis:
+    """The cells of an axis with knots (n,) from `low` to `high`; outside the knots the nearer one counts."""
+    middle, cuts = 0.5 * (knots[0] + knots[-1]), knots
+    if turns:
+        low, high = low - ROUNDING, high + ROUNDING
+        cuts = np.add.outer(TURN * np.arange(-3, 4), np.append(knots, middle + 0.5 * TURN)).ravel()
+    cuts = np.unique([low, *cuts[(cuts > low) & (cuts < high)], high])
+    ends = np.stack([cuts[:-1], cuts[1:]], axis=-1) if len(cuts) > 1 else np.array([[low, low]])
+    if turns:
+        ends = ends - TURN * np.rint((ends.mean(axis=1, keepdims=True) - middle) / TURN)
+    within = ends.clip(knots[0], knots[-1])
+    cell = np.searchsorted(knots, within.mean(axis=1), side="right") - 1
+    cell = cell.clip(0, len(knots) - 2)
+    powers, places = shapes(knots, periodic)
+    a, b = ((within - places[cell, :1]) * places[cell, 1:]).T
+    one = np.ones_like(a)
+    # The symmetric form of each power of the place in a cell, at three ends: its Bernstein coefficients.
+    blossom = np.array(
+        [
+            [one, a, a * a, a * a * a],
+            [one, (2.0 * a + b) / 3.0, a * (a + 2.0 * b) / 3.0, a * a * b],
+            [one, (a + 2.0 * b) / 3.0, b * (2.0 * a + b) / 3.0, a * b * b],
+            [one, b, b * b, b * b * b],
+        ]
+    )
+    still = within[:, :1] == within[:, 1:]
+    weight = np.moveaxis(blossom, -1, 0) @ powers[cell]
+    return _Axis(cell[:, None] + np.arange(4), weight, np.where(still, ends[:, :1], within))
