@@ -20,7 +20,7 @@ from finlab.precision import NOTHING, ROUNDS
 GAP = 3e-5
 """Share of the best corner's worth that may stay between it and the bound."""
 MOST_CELLS = 30_000
-"""Cells in work at once: a table with more is bounded price by price; where halving leads to more, it ends."""
+"""Cells in work at once: larger tables are bounded price by price; where halving leads to more, it ends."""
 _HALVES = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
 _SPLIT = np.concatenate([_HALVES, _HALVES[::-1, ::-1]])
 """Coefficients (4,) of a polynomial to those of both halves of its interval (2 * 4)."""
@@ -60,40 +60,50 @@ class TableBound:
         return np.concatenate([self._block(price[k : k + step]) for k in range(0, len(price), step)])
 
     def _block(self, price: Array) -> Array:
-        factor = price if self._blade else np.insert(price, 3, -1.0, axis=1)
-        part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
-        count, shape = len(price), [len(axis.near) for axis in self._axes]
-        for axis in self._axes:  # the first axis of three becomes cells and coefficients, and the last
-            around = part[:, axis.near]
-            own = axis.weight @ around.reshape(*around.shape[:3], -1)
-            part = np.moveaxis(own.reshape(count, -1, *part.shape[2:]), 1, 3)
-        pairs = part.reshape(count, shape[0], 4, shape[1], 4, shape[2], 4)
-        cells = pairs.transpose(0, 1, 3, 5, 2, 4, 6)
-        bound, corner = self._bounds(cells, self._ends)
-        best = corner.max(axis=(1, 2, 3))
-        slack = NOTHING * np.abs(part).max(axis=(1, 2, 3))
-        least = (best + GAP * np.abs(best) + slack)[:, None, None, None]
-        most = np.maximum(best, np.where(bound <= least, bound, -np.inf).max(axis=(1, 2, 3)))
-        row, *place = np.nonzero(bound > least)
-        bound, cells, ends = bound[row, *place], cells[row, *place], self._ends[*place]
+        cells = self._all_cells(price)
+        ends = self._ends
+        bound, corner = self._bounds(cells[:-1], cells[-1:], ends)
+        inner = 1, 2, 3
+        best = corner.max(axis=inner)
+        slack = NOTHING * np.abs(cells).max(axis=(*inner, 4, 5, 6))[:-1]
+        least = best + GAP * np.abs(best) + slack
+        left = bound > least[:, None, None, None]
+        most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
+        row, *place = np.nonzero(left)
+        bound, ends = bound[left], ends[*place]
+        pair = np.stack([cells[row, *place], cells[-1, *place]], axis=1)
         for _ in range(ROUNDS):
             if not 0 < 8 * len(row) <= MOST_CELLS:
                 break
-            cells, ends, row = _split(cells, ends, row)
-            bound, corner = self._bounds(cells, ends)
+            pair, ends, row = _split(pair, ends, row)
+            bound, corner = self._bounds(pair[:, 0], pair[:, 1], ends)
             np.maximum.at(best, row, corner)
             left = bound > (best + GAP * np.abs(best) + slack)[row]
             np.maximum.at(most, row[~left], bound[~left])
-            cells, ends, row, bound = cells[left], ends[left], row[left], bound[left]
+            pair, ends, row, bound = pair[left], ends[left], row[left], bound[left]
         np.maximum.at(most, row, bound)
         return np.maximum(most, best) + ROUNDING * slack / NOTHING
 
-    def _bounds(self, cells: Array, ends: Array) -> tuple[Array, Array]:
+    def _all_cells(self, price: Array) -> Array:
+        """Coefficients (N + 1, a, f, d, 4, 4, 4) of all cells: of price times force, at last of power."""
+        factor = np.zeros((len(price) + 1, self._values.shape[-1]))
+        factor[:-1, :3], factor[-1, 3:] = price, 1.0
+        part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
+        for axis in self._axes:  # the first axis of three becomes cells and coefficients, and the last
+            around = part[:, axis.near]
+            own = axis.weight @ around.reshape(*around.shape[:3], -1)
+            part = np.moveaxis(own.reshape(len(part), -1, *part.shape[2:]), 1, 3)
+        counts = [size for axis in self._axes for size in (len(axis.near), 4)]
+        return part.reshape(-1, *counts).transpose(0, 1, 3, 5, 2, 4, 6)
+
+    def _bounds(self, paid: Array, power: Array, ends: Array) -> tuple[Array, Array]:
         """Bounds (...) of cells with coefficients (..., 4, 4, 4) and ends (..., 3, 2), and their best corners
         (...)."""
-        corner = cells[..., ::3, ::3, ::3]
+        corner, inner = paid[..., ::3, ::3, ::3], (-3, -2, -1)
         if self._blade is None:
-            return cells.max(axis=(-3, -2, -1)), corner.max(axis=(-3, -2, -1))
+            # Power is never below 0, whatever the interpolation says.
+            bound = np.minimum((paid - power).max(axis=inner), paid.max(axis=inner))
+            return bound, (corner - np.maximum(power[..., ::3, ::3, ::3], 0.0)).max(axis=inner)
         # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
         # tangent in the middle.
         amplitude, frequency = ends[..., 0, :], ends[..., 1, :]
@@ -103,22 +113,22 @@ class TableBound:
         slope = self._blade.power_gradient(middle, one)[0][..., None]
         tangent = self._blade.power(middle, one)[..., None] + slope * across
         cubed = frequency[..., :1] ** np.arange(3, -1, -1) * frequency[..., 1:] ** np.arange(4)
-        least = tangent[..., None] * cubed[..., None, :]
-        bound = (cells.max(axis=-1) - least).max(axis=(-2, -1))
+        lowest = tangent[..., None] * cubed[..., None, :]
+        bound = (paid.max(axis=-1) - lowest).max(axis=(-2, -1))
         return bound, (corner.max(axis=-1) - exact).max(axis=(-2, -1))
 
 
-def _split(cells: Array, ends: Array, row: Array) -> tuple[Array, Array, Array]:
+def _split(pair: Array, ends: Array, row: Array) -> tuple[Array, Array, Array]:
     """The eighths of cells, each once."""
     for _ in range(3):
-        cells = np.tensordot(cells, _SPLIT, ([1], [1]))
-    cells = cells.reshape(-1, 2, 4, 2, 4, 2, 4).transpose(0, 1, 3, 5, 2, 4, 6).reshape(-1, 4, 4, 4)
+        pair = np.tensordot(pair, _SPLIT, ([2], [1]))
+    eighths = pair.reshape(-1, 2, 2, 4, 2, 4, 2, 4).transpose(0, 2, 4, 6, 1, 3, 5, 7).reshape(-1, 2, 4, 4, 4)
     first, last = ends[..., 0], ends[..., 1]
     middle = 0.5 * (first + last)
     halves = np.stack([np.stack([first, middle], -1), np.stack([middle, last], -1)], axis=-2)
     once = ~((first == last)[:, None] & (_EIGHTHS == 1)).any(axis=-1).ravel()
     ends = halves[:, np.arange(3), _EIGHTHS].reshape(-1, 3, 2)
-    return cells[once], ends[once], row.repeat(8)[once]
+    return eighths[once], ends[once], row.repeat(8)[once]
 
 
 def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) -> _Axis:
