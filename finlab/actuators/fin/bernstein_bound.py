@@ -15,10 +15,8 @@ from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.actuators.fin.hermite_grid import ROUNDING, closed_axes, shapes, with_neighbours
 from finlab.arrays import Array
 from finlab.axes import TURN
-from finlab.precision import NOTHING, ROUNDS
+from finlab.precision import CLOSE, NOTHING, ROUNDS
 
-GAP = 3e-5
-"""Share of the best corner's worth that may stay between it and the bound."""
 MOST_CELLS = 30_000
 """Cells in work at once: larger tables are bounded price by price; where halving leads to more, it ends."""
 _HALVES = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
@@ -66,7 +64,7 @@ class TableBound:
         inner = 1, 2, 3
         best = corner.max(axis=inner)
         slack = NOTHING * np.abs(cells).max(axis=(*inner, 4, 5, 6))[:-1]
-        least = best + GAP * np.abs(best) + slack
+        least = best + CLOSE * np.abs(best) + slack
         left = bound > least[:, None, None, None]
         most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
         row, *place = np.nonzero(left)
@@ -78,7 +76,7 @@ class TableBound:
             pair, ends, row = _split(pair, ends, row)
             bound, corner = self._bounds(pair[:, 0], pair[:, 1], ends)
             np.maximum.at(best, row, corner)
-            left = bound > (best + GAP * np.abs(best) + slack)[row]
+            left = bound > (best + CLOSE * np.abs(best) + slack)[row]
             np.maximum.at(most, row[~left], bound[~left])
             pair, ends, row, bound = pair[left], ends[left], row[left], bound[left]
         np.maximum.at(most, row, bound)
@@ -94,16 +92,16 @@ class TableBound:
             own = axis.weight @ around.reshape(*around.shape[:3], -1)
             part = np.moveaxis(own.reshape(len(part), -1, *part.shape[2:]), 1, 3)
         counts = [size for axis in self._axes for size in (len(axis.near), 4)]
-        return part.reshape(-1, *counts).transpose(0, 1, 3, 5, 2, 4, 6)
+        return np.ascontiguousarray(part.reshape(-1, *counts).transpose(0, 1, 3, 5, 2, 4, 6))
 
     def _bounds(self, paid: Array, power: Array, ends: Array) -> tuple[Array, Array]:
         """Bounds (...) of cells with coefficients (..., 4, 4, 4) and ends (..., 3, 2), and their best corners
         (...)."""
-        corner, inner = paid[..., ::3, ::3, ::3], (-3, -2, -1)
+        corner = paid[..., ::3, ::3, ::3]
         if self._blade is None:
             # Power is never below 0, whatever the interpolation says.
-            bound = np.minimum((paid - power).max(axis=inner), paid.max(axis=inner))
-            return bound, (corner - np.maximum(power[..., ::3, ::3, ::3], 0.0)).max(axis=inner)
+            least = np.maximum(power[..., ::3, ::3, ::3], 0.0)
+            return np.minimum(_largest(paid - power, 3), _largest(paid, 3)), _largest(corner - least, 3)
         # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
         # tangent in the middle.
         amplitude, frequency = ends[..., 0, :], ends[..., 1, :]
@@ -114,8 +112,12 @@ class TableBound:
         tangent = self._blade.power(middle, one)[..., None] + slope * across
         cubed = frequency[..., :1] ** np.arange(3, -1, -1) * frequency[..., 1:] ** np.arange(4)
         lowest = tangent[..., None] * cubed[..., None, :]
-        bound = (paid.max(axis=-1) - lowest).max(axis=(-2, -1))
-        return bound, (corner.max(axis=-1) - exact).max(axis=(-2, -1))
+        return _largest(paid.max(axis=-1) - lowest, 2), _largest(corner.max(axis=-1) - exact, 2)
+
+
+def _largest(values: Array, axes: int) -> Array:
+    """The largest ones over the last axes."""
+    return np.asarray(values.reshape(*values.shape[:-axes], -1).max(axis=-1))
 
 
 def _split(pair: Array, ends: Array, row: Array) -> tuple[Array, Array, Array]:
