@@ -58,17 +58,16 @@ class TableBound:
         return np.concatenate([self._block(price[k : k + step]) for k in range(0, len(price), step)])
 
     def _block(self, price: Array) -> Array:
-        cells = self._all_cells(price)
-        ends = self._ends
-        bound, corner = self._bounds(cells[:-1], cells[-1:], ends)
-        inner = 1, 2, 3
+        cells, inner = self._all_cells(price), (1, 2, 3)
+        bound, corner = self._bounds(cells[:-1], cells[-1:], self._ends)
         best = corner.max(axis=inner)
         slack = NOTHING * np.abs(cells).max(axis=(*inner, 4, 5, 6))[:-1]
         least = best + CLOSE * np.abs(best) + slack
         left = bound > least[:, None, None, None]
         most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
-        row, *place = np.nonzero(left)
-        bound, ends = bound[left], ends[*place]
+        places: list[NDArray[np.intp]] = list(np.nonzero(left))
+        row, *place = places
+        bound, ends = bound[left], self._ends[*place]
         pair = np.stack([cells[row, *place], cells[-1, *place]], axis=1)
         for _ in range(ROUNDS):
             if not 0 < 8 * len(row) <= MOST_CELLS:
@@ -80,7 +79,7 @@ class TableBound:
             np.maximum.at(most, row[~left], bound[~left])
             pair, ends, row, bound = pair[left], ends[left], row[left], bound[left]
         np.maximum.at(most, row, bound)
-        return np.maximum(most, best) + ROUNDING * slack / NOTHING
+        return np.asarray(np.maximum(most, best) + ROUNDING * slack / NOTHING)
 
     def _all_cells(self, price: Array) -> Array:
         """Coefficients (N + 1, a, f, d, 4, 4, 4) of all cells: of price times force, at last of power."""
@@ -120,7 +119,7 @@ def _largest(values: Array, axes: int) -> Array:
     return np.asarray(values.reshape(*values.shape[:-axes], -1).max(axis=-1))
 
 
-def _split(pair: Array, ends: Array, row: Array) -> tuple[Array, Array, Array]:
+def _split(pair: Array, ends: Array, row: NDArray[np.intp]) -> tuple[Array, Array, NDArray[np.intp]]:
     """The eighths of cells, each once."""
     for _ in range(3):
         pair = np.tensordot(pair, _SPLIT, ([2], [1]))
