@@ -1,6 +1,5 @@
-"""The bound of robots with measured fins: below every command's power, and near the least of smooth tables."""
+"""The bound of measured fins: below the power of every command, and near the least of smooth tables."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -63,20 +62,19 @@ def measured(kind: str, number: int, folder: Path) -> Any:
 @pytest.mark.parametrize("seed", range(30))
 def test_no_command_is_worth_more_and_hardly_any_less(seed: int) -> None:
     rng = np.random.default_rng([5, seed])
-    directions = rng.choice([0.0, 0.1, 2.0, 4.0, TURN])
-    start = rng.uniform(-TURN, TURN - directions)
-    limits = np.stack([*np.sort(rng.uniform(0.0, [[1.2], [3.0]], (2, 2))), [start, start + directions]])
-    law = random_table(rng, limits, rng.choice([0.0, 0.03, 0.2]))
-    limits[rng.integers(3)] += rng.uniform(-0.1, 0.1)
-    limits[:2] = np.maximum(limits[:2], 0.0)
-    if rng.random() < 0.3:
-        limits[0, 1] = limits[0, 0]
+    covered = np.array([[0.0, 1.2], [0.0, 3.0], [-3.0, rng.choice([-2.0, 0.5, TURN - 3.0])]])
+    law = random_table(rng, covered, rng.choice([0.0, 0.03, 0.2]))
+    limits = np.sort(rng.uniform(0.0, [[1.3], [3.2], [TURN]], (3, 2)))
+    limits[2] -= rng.uniform(0.0, TURN)
+    if seed % 3 == 0:  # one that is held
+        limits[seed // 3 % 3] = limits[seed // 3 % 3, 0]
     price = rng.normal(size=(5, 3)) * 10.0 ** rng.uniform(-1.0, 1.0, (5, 1))
     bound = TableBound(law, *limits.T)(price)
-    knots = [np.add.outer(axis, TURN * np.arange(-3, 4) * (k == 2)) for k, axis in enumerate(law.grid.axes)]
-    grid = [
-        np.append(np.linspace(*ends, 17), axis.clip(*ends)) for ends, axis in zip(limits, knots, strict=True)
-    ]
+    grid = []
+    for k, axis in enumerate(law.grid.axes):
+        fine = np.interp(np.arange(0.0, len(axis), 0.25), np.arange(len(axis)), axis)
+        near = np.add.outer(fine, TURN * np.arange(-2, 3) * (k == 2)).ravel()
+        grid.append(np.append(np.linspace(*limits[k], 9), near.clip(*limits[k])))
     command = np.stack(np.meshgrid(*map(np.unique, grid), indexing="ij"), axis=-1).reshape(-1, 3)
     command = np.concatenate([command, rng.uniform(*limits.T, (20_000, 3))])
     worth = law.force(command) @ price.T - law.power(command)[:, None]
@@ -85,9 +83,9 @@ def test_no_command_is_worth_more_and_hardly_any_less(seed: int) -> None:
     assert (bound <= worth.max(axis=0) + 0.03 * scale).all()
 
 
-@pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "wide arcs", "holes", "mixed", "all"])
+@pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "holes", "all"])
 def test_no_command_takes_less(kind: str, tmp_path: Path) -> None:
-    for number in range(3):
+    for number in range(2):
         if (layout := measured(kind, number, tmp_path)) is None:
             continue
         allocator, plant, rng = Allocator(layout), Plant(layout), np.random.default_rng(number)
@@ -115,6 +113,4 @@ def test_smooth_tables_are_proved(power: bool, tmp_path: Path) -> None:
     batch = Allocator(layout).allocate_batch(0.7 * wrench)
     ratio = batch.bound / batch.power
     assert ratio.max() <= 1.0 and np.median(ratio) > (0.9 if power else 0.999)
-    doubtful = tuple(replace(fin, uncertainty=None) for fin in layout.fins)
-    sure = Allocator(replace(layout, actuators=doubtful), robust=5.0).allocate(0.7 * wrench[0])
-    assert math.isfinite(sure.power)
+    assert Allocator(layout, robust=5.0).allocate(0.7 * wrench[0]).bound is None
