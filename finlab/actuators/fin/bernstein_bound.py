@@ -6,6 +6,7 @@ coefficients bounds it from above. Cells that may hold more than the best corner
 (de Casteljau), until bound and corner are close.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.precision import CLOSE, NOTHING, ROUNDS
 
+MOST_KEPT = 4096
+"""Cells of a table whose coefficients are kept."""
 MOST_CELLS = 30_000
 """Cells in work at once: larger tables are bounded price by price; where halving leads to more, it ends."""
 _HALVES = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
@@ -42,15 +45,18 @@ class TableBound:
 
     def __init__(self, law: TableLaw, lower: Array, upper: Array) -> None:
         """Takes limits (3,) [rad, Hz, rad]."""
-        self._values = with_neighbours(law.grid)
+        # Directions come first: of them the blade's power does not depend.
+        self._values = np.moveaxis(with_neighbours(law.grid), 2, 0)
         self._blade = None if law.has_power else law.blade
         self._axes = [
-            _axis(knots, law.periodic and k == 2, float(lower[k]), float(upper[k]), k == 2)
-            for k, knots in enumerate(closed_axes(law.grid))
+            _axis(closed_axes(law.grid)[k], law.periodic and k == 2, float(lower[k]), float(upper[k]), k == 2)
+            for k in (2, 0, 1)
         ]
         shape = tuple(len(axis.near) for axis in self._axes)
         place = np.indices(shape)
         self._ends = np.stack([axis.ends[i] for axis, i in zip(self._axes, place, strict=True)], axis=-2)
+        small = math.prod(shape) <= MOST_KEPT
+        self._kept = self._cells(np.eye(self._values.shape[-1])) if small else None
 
     def __call__(self, price: Array) -> Array:
         """Returns powers (N,) [W] that no command's worth exceeds at prices (N, 3) [W/N] along own axes."""
@@ -58,10 +64,13 @@ class TableBound:
         return np.concatenate([self._block(price[k : k + step]) for k in range(0, len(price), step)])
 
     def _block(self, price: Array) -> Array:
-        cells, inner = self._all_cells(price), (1, 2, 3)
+        factor = np.zeros((len(price) + 1, self._values.shape[-1]))
+        factor[:-1, :3], factor[-1, 3:] = price, 1.0  # at last power
+        cells = self._cells(factor) if self._kept is None else np.tensordot(factor, self._kept, 1)
+        inner = 1, 2, 3
         bound, corner = self._bounds(cells[:-1], cells[-1:], self._ends)
         best = corner.max(axis=inner)
-        slack = NOTHING * np.abs(cells).max(axis=(*inner, 4, 5, 6))[:-1]
+        slack = NOTHING * np.abs(bound).max(axis=inner)
         least = best + CLOSE * np.abs(best) + slack
         left = bound > least[:, None, None, None]
         most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
@@ -81,10 +90,8 @@ class TableBound:
         np.maximum.at(most, row, bound)
         return np.asarray(np.maximum(most, best) + ROUNDING * slack / NOTHING)
 
-    def _all_cells(self, price: Array) -> Array:
-        """Coefficients (N + 1, a, f, d, 4, 4, 4) of all cells: of price times force, at last of power."""
-        factor = np.zeros((len(price) + 1, self._values.shape[-1]))
-        factor[:-1, :3], factor[-1, 3:] = price, 1.0
+    def _cells(self, factor: Array) -> Array:
+        """Coefficients (N, d, a, f, 4, 4, 4) of all cells, of the table's columns by factors (N, 3 or 4)."""
         part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
         for axis in self._axes:  # the first axis of three becomes cells and coefficients, and the last
             around = part[:, axis.near]
@@ -103,7 +110,7 @@ class TableBound:
             return np.minimum(_largest(paid - power, 3), _largest(paid, 3)), _largest(corner - least, 3)
         # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
         # tangent in the middle.
-        amplitude, frequency = ends[..., 0, :], ends[..., 1, :]
+        amplitude, frequency = ends[..., 1, :], ends[..., 2, :]
         exact = self._blade.power(amplitude[..., None], frequency[..., None, :])
         middle, one = amplitude.mean(axis=-1), np.ones(())
         across = (amplitude[..., 1] - amplitude[..., 0])[..., None] * (np.arange(4) / 3.0 - 0.5)
@@ -111,7 +118,7 @@ class TableBound:
         tangent = self._blade.power(middle, one)[..., None] + slope * across
         cubed = frequency[..., :1] ** np.arange(3, -1, -1) * frequency[..., 1:] ** np.arange(4)
         lowest = tangent[..., None] * cubed[..., None, :]
-        return _largest(paid.max(axis=-1) - lowest, 2), _largest(corner.max(axis=-1) - exact, 2)
+        return _largest(paid.max(axis=-3) - lowest, 2), _largest(corner.max(axis=-3) - exact, 2)
 
 
 def _largest(values: Array, axes: int) -> Array:
