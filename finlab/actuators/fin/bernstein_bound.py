@@ -6,8 +6,7 @@ coefficients bounds it from above. Cells that may hold more than the best corner
 (de Casteljau), until bound and corner are close.
 """
 
-import math
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +28,6 @@ _EIGHTHS = np.indices((2, 2, 2)).reshape(3, 8).T
 """Which half of a cell each of its eighths is, along each axis (8, 3)."""
 
 
-class _Axis(NamedTuple):
-    """The cells of one axis within limits."""
-
-    near: NDArray[np.intp]
-    """Places (c, 4) of each cell's neighbours in a table with a rim."""
-    weight: Array
-    """Bernstein coefficients by the values there (c, 4, 4)."""
-    ends: Array
-    """Ends (c, 2); twice the first one where the table knows no change."""
-
-
 class TableBound:
     """What commands of a fin with a table, within limits, are worth at most."""
 
@@ -48,14 +36,16 @@ class TableBound:
         # Directions come first: of them the blade's power does not depend.
         self._values = np.moveaxis(with_neighbours(law.grid), 2, 0)
         self._blade = None if law.has_power else law.blade
-        self._axes = [
-            _axis(closed_axes(law.grid)[k], law.periodic and k == 2, float(lower[k]), float(upper[k]), k == 2)
-            for k in (2, 0, 1)
-        ]
-        shape = tuple(len(axis.near) for axis in self._axes)
-        place = np.indices(shape)
-        self._ends = np.stack([axis.ends[i] for axis, i in zip(self._axes, place, strict=True)], axis=-2)
-        small = math.prod(shape) <= MOST_KEPT
+        self._axes: list[list[Any]] = []
+        each = []
+        for k in (2, 0, 1):
+            knots, limits = closed_axes(law.grid)[k], (float(lower[k]), float(upper[k]))
+            *axis, ends = _axis(knots, law.periodic and k == 2, *limits, k == 2)
+            self._axes.append(axis)
+            each.append(ends)
+        place = np.indices([len(ends) for ends in each])
+        self._ends = np.stack([ends[i] for ends, i in zip(each, place, strict=True)], axis=-2)
+        small = place[0].size <= MOST_KEPT
         self._kept = self._cells(np.eye(self._values.shape[-1])) if small else None
 
     def __call__(self, price: Array) -> Array:
@@ -93,11 +83,14 @@ class TableBound:
     def _cells(self, factor: Array) -> Array:
         """Coefficients (N, d, a, f, 4, 4, 4) of all cells, of the table's columns by factors (N, 3 or 4)."""
         part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
-        for axis in self._axes:  # the first axis of three becomes cells and coefficients, and the last
-            around = part[:, axis.near]
-            own = axis.weight @ around.reshape(*around.shape[:3], -1)
+        for (
+            near,
+            weight,
+        ) in self._axes:  # the first of three axes becomes cells and coefficients, and the last
+            around = part[:, near]
+            own = weight @ around.reshape(*around.shape[:3], -1)
             part = np.moveaxis(own.reshape(len(part), -1, *part.shape[2:]), 1, 3)
-        counts = [size for axis in self._axes for size in (len(axis.near), 4)]
+        counts = [size for near, _ in self._axes for size in (len(near), 4)]
         return np.ascontiguousarray(part.reshape(-1, *counts).transpose(0, 1, 3, 5, 2, 4, 6))
 
     def _bounds(self, paid: Array, power: Array, ends: Array) -> tuple[Array, Array]:
@@ -139,8 +132,10 @@ def _split(pair: Array, ends: Array, row: NDArray[np.intp]) -> tuple[Array, Arra
     return eighths[once], ends[once], row.repeat(8)[once]
 
 
-def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) -> _Axis:
-    """The cells of an axis with knots (n,) from `low` to `high`; outside the knots the nearer one counts."""
+def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) -> tuple[Any, Array, Array]:
+    """Of the cells of an axis with knots (n,), cut at limits: the places (c, 4) of their neighbours in a
+    table with a rim, the Bernstein coefficients by the values there (c, 4, 4), and the ends (c, 2), twice
+    the first one outside the knots, where the nearer one counts."""
     middle, cuts = 0.5 * (knots[0] + knots[-1]), knots
     if turns:
         low, high = low - ROUNDING, high + ROUNDING
@@ -166,4 +161,4 @@ def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) ->
     )
     still = within[:, :1] == within[:, 1:]
     weight = np.moveaxis(blossom, -1, 0) @ powers[cell]
-    return _Axis(cell[:, None] + np.arange(4), weight, np.where(still, ends[:, :1], within))
+    return cell[:, None] + np.arange(4), weight, np.where(still, ends[:, :1], within)

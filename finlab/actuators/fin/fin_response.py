@@ -80,7 +80,7 @@ class FinGroup(Group):
         were measured nothing."""
         result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
-            if table.box.bound is not None:
+            if isinstance(table.box.law, TableLaw):
                 continue
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
@@ -94,10 +94,10 @@ class FinGroup(Group):
         """See `Group`: a bound, of fins that were measured alone."""
         result = np.full((len(price), len(self._tables)), np.nan)
         for table in {id(table): table for table in self._tables}.values():
-            if (bound := table.box.bound) is not None:
+            if isinstance(law := table.box.law, TableLaw):
                 places = [i for i, own in enumerate(self._tables) if own is table]
                 own = np.einsum("maw,nw->nma", self._effectiveness[places], price)
-                result[:, places] = bound(own.reshape(-1, 3)).reshape(len(price), -1)
+                result[:, places] = _table_bound(law, table.box)(own.reshape(-1, 3)).reshape(len(price), -1)
         return result
 
 
@@ -173,11 +173,6 @@ class _Box:
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
         turns = np.linspace(low, high, POINTS + 1)
         return turns, self.strongest(turns)
-
-    @cached_property
-    def bound(self) -> TableBound | None:
-        """What its force is worth at most; None where a formula tells."""
-        return TableBound(self.law, self.lower, self.upper) if isinstance(self.law, TableLaw) else None
 
     def strongest(self, turns: Array) -> Array:
         """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""
@@ -272,6 +267,11 @@ class _Box:
             first = int(enough.argmax()) if enough.any() else len(prices) - 1
             low, high = float(prices[max(first - 1, 0)]), float(prices[first])
         return high
+
+
+@lru_cache(maxsize=32)
+def _table_bound(law: TableLaw, box: _Box) -> TableBound:
+    return TableBound(law, box.lower, box.upper)
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
