@@ -79,7 +79,7 @@ def test_no_command_is_worth_more_and_hardly_any_less(seed: int) -> None:
     worth = law.force(command) @ price.T - law.power(command)[:, None]
     scale = np.abs(worth).max(axis=0)
     assert (worth.max(axis=0) <= bound + 1e-12 * scale).all()
-    assert (bound <= worth.max(axis=0) + 0.03 * scale).all()
+    assert (bound <= worth.max(axis=0) + 0.05 * scale).all()
 
 
 @pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "holes", "all"])
