@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab.actuators.fin import bernstein_bound
 from finlab.actuators.fin.bernstein_bound import TableBound
 from finlab.actuators.fin.force_table_file import COLUMNS, table_text
 from finlab.allocation import Allocator
@@ -60,7 +61,7 @@ def measured(kind: str, number: int, folder: Path) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_no_command_is_worth_more_and_hardly_any_less(seed: int) -> None:
+def test_no_command_is_worth_more_and_hardly_any_less(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng([5, seed])
     covered = np.array([[0.0, 1.2], [0.0, 3.0], [-3.0, rng.choice([-2.0, 0.5, TURN - 3.0])]])
     law = random_table(rng, covered, rng.choice([0.0, 0.03, 0.2]))
@@ -80,6 +81,10 @@ def test_no_command_is_worth_more_and_hardly_any_less(seed: int) -> None:
     scale = np.abs(worth).max(axis=0)
     assert (worth.max(axis=0) <= bound + 1e-12 * scale).all()
     assert (bound <= worth.max(axis=0) + 0.05 * scale).all()
+    monkeypatch.setattr(bernstein_bound, "MOST_KEPT", 0)
+    np.testing.assert_allclose(TableBound(law, *limits.T)(price), bound, rtol=1e-9)
+    monkeypatch.setattr(bernstein_bound, "MOST_CELLS", 50)  # ends early
+    assert (worth.max(axis=0) <= TableBound(law, *limits.T)(price) + 1e-12 * scale).all()
 
 
 @pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "holes", "all"])
