@@ -196,8 +196,9 @@ class Dual(Method):
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
             raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])
-            other = proved_power(self.compiled, wrench[rows], raised)
-            bound[rows] = np.maximum(0.0, np.maximum(bound[rows], other))
+            for tried in (raised, np.zeros_like(raised)):  # the latter prove the power at rest
+                other = proved_power(self.compiled, wrench[rows], tried)
+                bound[rows] = np.maximum(0.0, np.maximum(bound[rows], other))
         slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
