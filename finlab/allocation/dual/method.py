@@ -28,8 +28,6 @@ from finlab.core.calls import BEYOND, MET, Found
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
-GAP = 1e-3
-"""Share of its power that may be missing to a bound without a search for better prices."""
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
 _ENDED = "the search for a better answer was ended by its limit of steps"
@@ -192,7 +190,7 @@ class Dual(Method):
         power = self.plant.power(command).sum(axis=-1)
         if not self._measured:
             bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
-        elif len(rows := np.flatnonzero(bound < (1.0 - GAP) * power)):
+        elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)):
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
             raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])

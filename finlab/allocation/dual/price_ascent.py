@@ -8,12 +8,10 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
-from finlab.precision import NOTHING, ROUNDS
+from finlab.precision import CLOSE, NOTHING, ROUNDS
 
 DRAWN = 800
 """Commands of each actuator."""
-NEAREST = 1e-3
-"""Share of its range that the nearest of them lies away."""
 HEATS = np.geomspace(0.3, 0.003, 14)
 """Smoothing, as a share of the mean power of an actuator."""
 
@@ -23,7 +21,7 @@ def raised_price(plant: Plant, scale: Array, wrench: Array, price: Array, comman
     plant; errors count on the yardstick `scale` (6,)."""
     low, high = plant.layout.lower, plant.layout.upper
     draw = np.random.default_rng(0).uniform(-1.0, 1.0, (DRAWN, *command.shape)) * (high - low)
-    drawn = (command + np.geomspace(NEAREST, 1.0, DRAWN)[:, None, None] * draw).clip(low, high)
+    drawn = (command + np.geomspace(10.0 * CLOSE, 1.0, DRAWN)[:, None, None] * draw).clip(low, high)
     drawn[0] = command
     given = np.einsum("kna,naw->nkw", plant.force(drawn), plant.effectiveness) / scale
     power = plant.power(drawn).T
@@ -37,7 +35,7 @@ def raised_price(plant: Plant, scale: Array, wrench: Array, price: Array, comman
         total = share.sum(axis=1, keepdims=True)
         return float(heat * (most + np.log(total)).sum() - target @ inner), share / total
 
-    ridge = NEAREST
+    ridge = 10.0 * CLOSE
     for heat in HEATS * power[:, 0].mean():
         value, share = smoothed(inner, heat)
         mean = np.einsum("nk,nkw->nw", share, given)
