@@ -9,7 +9,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas figures help setup core app test test-all test-near test-fast check format checkpoint wheel wheels wheel-check clean
+.PHONY: schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -17,6 +17,7 @@ help:
 	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
 	@echo "make test         every test, browser tests included; of long tables of cases one in ten"
 	@echo "make test-all     every test and every case"
+	@echo "make fuzz         a million mutated robots and wild wrenches for the core in C, under sanitizers"
 	@echo "make test-near    the tests near what was changed since the branch main"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
@@ -41,10 +42,21 @@ core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.[ch])
 app: setup
 	$(BIN)/finlab app --port $(HOST_PORT)
 
-test: setup
+# What compiles and runs the C export, and where it stands in Debian.
+BOARD_TOOLS := gcc g++ clang cmake aarch64-linux-gnu-gcc qemu-aarch64 arm-none-eabi-gcc qemu-system-arm
+BOARD_PACKAGES := gcc g++ clang libclang-rt-dev cmake gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user \
+    gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+
+board-tools:
+	@for tool in $(BOARD_TOOLS); do command -v $$tool >/dev/null || exec tools/apt-install $(BOARD_PACKAGES); done
+
+test: setup board-tools
 	@tools/find-browser || tools/apt-install chromium fonts-dejavu-core || tools/no-browser
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal --ignore tests/browser $(CASES)
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser $(CASES)
+
+fuzz: setup board-tools
+	FUZZ=250000 $(BIN)/python -m pytest -n 2 -k fuzzer tests/core
 
 test-all: CASES := -m ""
 test-all: test

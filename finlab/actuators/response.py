@@ -272,12 +272,12 @@ class Group(ABC):
     def radial_worth(self, price: Array, back: Array) -> Array | None:
         """Returns the most (N, m) [W] that force along its own direction is worth at prices (N, m) [W/N],
         less its power, by the law itself (of lines signed prices; of planes that push either way `back` in
-        reverse); None where that is what the tables say."""
+        reverse); NaN, or None, where that is what the tables say."""
         return None
 
     def worth(self, price: Array) -> Array | None:
         """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth at prices
-        (N, 6) of the wrench, less its power; None where the answers' forces are all."""
+        (N, 6) of the wrench, less its power, or more; NaN, or None, where the answers' forces are all."""
         return None
 
     @property

@@ -91,7 +91,7 @@ def doubts(result: Allocation) -> tuple[str, ...]:
     return (
         *doubt,
         f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
-        "wide arc, a dead band or drag, the least is not proved",
+        "wide arc, a dead band, drag or a measured table, the least is not proved",
     )
 
 

@@ -76,32 +76,43 @@ def export(
     layout: shared_options.Robot,
     output: Annotated[Path | None, arg(metavar="DIR", aliases=["-o"])] = None,
     graph: Annotated[Path | None, arg(metavar="FILE")] = None,
+    c: Annotated[Path | None, arg(metavar="DIR")] = None,
     zip: bool = False,
     lost: shared_options.Lost = (),
     method: Literal["dual", "mdn", "paper"] = "dual",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
-    """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), or the
-    layout graph file.
+    """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), the
+    layout graph file, or the allocator in C for a microcontroller.
 
     Args:
         output: folder to write the bundle to.
         graph: file to write the graph of actuators to (JSON, node-link form), for networkx and learners.
+        c: folder to write the C99 sources of method dual for this robot to, with a self-test and examples.
         zip: write one archive, DIR.zip, instead of a folder.
         lost: name of an actuator that does not work.
         method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
         checkpoint: trained checkpoint of mdn or paper, which travels; the shipped one by default.
     """
-    if output is None and graph is None:
-        raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, or both")
+    if output is None and graph is None and c is None:
+        raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, --c DIR, or several")
+    if c is not None and method != "dual":
+        raise FinlabError(f"method {method!r}: has no C sources; leave --method out, or --c")
     if output is not None and output.suffix == ".json":
         raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
     robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
+    left = robot.without(gone) if gone else robot
     if graph is not None:
         from finlab.deploy.bundle import write_graph
 
-        write_graph(robot.without(gone) if gone else robot, graph)
-        print(f"{graph}: {robot.counted}, {len(robot.names) - len(gone)} nodes")
+        write_graph(left, graph)
+        print(f"{graph}: {robot.counted}, {left.n} nodes")
+    if c is not None:
+        from finlab.deploy.c_sources import c_sources, write_c
+
+        files = c_sources(left)
+        write_c(files, c)
+        print(f"{c}: {left.counted}, {len(files)} files; try: cc -std=c99 {c}/*.c -lm && ./a.out")
     if output is None:
         return
     from finlab.allocation import Allocator

@@ -66,8 +66,10 @@ int fl_check(const real *block, int length) {
     if (!(a->form >= FL_THRUSTER && a->form <= FL_FOIL && a->form == FLOOR(a->form))) return FL_BAD_BLOCK;
     if (a->form >= FL_FIN && !is_table(block, a->beat, h->length, 0, 2, a->form == FL_FIN)) return FL_BAD_BLOCK;
     if (a->form >= FL_FIN ? !is_grid(block, a->law, h->length) : a->law != 0) return FL_BAD_BLOCK;
+    int used = a->form == FL_FIN ? 3 : a->form == FL_POD ? 2 : 1;
     for (int k = 0; k < 3; k++)
-      if (!(a->lower[k] <= a->upper[k] && a->step[k] >= 0)) return FL_BAD_NUMBER;
+      if (!((k < used ? a->lower[k] <= a->upper[k] : a->lower[k] == 0 && a->upper[k] == 0) && a->step[k] >= 0))
+        return FL_BAD_NUMBER;
     if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;
     if (!(a->share > 0 && a->worth > 0 && a->most[0] > 0 && a->low <= a->high && a->half >= 0)) return FL_BAD_NUMBER;
     if (!(a->band >= 0 && a->speed >= 0 && a->gain[0] >= 0 && a->gain[1] >= 0)) return FL_BAD_NUMBER;

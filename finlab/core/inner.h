@@ -36,7 +36,7 @@ typedef fl_real real;
 #define ENOUGH TOLERANCE
 #define IDLE MOST_STEPS
 #define ROUNDING 1e-12
-#define CLOSE_BY 1e-9
+#define CLOSE_BY NOTHING
 #define STALLED R(1.0)
 #define SAME NEARLY
 #define TINY 1e-300

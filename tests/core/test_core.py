@@ -26,7 +26,7 @@ def heavy() -> Core:
 
 def test_both_languages_agree_on_what_a_block_is(heavy: Core) -> None:
     core = library()
-    assert [core.fl_sizes(k) // 8 for k in (1, 2)] == [robot._HEAD, robot._EACH]
+    assert [core.fl_sizes(k) // 8 for k in (1, 2)] == [robot.HEAD, robot.EACH]
     assert core.fl_check(heavy._block.ctypes.data, len(heavy._block)) == 0
 
 
@@ -46,10 +46,10 @@ def checked(block: Array) -> int:
         (4, 2.5, BLOCK),
         (5, 0.0, NUMBER),
         (100, np.nan, NUMBER),
-        (robot._HEAD, 3.0, BLOCK),
-        (robot._HEAD + 1, 1e9, BLOCK),
-        (robot._HEAD + 1, 0.5, BLOCK),
-        (robot._HEAD + 3, -1.0, NUMBER),
+        (robot.HEAD, 3.0, BLOCK),
+        (robot.HEAD + 1, 1e9, BLOCK),
+        (robot.HEAD + 1, 0.5, BLOCK),
+        (robot.HEAD + 3, -1.0, NUMBER),
     ],
 )
 def test_a_damaged_block_is_refused(heavy: Core, place: int, value: float, code: int) -> None:
@@ -61,7 +61,7 @@ def test_a_damaged_block_is_refused(heavy: Core, place: int, value: float, code:
 
 
 def test_a_block_cut_short_is_refused(heavy: Core) -> None:
-    for length in (0, 1, robot._HEAD, len(heavy._block) - 1):
+    for length in (0, 1, robot.HEAD, len(heavy._block) - 1):
         assert checked(heavy._block[:length].copy()) != 0
 
 

@@ -16,6 +16,8 @@ WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
 SPOKEN = 0.05
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
+FAR = 9.0
+"""Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a table."""
 PROVED = 1e-4
 """Share of its watts that an answer may lie above the bound and count as proved least."""
 LEAST_WATTS = 1e-3
@@ -97,6 +99,8 @@ def bound_sentence(allocation: Allocation) -> str:
     gap = _gap(allocation, allocation.bound)
     if gap <= PROVED:
         return "Its watts are proved least."
+    if gap > FAR:
+        return "How far its watts are from the least is not known."
     share = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
     return f"Its watts are at most {share} % above the least."
 

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import file_stamp, make_law
+from finlab.actuators.fin.bernstein_bound import TableBound
+from finlab.actuators.fin.fin_laws import TableLaw, file_stamp, make_law
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
 from finlab.actuators.form import Form
 from finlab.actuators.law import FinLaw, PlanarLaw
@@ -63,7 +64,7 @@ class FinGroup(Group):
         """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
         a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
-        self._tables = tables
+        self._tables, self._effectiveness = tables, effectiveness
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
@@ -75,15 +76,28 @@ class FinGroup(Group):
         return [table.form for table in self._tables]
 
     def radial_worth(self, price: Array, back: Array) -> Array:
-        """See `Group`: from the commands of the table on both sides of each price, by the law."""
-        result = np.empty(price.shape)
+        """See `Group`: from the commands of the table on both sides of each price, by the law; of fins that
+        were measured nothing."""
+        result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
+            if isinstance(table.box.law, TableLaw):
+                continue
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(paid, starts)
             result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return result
+
+    def worth(self, price: Array) -> Array:
+        """See `Group`: a bound, of fins that were measured alone."""
+        result = np.full((len(price), len(self._tables)), np.nan)
+        for table in {id(table): table for table in self._tables}.values():
+            if isinstance(law := table.box.law, TableLaw):
+                places = [i for i, own in enumerate(self._tables) if own is table]
+                own = np.einsum("maw,nw->nma", self._effectiveness[places], price)
+                result[:, places] = _table_bound(law, table.box)(own.reshape(-1, 3)).reshape(len(price), -1)
         return result
 
 
@@ -244,6 +258,11 @@ class _Box:
             first = int(enough.argmax()) if enough.any() else len(prices) - 1
             low, high = float(prices[max(first - 1, 0)]), float(prices[first])
         return high
+
+
+@lru_cache(maxsize=32)
+def _table_bound(law: TableLaw, box: _Box) -> TableBound:
+    return TableBound(law, box.lower, box.upper)
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:

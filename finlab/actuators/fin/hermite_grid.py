@@ -37,19 +37,19 @@ class HermiteGrids:
     def __init__(self, grids: list[Grid]) -> None:
         """Prepares the grids."""
         self.grids = grids
-        knots = [axis for grid in grids for axis in _closed(grid)]
+        knots = [axis for grid in grids for axis in closed_axes(grid)]
         counts = np.array([len(axis) for axis in knots])
         first, last = np.array([axis[0] for axis in knots]), np.array([axis[-1] for axis in knots])
         scale, shift = 1.0 / (last - first), 2.0 * np.arange(len(knots))
         # All axes are looked up together: on one line where axis k lies between 2 k and 2 k + 1.
         line = [(axis - axis[0]) * s + k for axis, s, k in zip(knots, scale, shift, strict=True)]
         self._line = np.concatenate(line)
-        shapes = [_shapes(axis, grids[k // 3].periodic and k % 3 == 2) for k, axis in enumerate(knots)]
-        self._shapes = np.concatenate([shape for shape, _ in shapes])
-        self._places = np.concatenate([place for _, place in shapes])
+        cells = [shapes(axis, grids[k // 3].periodic and k % 3 == 2) for k, axis in enumerate(knots)]
+        self._shapes = np.concatenate([shape for shape, _ in cells])
+        self._places = np.concatenate([place for _, place in cells])
         before = np.cumsum(counts) - counts
         # The values of all grids below each other, each with a rim of neighbours; a view of four in a row.
-        padded = [_with_neighbours(grid) for grid in grids]
+        padded = [with_neighbours(grid) for grid in grids]
         self.columns: int = grids[0].values.shape[-1]
         """How many values each point has."""
         flat = np.concatenate([values.reshape(-1, self.columns) for values in padded])
@@ -108,22 +108,22 @@ class HermiteGrids:
         return cell, powers @ self._shapes.take(cell, axis=0)
 
 
-def _closed(grid: Grid) -> list[Array]:
-    """The axes, a circle closed."""
+def closed_axes(grid: Grid) -> list[Array]:
+    """Returns the axes, a circle closed."""
     amplitude, frequency, direction = grid.axes
     return [amplitude, frequency, np.append(direction, direction[0] + TURN) if grid.periodic else direction]
 
 
-def _with_neighbours(grid: Grid) -> Array:
-    """The values with a rim of neighbours, at an edge the edge itself, which makes slopes one-sided."""
+def with_neighbours(grid: Grid) -> Array:
+    """Returns the values with a rim of neighbours, at an edge the edge itself: slopes are one-sided there."""
     values = np.pad(grid.values, ((1, 1), (1, 1), (0, 0), (0, 0)), "edge")
     around, how = ((1, 2), "wrap") if grid.periodic else ((1, 1), "edge")
     return np.pad(values, ((0, 0), (0, 0), around, (0, 0)), how)  # type: ignore[call-overload, no-any-return]
 
 
-def _shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
-    """Of each cell between knots (n,): the polynomials (n, 4 powers, 4 neighbours) that weigh its neighbours,
-    its start, and one over its width (n, 2). The last row stands for no cell."""
+def shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
+    """Returns of each cell between knots (n,) the polynomials (n, 4 powers, 4 neighbours) that weigh its
+    neighbours, its start, and one over its width (n, 2). The last row stands for no cell."""
     gaps = np.diff(knots)
     before, after = (gaps[-1], gaps[0]) if periodic else (0.0, 0.0)
     pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])

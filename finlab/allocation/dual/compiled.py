@@ -117,10 +117,9 @@ def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
     """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
     ahead, back, worth = np.moveaxis(compiled.robot.core.worth(price), -1, 0)
     for places, group in compiled.groups:
-        own = group.worth(price)
-        own = compiled.radial_worth(group, ahead[:, places], back[:, places]) if own is None else own
-        if own is not None:
-            worth[:, places] = own
+        for own in (compiled.radial_worth(group, ahead[:, places], back[:, places]), group.worth(price)):
+            if own is not None:
+                worth[:, places] = np.where(np.isnan(own), worth[:, places], own)
     paid = price * (wrench - compiled.beside)
     rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=1))
     return np.asarray(paid.sum(axis=1) - worth.sum(axis=1) - rounding)

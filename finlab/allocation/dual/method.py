@@ -14,6 +14,7 @@ import numpy as np
 
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.drag import EXACT, Search
+from finlab.allocation.dual.price_ascent import raised_price
 from finlab.allocation.dual.rates import Rates
 from finlab.allocation.dual.turns import Forces, Linear, settled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -186,17 +187,28 @@ class Dual(Method):
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
         wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
         bound = proved_power(self.compiled, wrench, price)
-        bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
         power = self.plant.power(command).sum(axis=-1)
+        if not self._measured:
+            bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
+        elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)):
+            # The prices are those of the smooth shapes that stand for tables.
+            questions = zip(wrench[rows], price[rows], command[rows], strict=True)
+            raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])
+            for tried in (raised, np.zeros_like(raised)):  # the latter prove the power at rest
+                other = proved_power(self.compiled, wrench[rows], tried)
+                bound[rows] = np.maximum(0.0, np.maximum(bound[rows], other))
         slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
     @cached_property
+    def _measured(self) -> bool:
+        return any(part.reads for part in self.layout.actuators)
+
+    @property
     def unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: with what doubt
-        costs, or of the smooth shape that stands for a measured table."""
-        measured = any(part.reads for part in self.layout.actuators)
-        return measured or self.compiled.doubt is not None
+        costs."""
+        return self.compiled.doubt is not None
 
     def forces(
         self, targets: Array, policy: Policy | None, inner: Array | None = None, previous: Array | None = None

@@ -50,7 +50,7 @@ class DualRobot:
         """Largest force (n, 2) [N] along each direction."""
         self._gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
         self._gain = self._gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
-        tables = _Tables(_HEAD + _EACH * len(responses))
+        tables = _Tables(HEAD + EACH * len(responses))
         self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
         self._tables = tables.numbers
         self._span(np.array([each.rows for each in responses]), effectiveness)
@@ -102,7 +102,7 @@ class DualRobot:
         basis[:, :rank] = self.basis
         matrix = np.zeros((len(self.responses), 2, 6))
         matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
-        length = _HEAD + _EACH * len(self.responses) + len(self._tables)
+        length = HEAD + EACH * len(self.responses) + len(self._tables)
         head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
         parts: list[Any] = [head, self.scale, self.yardstick, self.beside, basis.ravel()]
         for i, (each, form, places) in enumerate(zip(self.responses, self._forms, self._places, strict=True)):
@@ -121,7 +121,8 @@ class DualRobot:
         return np.hstack([*parts, self._tables]).astype(np.float64)
 
 
-_HEAD, _EACH = 59, 67
+HEAD, EACH = 59, 67
+"""Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 _KINDS = "thruster", "pod", "fin", "foil"
 
 

@@ -1,0 +1,92 @@
+/* Asks what the library was asked at the export and compares the answers; `robot_selftest` says how many differ.
+   On a board call it from your own program, as examples/blink.ino does; define FL_NO_MAIN there. */
+#include "robot.h"
+#include "inner.h"
+#include <stdio.h>
+
+typedef struct { /* question and answer of the library: wrench that it gives, its error on the yardstick, commands */
+  int policy;
+  fl_real wrench[6], aim[6], error, command[ROBOT_COUNT][3];
+  const fl_real (*previous)[3];
+} sample;
+#include "samples.h"
+
+#ifdef FL_SINGLE
+#define APART 1e-4
+#define SHORT 1e-2 /* of a ray that only just leaves what can be reached */
+#else
+#define APART 1e-5
+#define SHORT APART
+#endif
+
+static fl_work work;
+static fl_answer out;
+static int most_steps, others;
+
+static double apart(const fl_real *a, const fl_real *b) {
+  double sum = 0;
+  for (int k = 0; k < 6; k++) {
+    double way = ((double)a[k] - (double)b[k]) / (double)((const fl_head *)robot)->yard[k];
+    sum += way * way;
+  }
+  return sqrt(sum);
+}
+
+static int outside(void) {
+  for (int i = 0; i < ROBOT_COUNT; i++)
+    for (int k = 0; k < 3; k++)
+      if (!(out.command[i][k] >= ROBOT_ACTUATOR(i)->lower[k] && out.command[i][k] <= ROBOT_ACTUATOR(i)->upper[k])) return 1;
+  return 0;
+}
+
+/* Whether a command is another one: where several cost the same, or none pushes, the choice is rounding's. */
+static int is_other(const sample *s) {
+  for (int i = 0; i < ROBOT_COUNT; i++)
+    for (int k = 0; k < 3; k++) {
+      const fl_actuator *a = ROBOT_ACTUATOR(i);
+      fl_real way = out.command[i][k] - s->command[i][k], width = a->upper[k] - a->lower[k];
+      if (a->turns != 0 && width > 6) way = wrapped(way);
+      if (FABS(way) > width / 20) return 1;
+    }
+  return 0;
+}
+
+/* Whether an answer is as near as the library's: `direction` gives one point, `closest` a distance; commands of a
+   tick, on which the library spends more steps, may be a little farther. */
+static int differs(const sample *s) {
+  fl_policy policy = {s->policy, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  fl_question question = {{0}, &policy, 0, s->previous ? s->previous[0] : 0};
+  for (int k = 0; k < 6; k++) question.wrench[k] = s->wrench[k];
+  if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
+  if (out.steps > most_steps) most_steps = out.steps;
+  double away = s->policy == FL_DIRECTION ? apart(out.aim, s->aim)
+                                          : apart(out.aim, s->wrench) - apart(s->aim, s->wrench);
+
+  static const fl_real rest[6];
+  double size = fmax(1, apart(s->wrench, rest)), most = s->previous ? 1e-3 + 1.02 * (double)s->error : 0;
+  int on_ray = s->policy == FL_DIRECTION;
+  fl_real command[ROBOT_COUNT][3]; /* the library's, by the laws of this block */
+  memcpy(command, s->command, sizeof command);
+  all_limits(robot, &work.box);
+  if (!(refine(robot, &work, &work.box, s->previous ? s->wrench : s->aim, command, 0) <= s->error + size * APART)) return 1;
+  others += is_other(s);
+  return !(away <= size * (on_ray ? SHORT : APART) && (double)out.error <= size * APART + most);
+}
+
+int robot_selftest(void) {
+  fl_question broken = {{NAN}, 0, 0, 0};
+  int wrong = others = 0;
+  if (fl_check(robot, robot_length) || fl_prepare(robot, &work)) return SAMPLES;
+  for (int k = 0; k < SAMPLES; k++) wrong += differs(samples + k);
+  if (8 * others > SAMPLES) wrong += others;
+  return wrong + (fl_answer_one(robot, &work, &broken, &out) != FL_BAD_ARGUMENT);
+}
+
+#if !defined(ARDUINO) && !defined(FL_NO_MAIN)
+int main(void) {
+  int wrong = robot_selftest();
+  printf("%d of %d answers differ from the library's; bytes: block %d, work %d, answer %d; Newton's steps: %d at most\n",
+         wrong, SAMPLES, robot_length * (int)sizeof *robot, (int)sizeof work, (int)sizeof out, most_steps);
+  return wrong != 0;
+}
+#endif

@@ -1,0 +1,150 @@
+"""The robot's allocator as C99: the core, the robot's block of numbers, a self-test and examples.
+
+`robot.c` holds two blocks: the library's own in double precision, and one with few knots in its tables where
+FL_SINGLE is defined. The same layout gives the same bytes.
+"""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import finlab
+from finlab import core
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.dual.method import Dual, DualSettings
+from finlab.allocation.policy import Policy
+from finlab.arrays import Array
+from finlab.axes import AXES
+from finlab.deploy.thin_block import tables_of, thinned
+from finlab.errors import AllocationError, DataError
+from finlab.layout import Layout
+from finlab.physics.objective import yardstick
+from finlab.whole_file import write_together
+
+SAMPLES = 24
+"""Questions of a self-test."""
+ALONE = 3e-7
+"""Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
+TEMPLATES = Path(__file__).with_name("c_files")
+
+
+def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
+    """Returns files by name: the core, `robot.c` and `robot.h`, a self-test of so many questions, a README,
+    CMakeLists.txt, examples. Raises AllocationError: the actuators act on each other, which the core does not
+    know; DataError: a force table cannot be read."""
+    if layout.interaction is not None:
+        raise AllocationError(
+            f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it without"
+        )
+    method = Dual(layout, DualSettings(), yardstick(layout), None)
+    block = method.compiled.robot.block
+    thin = thinned(block)
+    sources = {path.name: path.read_text("utf-8") for path in Path(core.__path__[0]).glob("*.[ch]")}
+    sources["core.h"] = _sized(sources["core.h"], layout.n)
+    sources["robot.c"] = _robot(block, thin)
+    sources["robot.h"] = _header(layout)
+    sources["samples.h"] = _samples(layout, method, samples)
+    for path in TEMPLATES.rglob("*.*"):
+        sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
+    law = max(sum(len(table) for _, table in row.values()) for row in tables_of(thin))
+    sources["README.md"] = sources["README.md"].format(
+        name=layout.name,
+        version=finlab.__version__,
+        count=layout.n,
+        samples=samples,
+        double=8 * len(block),
+        single=4 * len(thin),
+        law=4 * law,
+        axes=", ".join(np.array(AXES)[layout.commanded]),
+    )
+    return {name: text.encode() for name, text in sorted(sources.items())}
+
+
+def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
+    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it
+    has other C files, or cannot be written."""
+    path = Path(folder)
+    try:
+        path.joinpath("examples").mkdir(parents=True, exist_ok=True)
+        if strangers := sorted(own.name for own in path.glob("*.[ch]") if own.name not in files):
+            raise DataError(
+                f"{path}: holds {strangers[0]!r:.60}, which is none of an export; name an empty folder"
+            )
+        write_together({path / name: content for name, content in files.items()}, DataError, str(path))
+    except OSError as error:
+        raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
+
+
+def _sized(header: str, count: int) -> str:
+    """core.h for so many actuators, in single precision where a processor has no unit for double."""
+    header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
+    single = "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define FL_SINGLE\n#endif\n\n"
+    return header.replace("#ifdef FL_SINGLE\n", f"{single}#ifdef FL_SINGLE\n", 1)
+
+
+def _row(values: Array) -> str:
+    return "{" + ", ".join(repr(float(one)) for one in values) + "}"
+
+
+def _rows(values: Array) -> str:
+    return "{" + ", ".join(map(_row, values)) + "}"
+
+
+def _block(values: Array, number: Any) -> str:
+    texts = [str(number(value)) for value in values]
+    return ",\n".join("  " + ", ".join(texts[k : k + 8]) for k in range(0, len(texts), 8))
+
+
+def _robot(block: Array, thin: Array) -> str:
+    return (
+        '#include "robot.h"\n\n/* See `layout of a block` in core.h. */\nconst fl_real robot[] = {\n'
+        f"#ifdef FL_SINGLE\n{_block(thin, np.float32)}\n#else\n{_block(block, float)}\n#endif\n}};\n"
+        "const int robot_length = sizeof robot / sizeof *robot;\n"
+    )
+
+
+def _header(layout: Layout) -> str:
+    about = [
+        f"  ROBOT_{re.sub(r'[^A-Z0-9]', '_', name.upper())}, /* {name}: "
+        + ", ".join(f"{label} [{unit}]" for label, unit in part.NUMBERS)
+        + " */"
+        for name, part in zip(layout.names, layout.actuators, strict=True)
+    ]
+    return (
+        '#ifndef ROBOT_H\n#define ROBOT_H\n#include "core.h"\n\nextern const fl_real robot[];\n'
+        "extern const int robot_length;\n"
+        "int robot_selftest(void); /* how many answers differ from the library's */\n"
+        "#define ROBOT_ACTUATOR(i) ((const fl_actuator *)((const fl_head *)robot + 1) + (i))\n\n"
+        "enum { /* rows of commands, and their numbers */\n"
+        + "\n".join(about)
+        + "\n  ROBOT_COUNT\n};\n#endif\n"
+    )
+
+
+def _samples(layout: Layout, method: Dual, count: int) -> str:
+    """Wrenches within reach, out of it by the policies that single precision serves, and ticks; where the
+    core leaves nothing to the library, which has more ways around gaps."""
+    allocator, rng = Allocator(layout), np.random.default_rng(0)
+    before: list[str] = []
+    rows: list[str] = []
+    for k in range(8 * count):
+        if len(rows) == count:
+            break
+        policy, far = (("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("closest", 0.6))[k % 4]
+        wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
+        tick = allocator.allocate(0.5 * wrench).command if k % 4 == 3 else None
+        answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
+        given = answer.wrench * layout.commanded
+        alone = method.forces(far * wrench[None], Policy(policy)).found.command
+        if tick is None and method.error(alone, given[None])[0] > ALONE:
+            continue
+        error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
+        if tick is not None:
+            before.append(f"static const fl_real {last}[][3] = {_rows(tick)};")
+        answered = f"{_row(given)}, {error!r}, {_rows(answer.command)}"
+        rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {answered}, {last}}},")
+    about = f"enum {{ SAMPLES = {len(rows)} }};"
+    return "\n".join([*before, "static const sample samples[] = {", *rows, "};", about, ""])

@@ -1,0 +1,163 @@
+"""`finlab export ROBOT --c DIR`: the self-test here, under sanitizers, on aarch64 and on a Cortex-M7."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from finlab.cli import main
+from finlab.deploy.c_sources import c_sources, write_c
+from finlab.deploy.thin_block import tables_of, thinned
+from finlab.layout import load_layout
+from tests.any_robot import AnyRobot
+from tests.mixed_robots import KINDS, load, random_robot, with_rates
+from tests.terminal import refused
+
+HERE = Path(__file__).parent
+SINGLE = "", "-DFL_SINGLE"
+SANITIZED = "-g -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
+M7 = "-mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard -ffp-contract=off -fno-math-errno"
+SMALL = f"arm-none-eabi-gcc -std=c99 -Os {M7} -ffunction-sections -fdata-sections"
+
+
+@cache
+def _exported(name: str, samples: int) -> TemporaryDirectory[str]:
+    folder = TemporaryDirectory()
+    write_c(c_sources(load_layout(name), samples), folder.name)
+    return folder
+
+
+def exported(name: str, samples: int = 24) -> Path:
+    return Path(_exported(name, samples).name)
+
+
+def ran(command: str, folder: Path, code: int = 0) -> str:
+    """What a command prints, run in a folder; `*` stands for names. Compilers that are missing fail the test:
+    `make test` installs them."""
+    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, timeout=7200)
+    assert done.returncode == code, f"{command}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+    return done.stdout
+
+
+@pytest.mark.parametrize(("compiler", "single"), [("gcc", ""), ("clang", "-DFL_SINGLE")])
+@pytest.mark.parametrize("name", ["A", "octo", "torpedo", "bluerov2"])
+def test_self_test_holds(name: str, compiler: str, single: str, tmp_path: Path) -> None:
+    words = (
+        f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    )
+    assert ran(words, exported(name, 200)).startswith("0 of 200 ")
+
+
+@pytest.mark.parametrize("single", SINGLE)
+def test_self_test_fails_where_a_number_is_another(single: str, tmp_path: Path) -> None:
+    other, part = (
+        shutil.copytree(exported("octo", 200), tmp_path / "c"),
+        "FL_SINGLE\n" if single else "#else\n",
+    )
+    first, rest = (other / "robot.c").read_text().split(part)
+    numbers = rest.split(", ")  # the sixth is the scale of forces along x
+    numbers[5] = str(1.5 * float(numbers[5]))
+    (other / "robot.c").write_text(part.join([first, ", ".join(numbers)]))
+    ran(f"gcc -std=c99 {single} *.c -lm && ./a.out", other, 1)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_self_test_holds_on_any_robot(kind: str, seed: int, tmp_path: Path) -> None:
+    write_c(c_sources(load(with_rates(random_robot(kind, 4, 60 + seed))), 40), tmp_path)
+    for single in SINGLE:
+        ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", tmp_path)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("name", ["A", "bluerov2_heavy", "turtle_hybrid", "mixed", "restricted"])
+def test_single_precision_answers_as_double_does(name: str, tmp_path: Path) -> None:
+    words = f"gcc -std=c99 -O2 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    assert ran(words, exported(name, 2000)).startswith("0 of 2000 ")
+
+
+@pytest.mark.parametrize(
+    ("name", "cases", "compiler"),
+    [
+        ("catamaran", 12000, "gcc"),
+        ("torpedo", 6000, "clang -DFL_SINGLE"),
+        ("octo", 1000, "clang"),
+        ("mixed", 1000, "gcc -DFL_SINGLE"),
+    ],
+)
+def test_fuzzer_finds_nothing(name: str, cases: int, compiler: str, tmp_path: Path) -> None:
+    cases = int(os.environ.get("FUZZ", cases))  # `make fuzz`: a million in all
+    words = f"{compiler} -std=c99 -O1 {SANITIZED} -DFL_NO_MAIN -DFL_PARTS=20 -I. *.c {HERE / 'fuzz.c'}"
+    said = ran(f"{words} -lm -o {tmp_path}/it && {tmp_path}/it {cases}", exported(name))
+    blocks, refused_ones, answers = map(int, re.findall(r"\d+", said)[:3])
+    assert blocks == cases and 0 < refused_ones < blocks / 2 and answers > blocks
+
+
+def test_on_aarch64(tmp_path: Path) -> None:
+    for single in SINGLE:
+        words = f"aarch64-linux-gnu-gcc -std=c99 -O2 -static {single} *.c -lm -o {tmp_path / 'it'}"
+        assert ran(f"{words} && qemu-aarch64 {tmp_path / 'it'}", exported("octo", 200)).startswith("0 of ")
+
+
+def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
+    folder, elf = exported("octo", 2000), tmp_path / "it.elf"
+    board = f"-Wl,--gc-sections -nostartfiles -T{HERE / 'board.ld'} {HERE / 'board.c'}"
+    ran(f"{SMALL} -DFL_NO_MAIN {board} -I. *.c -lm -o {elf}", folder)
+    machine = (
+        "-M mps2-an500 -display none -monitor none -serial stdio -semihosting-config enable=on,target=native"
+    )
+    said = ran(f"qemu-system-arm {machine} -kernel {elf}", folder)
+    found = {name: int(value) for name, value in re.findall(r"(\w+) (\d+)", said)}
+    assert found["differ"] == 0 and found["static"] + found["stack"] <= 16_000
+    core = [path.stem for path in folder.glob("*.c") if path.stem not in ("robot", "selftest")]
+    for name in core:
+        ran(f"{SMALL} -c {name}.c -o {tmp_path / name}.o", folder)
+    sizes = ran(f"arm-none-eabi-size {shlex.join(f'{name}.o' for name in core)}", tmp_path)
+    assert 16_000 < sum(int(line.split()[0]) for line in sizes.splitlines()[1:]) <= 32_000
+
+
+@pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
+def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
+    robot = AnyRobot().method(load_layout(name)).compiled.robot
+    thin = thinned(robot.block)
+    assert max(sum(len(table) for _, table in row.values()) for row in tables_of(thin)) * 4 <= 4096
+    assert len(thinned(thin)) <= len(thin)
+    limits = [block[59:][: 67 * int(block[3])].reshape(-1, 67)[:, 48:54] for block in (robot.block, thin)]
+    np.testing.assert_allclose(limits[1], limits[0], rtol=2e-7)
+
+
+def test_cmake_builds_and_the_examples_compile(tmp_path: Path) -> None:
+    folder = exported("bluerov2_heavy")
+    ran(
+        f"cmake -S . -B {tmp_path}/b -DFL_SINGLE=ON && cmake --build {tmp_path}/b && {tmp_path}/b/selftest",
+        folder,
+    )
+    stubs = f'#include "{HERE / "stubs.hpp"}"\n'
+    for example in sorted((folder / "examples").iterdir()):
+        text = example.read_text()
+        for header in re.findall(r"#include <(.*[/].*)>", text):
+            (tmp_path / header).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / header).write_text(stubs)
+        (tmp_path / "one.cpp").write_text(f'{stubs}#include "{example}"\n')
+        ran(
+            f"g++ -std=c++17 -Wall -Wextra -Werror -I{tmp_path} -I. -c {tmp_path}/one.cpp -o {tmp_path}/o",
+            folder,
+        )
+
+
+def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):  # what an export left is replaced
+        assert main(["export", "A", "--lost", "front_left", "--c", str(tmp_path / "c")]) == 0
+    assert "3 fins" in capsys.readouterr().out
+    assert "front_left" not in (tmp_path / "c" / "robot.h").read_text()
+    (tmp_path / "c" / "mine.c").write_text("")
+    assert "'mine.c'" in refused(["export", "A", "--c", str(tmp_path / "c")])
+    assert "no C sources" in refused(["export", "A", "--method", "mdn", "--c", str(tmp_path / "d")])
