@@ -247,7 +247,7 @@ class Allocator:
         target = np.where(counts, values, 0.0)
         if reference is not None:
             later = np.where(counts, check_wrenches(reference, single=False, name="reference"), 0.0)
-            target = method.in_time(target, np.nan_to_num(later))
+            target = method.in_time(target, np.where(np.isnan(later), 0.0, later))
         solution = question.solution(method, target[None], previous=before, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(

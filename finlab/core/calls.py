@@ -2,6 +2,7 @@
 
 import ctypes
 from functools import lru_cache
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,8 +94,11 @@ class Core:
         core = library()
         self._core, self._block, self._count = core, block, count
         self._work = ctypes.create_string_buffer(core.fl_sizes(3))
-        self._question, self._answer = _Question(), _Answer()
+        self._question, self._answer, self._lock = _Question(), _Answer(), Lock()
         self._to, self._from = ctypes.addressof(self._question), ctypes.addressof(self._answer)
+        self._wrench = np.frombuffer(memoryview(self._question), np.float64, 6)
+        self._inner, self._previous = np.zeros(6), np.zeros((count, 3))
+        self._inner_at, self._previous_at = self._inner.ctypes.data, self._previous.ctypes.data
         self._force, self._command = (
             np.ctypeslib.as_array(getattr(self._answer, name))[: width * count].reshape(1, count, width)
             for name, width in (("force", 2), ("command", 3))
@@ -115,25 +119,30 @@ class Core:
         """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method
         ended (`MET` ...). It begins at prices `inner`, where there are some; commands may follow `previous`
         ones (n, 3); a policy is served where the wrench is out of reach, or `always`."""
-        question, answer = self._question, self._answer
-        question.wrench[:] = wrench.tolist()
-        question.policy = None if policy is None else ctypes.addressof(_policy(policy, always))
-        known = [None if values is None else np.ascontiguousarray(values) for values in (inner, previous)]
-        question.inner, question.previous = (None if own is None else own.ctypes.data for own in known)
-        if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
-            raise ValueError(f"the core got {CODES[error]}")
-        vectors = self._vectors.copy()
-        found = Found(
-            self._force.copy(),
-            vectors[None, :6],
-            vectors[None, 12:18],
-            vectors[18:19],
-            np.array([answer.within != 0]),
-            self._command.copy(),
-            answer.dragged != 0,
-            answer.ended != 0,
-        )
-        return found, vectors[6:12], answer.status
+        with self._lock:  # question and answer lie in one place for all threads
+            question, answer = self._question, self._answer
+            self._wrench[:] = wrench
+            served = None if policy is None else _policy(policy, always)  # kept until the call ends
+            question.policy = None if served is None else ctypes.addressof(served)
+            question.inner = question.previous = None
+            if inner is not None:
+                self._inner[:], question.inner = inner, self._inner_at
+            if previous is not None:
+                self._previous[:], question.previous = previous, self._previous_at
+            if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
+                raise ValueError(f"the core got {CODES[error]}")
+            vectors = self._vectors.copy()
+            found = Found(
+                self._force.copy(),
+                vectors[None, :6],
+                vectors[None, 12:18],
+                vectors[18:19],
+                np.array([answer.within != 0]),
+                self._command.copy(),
+                answer.dragged != 0,
+                answer.ended != 0,
+            )
+            return found, vectors[6:12], answer.status
 
     def many(self, wrenches: Array, policy: Any) -> Found:
         """The answers to wrenches (N, 6)."""
@@ -141,7 +150,8 @@ class Core:
         force, value = np.empty((count, self._count, 2)), np.empty(count)
         price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
         command = np.empty((count, self._count, 3))
-        own = None if policy is None else ctypes.addressof(_policy(policy, False))
+        served = None if policy is None else _policy(policy, False)  # kept until the call ends
+        own = None if served is None else ctypes.addressof(served)
         outs = [values.ctypes.data for values in (force, price, aim, value, command, within)]
         error = self._core.fl_answer_many(self._at, self._area, wrenches.ctypes.data, count, own, *outs)
         if error > 0:

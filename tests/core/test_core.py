@@ -1,5 +1,7 @@
 """The core as Python calls it: sizes of both languages, damaged blocks, arguments, one answer and many."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,10 @@ def test_one_and_many_are_the_same(kind: str) -> None:
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.aim[row], single.aim[0])
         assert many.within[row] == single.within[0]
+
+
+def test_threads_share_one_robot(heavy: Core) -> None:
+    targets = np.random.default_rng(0).normal(0.0, 20.0, (2000, 6))
+    with ThreadPoolExecutor(4) as pool:
+        shared = list(pool.map(lambda target: heavy.one(target, Policy())[0].aim[0], targets))
+    np.testing.assert_array_equal(shared, heavy.many(targets, Policy()).aim)

@@ -120,7 +120,9 @@ class Dual(Method):
     @staticmethod
     def _padded(inner: Array) -> Array:
         """Prices (r,) in the basis as the core takes them (6,)."""
-        return np.pad(inner, (0, 6 - len(inner)))
+        padded = np.zeros(6)
+        padded[: len(inner)] = inner
+        return padded
 
     def linear(self, model: Linear) -> Self:
         """The same on a linear model; its search, in commands, is that of the whole one."""
