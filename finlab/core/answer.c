@@ -78,13 +78,8 @@ int fl_check(const real *block, int length) {
 }
 
 static int in_range(const real *block, const real *wrench, const real *target) {
-  const fl_head *h = HEAD(block);
-  real rest = 0, size = 0;
-  for (int k = 0; k < 6; k++) {
-    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
-    rest += left * left, size += scaled * scaled;
-  }
-  return SQRT(rest) <= NEARLY * (R(1e-3) + SQRT(size));
+  real size, rest = beside_range(block, wrench, target, &size);
+  return rest <= NEARLY * (R(1e-3) + size);
 }
 
 /* Limits of the forces for now: those of commands in a box, or all. */
@@ -236,15 +231,11 @@ void fl_first(const real *block, fl_work *work, const real *wrench, real *inner)
 /* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 3): prices along its force, ahead and
    in reverse, and what the force is worth, less its power [W]. */
 void fl_worth(const real *block, fl_work *work, const real *price, int count, real *worth) {
-  const fl_head *h = HEAD(block);
-  int r = RANGE(block);
   for (int k = 0; k < count; k++, price += 6) {
-    real inner[6] = {0};
-    for (int j = 0; j < r; j++)
-      for (int m = 0; m < 6; m++) inner[j] += h->basis[m][j] * h->scale[m] * price[m];
+    real inner[6], own[2];
+    price_in_basis(block, price, inner);
     for (int i = 0; i < COUNT(block); i++, worth += 3) {
-      const fl_actuator *a = ACTUATOR(block, i);
-      real own[2] = {dot(a->matrix[0], inner, r), a->rows == 2 ? dot(a->matrix[1], inner, r) : 0};
+      own_price(block, i, inner, own);
       along_of(block, i, work->set + i, own, worth, worth + 1);
       worth[2] = reply_of(block, i, work->set + i, own).conjugate;
     }

@@ -2,9 +2,11 @@
    commands of the tick before. */
 #include "inner.h"
 
-static int angle_of(const fl_actuator *a) { return a->form == FL_FIN ? 2 : a->form == FL_POD ? 0 : -1; }
+/* Which number of a command is an angle; -1 where none is. */
+int angle_of(const fl_actuator *a) { return a->form == FL_FIN ? 2 : a->form == FL_POD ? 0 : -1; }
 
-static real within(const fl_box *box, int i, int k, int angle, real value) {
+/* A number of a command in a box, an angle wrapped first. */
+real held_in(const fl_box *box, int i, int k, int angle, real value) {
   real low = box->low[i][k], high = box->high[i][k], middle = (low + high) / 2;
   if (k == angle) value = middle + wrapped(value - middle);
   return CLIP(value, low, high);
@@ -153,7 +155,7 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
       for (int c = 0; c < 3; c++) {
         real own = leaves(block, box, i, c, command[i], step[i][c]) ? 0 : step[i][c];
         own = command[i][c] + own * (box->high[i][c] - box->low[i][c]);
-        tried[i][c] = within(box, i, c, angle_of(ACTUATOR(block, i)), own);
+        tried[i][c] = held_in(box, i, c, angle_of(ACTUATOR(block, i)), own);
       }
     new_cost = miss_of(block, aim, tried, other);
     if ((moved = new_cost <= cost)) {

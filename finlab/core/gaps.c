@@ -7,9 +7,6 @@
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
 
 
-static int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
-static real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
-
 /* How far a plane's force is from all that it can give forward and in reverse. */
 static real between_ways(const fl_actuator *a, const fl_set *set, const real *force, real size) {
   real angle = ATAN2(force[1], force[0]) - set->middle, ends[2] = {set->high, set->reverse};
@@ -41,7 +38,8 @@ static real gap_of(const real *block, int i, const fl_set *set, const real *forc
     if (set->low > HOLLOW * largest && size < R(0.98) * set->low) amount += 1 - size / set->low;
   }
   if (set->reverse > 0) {
-    real own[2] = {dot(a->matrix[0], price, RANGE(block)), dot(a->matrix[1], price, RANGE(block))}, off;
+    real own[2], off;
+    own_price(block, i, price, own);
     int ahead = undecided(block, i, set, own, &off);
     return off > CLOSE * a->most[0] ? PI : ahead ? amount : 0;
   }
@@ -86,7 +84,7 @@ int nearer_side(const real *block, int i, const fl_set *set, const real *force) 
 /* Cuts a set by a force and keeps one side: of an arc the half towards smaller (-1) or larger angles (1), of a
    full circle that away from or around the force, of either way reverse or the rest, of a dead band rest or
    what is beyond, of drag less or more. */
-void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
+static void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (is_plane(a)) {
     if (set->reverse > 0) {

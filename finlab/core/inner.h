@@ -62,9 +62,18 @@ static inline real dot(const real *a, const real *b, int n) {
   for (int i = 0; i < n; i++) sum += a[i] * b[i];
   return sum;
 }
+static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
 real wrapped(real angle);
 int cholesky(real a[6][6], real factor[6][6], int n);
 void solve(real factor[6][6], const real *right, real *x, int n);
+
+/* Whether an actuator pushes in a plane. */
+static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
+/* Prices of an actuator's rows at prices of the wrench in the basis. */
+static inline void own_price(const real *block, int i, const real *price, real *own) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  own[0] = dot(a->matrix[0], price, RANGE(block)), own[1] = a->rows == 2 ? dot(a->matrix[1], price, RANGE(block)) : 0;
+}
 
 /* table.c */
 typedef struct { real force, slope, conjugate; } along;
@@ -95,6 +104,8 @@ void look(const real *block, const fl_work *work, const real *target, const real
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
 void to_basis(const real *block, const real *wrench, real *target);
+void price_in_basis(const real *block, const real *price, real *inner);
+real beside_range(const real *block, const real *wrench, const real *target, real *size);
 void wrench_of(const real *block, real force[][2], real *wrench);
 
 /* gaps.c */
@@ -102,7 +113,6 @@ void wrench_of(const real *block, real force[][2], real *wrench);
 #define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
 int worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
 int nearer_side(const real *block, int i, const fl_set *set, const real *force);
-void narrow(const real *block, int i, fl_set *set, const real *force, int side);
 int may_have_gaps(const real *block, const fl_work *work, real force[][2]);
 fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force);
 void take_side(const real *block, fl_work *work, const fl_node *node, int side);
@@ -126,6 +136,8 @@ void reach_of(const real *block, int i, const fl_box *box, real *limits);
 void all_limits(const real *block, fl_box *box);
 void tick_limits(const real *block, const real *previous, fl_box *box);
 int may_follow(const real *block, const real *previous, real command[][3]);
+int angle_of(const fl_actuator *a);
+real held_in(const fl_box *box, int i, int k, int angle, real value);
 void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
 void into_limits(const real *block, real command[][3]);

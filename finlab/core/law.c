@@ -132,13 +132,6 @@ static real on_curve(const real *curve, real value) {
   return row[2 * low + 1] + t * (row[2 * high + 1] - row[2 * low + 1]);
 }
 
-static real in_limits(const fl_box *box, int i, int k, real value) { return CLIP(value, box->low[i][k], box->high[i][k]); }
-
-static real angle_in(const fl_box *box, int i, int k, real angle) {
-  real middle = (box->low[i][k] + box->high[i][k]) / 2;
-  return in_limits(box, i, k, middle + wrapped(angle - middle));
-}
-
 /* Amplitude and frequency of a fin for a share of its largest force, from a table at shares (j / k)^2. */
 static void beat_at(const real *beat, real share, real *command) {
   int cells = (int)beat[0];
@@ -151,16 +144,16 @@ static void beat_at(const real *beat, real share, real *command) {
 static void fin_command(const real *block, int i, const fl_box *box, const real *force, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
-  real angle = ATAN2(force[1], force[0]), size = SQRT(force[0] * force[0] + force[1] * force[1]), wanted = size;
+  real angle = ATAN2(force[1], force[0]), size = size_of(force), wanted = size;
   real given[3];
   for (int k = 0; k < 2; k++) { /* what the tables leave undone is asked for on top */
     real most = a->high * (gauge ? gauge_at(gauge, angle) : 1), lean = gauge ? lean_at(gauge, angle) : a->lean;
     beat_at(block + (int)a->beat, wanted / most, command);
-    command[0] = in_limits(box, i, 0, command[0]), command[1] = in_limits(box, i, 1, command[1]);
-    command[2] = angle_in(box, i, 2, angle - lean);
+    command[2] = angle - lean;
+    for (int c = 0; c < 3; c++) command[c] = held_in(box, i, c, 2, command[c]);
     if (k == 1) break;
     force_of(block, i, command, given, 0);
-    wanted = MAX(wanted + size - SQRT(given[1] * given[1] + given[2] * given[2]), 0);
+    wanted = MAX(wanted + size - size_of(given + 1), 0);
     if (gauge && size > 0) angle += wrapped(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));
   }
 }
@@ -168,10 +161,10 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
 /* Angle and force of a pod, one way or the other: what comes nearer to a force, or the cheaper one. */
 static void pod_command(const real *block, int i, const fl_box *box, const real *force, real before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real size = SQRT(force[0] * force[0] + force[1] * force[1]);
+  real size = size_of(force);
   real angle = size > 0 ? ATAN2(force[1], force[0]) : before, way[2][2], missing[2], watts[2];
   for (int k = 0; k < 2; k++) {
-    way[k][0] = angle_in(box, i, 0, angle + k * PI), way[k][1] = in_limits(box, i, 1, k ? -size : size);
+    way[k][0] = held_in(box, i, 0, 0, angle + k * PI), way[k][1] = held_in(box, i, 1, 0, k ? -size : size);
     real dx = way[k][1] * COS(way[k][0]) - size * COS(angle), dy = way[k][1] * SIN(way[k][0]) - size * SIN(angle);
     missing[k] = SQRT(dx * dx + dy * dy), watts[k] = cost_at(block, i, way[k][1]);
   }
@@ -192,7 +185,7 @@ void command_for(const real *block, int i, const fl_box *box, const real *force,
   else {
     real angle = a->form == FL_FOIL ? on_curve(block + (int)a->beat, FABS(force[0]) / a->pressure) : 0;
     command[0] = a->form == FL_FOIL ? (force[0] < 0 ? -angle : angle) + a->turned : a->sign * force[0];
-    command[0] = in_limits(box, i, 0, command[0]), command[1] = command[2] = 0;
+    command[0] = held_in(box, i, 0, -1, command[0]), command[1] = command[2] = 0;
   }
 }
 
@@ -205,7 +198,7 @@ void reach_of(const real *block, int i, const fl_box *box, real *limits) {
     limits[2] = limits[3] = 0;
     return;
   }
-  int angle = a->form == FL_FIN ? 2 : 0;
+  int angle = MAX(angle_of(a), 0);
   real half = (high[angle] - low[angle]) / 2, best = 0;
   limits[2] = (low[angle] + high[angle]) / 2, limits[3] = half >= PI - NOTHING ? PI : half;
   limits[0] = low[1], limits[1] = high[1];
@@ -218,7 +211,7 @@ void reach_of(const real *block, int i, const fl_box *box, real *limits) {
     else
       command[0] = low[0] + (real)(j % 5) / 4 * (high[0] - low[0]), command[1] = low[1] + (real)(j / 5) / 4 * (high[1] - low[1]);
     force_of(block, i, command, force, 0);
-    real size = a->form == FL_FOIL ? force[0] : SQRT(force[1] * force[1] + force[2] * force[2]);
+    real size = a->form == FL_FOIL ? force[0] : size_of(force + 1);
     if (size > limits[1]) best = ATAN2(force[2], force[1]);
     limits[0] = MIN(limits[0], size), limits[1] = MAX(limits[1], size);
   }

@@ -19,7 +19,8 @@ static void farthest(const real *block, const fl_work *work, const real *weight,
     for (int k = 0; k < 6; k++) price[j] += h->basis[k][j] * h->scale[k] * weight[k] * normal[k];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real own[2] = {dot(a->matrix[0], price, r), a->rows == 2 ? dot(a->matrix[1], price, r) : 0};
+    real own[2];
+    own_price(block, i, price, own);
     farthest_of(block, i, work->set + i, own, force[i]);
     for (int q = 0; q < (int)a->rows; q++)
       for (int j = 0; j < r; j++) given[j] += force[i][q] * a->matrix[q][j];

@@ -18,6 +18,27 @@ void to_basis(const real *block, const real *wrench, real *target) {
   }
 }
 
+/* Prices in the basis of those of the wrench. */
+void price_in_basis(const real *block, const real *price, real *inner) {
+  const fl_head *h = HEAD(block);
+  for (int j = 0; j < RANGE(block); j++) {
+    inner[j] = 0;
+    for (int k = 0; k < 6; k++) inner[j] += h->basis[k][j] * h->scale[k] * price[k];
+  }
+}
+
+/* How much of a scaled wrench lies beside the range, and its size. */
+real beside_range(const real *block, const real *wrench, const real *target, real *size) {
+  const fl_head *h = HEAD(block);
+  real rest = 0, all = 0;
+  for (int k = 0; k < 6; k++) {
+    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
+    rest += left * left, all += scaled * scaled;
+  }
+  *size = SQRT(all);
+  return SQRT(rest);
+}
+
 /* The wrench [N, N m] of forces. */
 void wrench_of(const real *block, real force[][2], real *wrench) {
   const fl_head *h = HEAD(block);
@@ -74,7 +95,8 @@ void look(const real *block, const fl_work *work, const real *target, const real
     const fl_actuator *a = ACTUATOR(block, i);
     const real *first = a->matrix[0], *second = a->matrix[1];
     int two = a->rows == 2;
-    real own[2] = {dot(first, price, r), two ? dot(second, price, r) : 0};
+    real own[2];
+    own_price(block, i, price, own);
     reply o = reply_of(block, i, work->set + i, own);
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
     conjugate += o.conjugate;
@@ -102,22 +124,23 @@ void look(const real *block, const fl_work *work, const real *target, const real
 /* Prices to begin with: those that come nearest to the marginal costs of the forces of quadratic costs,
    weighted by what costs ~ T^1.5 would answer. */
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge) {
-  int n = COUNT(block), r = RANGE(block), drags = 0;
+  int n = COUNT(block), r = RANGE(block);
   real even[6], h[6][6] = {{0}}, right[6] = {0}, factor[6][6], trace = 0;
   solve((real(*)[6])work->factor, target, even, r);
   *ridge = NEARLY;
   for (int i = 0; i < n; i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    int two = a->rows == 2, plane = two && a->speed == 0;
-    real force[2] = {a->gain[0] * dot(a->matrix[0], even, r), two ? a->gain[1] * dot(a->matrix[1], even, r) : 0};
-    real size = plane ? SQRT(force[0] * force[0] + force[1] * force[1]) : FABS(force[0]);
+    int plane = is_plane(a);
+    real force[2];
+    own_price(block, i, even, force);
+    for (int q = 0; q < 2; q++) force[q] *= a->gain[q];
+    real size = plane ? size_of(force) : FABS(force[0]);
     real share = size / a->most[0], within = MIN(size, R(0.97) * a->most[0]), paid, per;
     if (share > R(0.8)) *ridge = SATURATED;
     per = a->share / a->worth;
     marginal(block + (int)(!plane && force[0] < 0 && a->back > 0 ? a->back : a->ahead), within / a->share, &paid);
     paid /= per * MAX(size, TINY);
     real weight = SQRT(CLIP(share, R(1e-4), 1));
-    drags |= a->speed > 0;
     for (int q = 0; q < (int)a->rows; q++) {
       add_square(h, a->matrix[q], weight * a->gain[q], r);
       for (int j = 0; j < r; j++) right[j] += a->matrix[q][j] * weight * a->gain[q] * paid * force[q];
@@ -127,7 +150,7 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
   for (int j = 0; j < r; j++) h[j][j] += NOTHING * trace;
   /* Where lift drags, forces of quadratic costs say little of its marginal cost. */
   if (cholesky(h, factor, r))
-    solve(factor, drags ? target : right, price, r);
+    solve(factor, work->drags ? target : right, price, r);
   else
     for (int j = 0; j < r; j++) price[j] = target[j] / trace;
 }

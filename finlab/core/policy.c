@@ -25,15 +25,12 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
 
 static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], ray[6], rest = 0, size = 0;
+  real target[6], weight[6], ray[6], size, rest;
   to_basis(block, wrench, target);
-  for (int k = 0; k < 6; k++) {
-    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
-    rest += left * left, size += scaled * scaled;
-    weight[k] = 1 / h->yard[k];
-  }
+  rest = beside_range(block, wrench, target, &size);
+  for (int k = 0; k < 6; k++) weight[k] = 1 / h->yard[k];
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
-    ray[k] = rest <= NEARLY * NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
+    ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
   farthest_along(block, work, weight, ray, &work->mixture);
   mixed_force(block, &work->mixture, force);
 }
@@ -119,11 +116,10 @@ static int is_less(const real *a, const real *b) {
 /* Forces in the middle of all sets. */
 static void middle_of(const real *block, const fl_work *work, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
     const fl_set *s = work->set + i;
     real size = (s->low + s->high) / 2;
     force[i][0] = size, force[i][1] = drag_of(block, i, size);
-    if (a->rows == 2 && a->speed == 0) {
+    if (is_plane(ACTUATOR(block, i))) {
       if (!(s->half < PI) || s->reverse > 0) size = 0;
       force[i][0] = size * s->cos_middle, force[i][1] = size * s->sin_middle;
     }

@@ -28,20 +28,17 @@ real cost_at(const real *block, int i, real force) {
 
 /* What follows from the limits of a set. */
 void set_up(const real *block, int i, fl_set *set) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  int plane = a->rows == 2 && a->speed == 0;
   real least = NOTHING * set->high_cost / MAX(set->high, TINY);
   if (set->low > 0) least = MAX(least, (set->half <= NARROW ? CLOSE : TURNING) * set->low_cost / set->low);
   set->gap2 = least * least + TINY;
   set->cos_middle = COS(set->middle), set->sin_middle = SIN(set->middle);
   set->cos_half = COS(set->half), set->sin_half = SIN(set->half);
-  set->forked = plane && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
+  set->forked = is_plane(ACTUATOR(block, i)) && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
 }
 
 /* A set between two forces [N], of planes below 0 against their direction, in an arc [rad]. */
 void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  int plane = a->rows == 2 && a->speed == 0, back = plane && low < 0;
+  int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
   set->flipped = back && high <= 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
@@ -54,9 +51,8 @@ void limit(const real *block, int i, fl_set *set, real low, real high, real midd
 
 /* A set of one force and nothing else. */
 void freeze(const real *block, int i, fl_set *set, const real *force) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  int plane = a->rows == 2 && a->speed == 0;
-  real size = plane ? SQRT(force[0] * force[0] + force[1] * force[1]) : force[0];
+  int plane = is_plane(ACTUATOR(block, i));
+  real size = plane ? size_of(force) : force[0];
   real within = CLIP(size, set->low, set->high);
   set->low_cost = set->high_cost = cost_at(block, i, set->flipped ? -within : within);
   set->low = set->high = size;

@@ -223,7 +223,7 @@ class Dual(Method):
             each = [self._with_drag(one, policy, inner, previous) for one in targets]
             return each[0] if len(each) == 1 else _joined(each)
         if len(targets) == 1:
-            return Forces(*core.one(targets[0], policy, inner, previous)[:2])
+            return Forces(core.one(targets[0], policy, inner, previous)[0])
         return Forces(core.many(targets, policy))
 
     def _with_drag(
@@ -232,7 +232,7 @@ class Dual(Method):
         """The same for one wrench (6,) where foils drag, and a command: what the dual leaves to the laws."""
         robot, core = self.compiled.robot, self.compiled.robot.core
         if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
-            return Forces(*core.one(wrench, policy, previous=previous)[:2])
+            return Forces(core.one(wrench, policy, previous=previous)[0])
         found, prices, status = core.one(wrench, None, inner)
         # With doubt the dual takes it for drag, and proves nothing.
         sure = status == MET and not found.dragged and self.compiled.doubt is None
@@ -257,7 +257,7 @@ class Dual(Method):
         # What the tables prove leaves out what foils do beyond them.
         price = robot.price(prices)[None]
         known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
-        return Forces(known, prices, command)
+        return Forces(known, command)
 
     def _near(
         self, wrench: Array, force: Array, starts: Array, prices: Array, status: int
@@ -307,7 +307,7 @@ class Dual(Method):
         if not len(rough):
             return command
         if previous is not None:
-            return self._follow(found, forces.inner, previous)
+            return self._follow(found, previous)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
         for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
             ends = refine(self.search.problem, found.aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
@@ -321,10 +321,10 @@ class Dual(Method):
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
-    def _follow(self, found: Found, inner: Array | None, previous: Array) -> Array:
+    def _follow(self, found: Found, previous: Array) -> Array:
         """Steps by the laws on a command of a tick, in the box of what may follow the previous one (n, 3)."""
         if self.rates.allow(previous, found.command[0]):
-            free = self.exact(Forces(found._replace(command=found.command.copy()), inner))
+            free = self.exact(Forces(found._replace(command=found.command.copy())))
             if self.rates.allow(previous, free[0]):
                 return free
         box = self.rates.box(previous)
@@ -349,4 +349,4 @@ def _joined(each: Sequence[Forces]) -> Forces:
     rows: Any = list(zip(*(one.found for one in each), strict=True))
     columns: Any = [np.concatenate(parts) for parts in rows[:-2]] + [any(flags) for flags in rows[-2:]]
     commands: Any = [one.command for one in each]
-    return Forces(Found(*columns), None, None if commands[0] is None else np.concatenate(commands))
+    return Forces(Found(*columns), None if commands[0] is None else np.concatenate(commands))

@@ -42,14 +42,14 @@ class DualRobot:
         ]
         self.speed = np.array(speeds)
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
-        sizes, self._gain = np.abs(self.ends).max(axis=1), np.zeros((len(responses), 2))
+        sizes = np.abs(self.ends).max(axis=1)
         drag = np.array([self._drag(i, size) for i, size in enumerate(sizes)])
         second = np.where(self.lines, drag, sizes)
         self._sizes = np.stack([sizes, second], axis=1)
         self.most = self._sizes + 1e-12
         """Largest force (n, 2) [N] along each direction."""
-        self._gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
-        self._gain = self._gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
+        gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
+        self._gain = gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
         tables = _Tables(HEAD + EACH * len(responses))
         self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
         self._tables = tables.numbers

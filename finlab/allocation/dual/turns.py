@@ -39,8 +39,6 @@ class Forces(NamedTuple):
 
     found: Found
     """Forces, prices and wrenches."""
-    inner: Array | None = None
-    """Prices (r,) of a single target in the robot's basis [W]."""
     command: Array | None = None
     """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
 
