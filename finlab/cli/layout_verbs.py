@@ -58,12 +58,11 @@ def show(
         lost: name of an actuator that does not work.
     """
     from finlab.analysis import score_card
-    from finlab.cli.layout_text import layout_text, score_card_text
 
     shared_options.check_json_file(json)
     robot, gone = shared_options.open_robot(layout, lost)
     card = score_card(robot, gone, flow)
-    shared_options.put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
+    shared_options.put_json(card.to_dict(), json, f"{robot}\n\n{card}")
 
 
 @verbs.command(name="convert")
