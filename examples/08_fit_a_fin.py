@@ -27,7 +27,7 @@ print("\n".join(summary(fit)))
 # %%
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 axes.plot(data.command[:, 0] * data.command[:, 1], np.linalg.norm(data.force, axis=1), ".")
-axes.set(xlabel="A f [rad/s]", ylabel="force [N]")
+axes.set(xlabel="A f [rad Hz]", ylabel="force [N]")
 plt.show()
 
 # %%
