@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.arrays import Array
 
@@ -61,16 +60,13 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
     return figure
 
 
-def body_picture(
-    title: str, unit: str, corners: Array, faces: NDArray[np.intp], outline: NDArray[np.intp]
-) -> Figure:
-    """Returns a polytope of corners (V, 3) in a unit, by its triangles (F, 3) or, flat, its outline, with
-    the origin."""
-    figure, axes = _space(title, np.concatenate([corners, np.zeros((1, 3))]), unit)
+def body_picture(title: str, unit: str, body: Any) -> Figure:
+    """Returns an attainable set (a `finlab.analysis.AttainableSet`) about the origin."""
+    figure, axes = _space(title, np.concatenate([body.vertices, np.zeros((1, 3))]), unit)
+    corners, faces = body.vertices.T, body.faces
     if len(faces):
-        axes.plot_trisurf(*corners.T, triangles=faces, color=COLORS[0], alpha=0.35, edgecolor="0.4", lw=0.3)
-    around = np.append(outline, outline[:1])
-    axes.plot(*corners[around].T, color=COLORS[0])
+        axes.plot_trisurf(*corners, triangles=faces, color=COLORS[0], alpha=0.35, edgecolor="0.4", lw=0.3)
+    axes.plot(*corners[:, np.append(body.outline, body.outline[:1])], color=COLORS[0])
     axes.plot(*np.zeros((3, 1)), "k+")
     return figure
 
@@ -93,11 +89,9 @@ def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) ->
 
     figure = Figure(figsize=(6.0, 2.4), layout="constrained")
     axes: Any = figure.subplots(1, 2)
-    for side, unit, k in zip(axes, ("N", "N m"), (0, 3), strict=True):
-        rows = slice(k, k + 3)
-        side.barh(
-            names[rows], np.nan_to_num(high - low)[rows], left=np.nan_to_num(low)[rows], color=COLORS[0]
-        )
+    width, low = np.nan_to_num(high - low), np.nan_to_num(low)
+    for side, unit, rows in zip(axes, ("N", "N m"), (slice(3), slice(3, 6)), strict=True):
+        side.barh(names[rows], width[rows], left=low[rows], color=COLORS[0])
         side.axvline(0.0, color="k", linewidth=0.8)
         side.set(xlabel=unit)
         side.invert_yaxis()

@@ -58,8 +58,7 @@ class AttainableSet:
         rows = [(axis, f"{low + 0.0:.3f}", f"{high + 0.0:.3f}") for axis, low, high in ends]
         table = Table(("axis", f"least [{unit}]", f"most [{unit}]"), rows, (True, False, False))
         title = f"attainable {self.kind}, all else at zero"
-        shown = title, unit, self.vertices, self.faces, self.outline
-        return html([title, table], lambda: body_picture(*shown))
+        return html([title, table], lambda: body_picture(title, unit, self))
 
 
 def _hull_of(points: Array, kind: Kind) -> AttainableSet:
