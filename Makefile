@@ -9,7 +9,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels wheel-check clean
+.PHONY: schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -25,7 +25,7 @@ help:
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make format       let ruff correct what it can"
 	@echo "make checkpoint   train the network that is shipped (hours)"
-	@echo "make wheels       build the wheels of Linux, macOS and Windows"
+	@echo "make wheels       build the wheels of Linux, macOS and Windows; make sdist the sources"
 	@echo "make wheel-check  build them, install this machine's in an empty environment of each Python here and try it"
 
 setup: $(STAMP) $(LIBRARY)
@@ -95,6 +95,9 @@ wheels: setup
 	$(BIN)/pip install --disable-pip-version-check -q -c constraints.txt ziglang
 	for target in $$($(BIN)/python -c 'import hatch_build as b; print(*b.TARGETS)'); do \
 	    FINLAB_TARGET=$$target $(WHEEL) || exit 1; done
+
+sdist: setup
+	$(BIN)/python -m hatchling build -t sdist -d dist
 
 wheel-check: wheel wheels
 	tools/wheel-check

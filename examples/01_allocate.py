@@ -1,26 +1,22 @@
-"""The main job: a layout and a target wrench in, one command per fin out.
+# %% [markdown]
+# # A wrench becomes commands
+# A layout and a target wrench go in, one command per fin comes out: half amplitude, frequency and zero
+# direction. You will see layout A of the paper, its four commands, and their power beside the least that any
+# answer takes.
 
-You will see amplitude, frequency and zero direction of layout A's four fins, the wrench they deliver, and
-their power beside the least that any answer takes.
-"""
-
-import numpy as np
-
+# %%
 import finlab
 
+layout = finlab.load_layout("A")
+layout
 
-def main() -> None:
-    layout = finlab.load_layout("A")
-    allocator = finlab.Allocator(layout)
-    result = allocator.allocate([1, 0, 0.5, 0, 0, 0.1], seed=0)
+# %% [markdown]
+# The wrench is `[Fx, Fy, Fz, Tx, Ty, Tz]` in N and N m: x forward, y left, z up.
 
-    print("fin           A [rad]  f [Hz]  zero direction [deg]")
-    for name, (amplitude, frequency, direction) in zip(result.names, result.command, strict=True):
-        print(f"{name:<12}  {amplitude:7.3f}  {frequency:6.3f}  {np.degrees(direction):20.1f}")
-    print("delivered [N, N m]:", np.round(result.wrench, 3) + 0.0)
-    print(f"error {result.err_norm:.1e} of what the robot can push")
-    print(f"power {result.power:.4f} W, no answer takes less than {result.bound:.4f} W")
-
-
-if __name__ == "__main__":
-    main()
+# %%
+result = finlab.Allocator(layout).allocate([1, 0, 0.5, 0, 0, 0.1], seed=0)
+for name, row in zip(result.names, result.command, strict=True):
+    print(f"{name:<12}", row.round(3))
+print(f"error {result.err_norm:.1e} of what the robot can push")
+print(f"power {result.power:.4f} W, no answer takes less than {result.bound:.4f} W")
+result

@@ -1,37 +1,45 @@
-"""Describe a robot in Python, save it as a layout file, and allocate with it at once.
+# %% [markdown]
+# # A robot of your own
+# Describe a robot in Python, see what it can push, save it as a layout file, and allocate with it. You will
+# see a robot of three thrusters, the file, the forces that it can give, and one answer.
 
-You will see the layout file of a robot with three fins and the command of each fin that lifts it.
-"""
-
-import math
+# %%
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import finlab
-from finlab.layout import Fin, Layout, Limits
+from finlab.analysis import attainable_set
 
+T200 = finlab.PowerLaw(forward=0.997, reverse=1.449)  # watts = 0.997 F^1.5
+FORCE = (-39.91, 51.44)  # N
+layout = finlab.Layout(
+    name="tripod",
+    description="Two thrusters ahead, one up at the stern.",
+    actuators=(
+        finlab.Thruster("port", (0.0, 0.2, 0.0), (1.0, 0.0, 0.0), FORCE, T200),
+        finlab.Thruster("starboard", (0.0, -0.2, 0.0), (1.0, 0.0, 0.0), FORCE, T200),
+        finlab.Thruster("lift", (-0.25, 0.0, 0.0), (0.0, 0.0, 1.0), FORCE, T200),
+    ),
+    axes=("Fx", "Fz", "Tz"),  # what it commands; the other axes take what comes
+)
+layout
 
-def main() -> None:
-    strong = Limits(amplitude=(0.05, 0.8), frequency=(0.1, 2.5))
-    layout = Layout(
-        name="tripod",
-        description="One fin at the stern, two at the sides.",
-        actuators=(
-            Fin("stern", (-0.25, 0.0, 0.0), math.pi, strong),
-            Fin("port", (0.1, 0.2, 0.0), math.radians(90)),
-            Fin("starboard", (0.1, -0.2, 0.0), math.radians(-90)),
-        ),
-    )
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "tripod.yaml"
-        finlab.save_layout(layout, path)
-        print(path.read_text())
-        layout = finlab.load_layout(path)
-    result = finlab.Allocator(layout).allocate([0, 0, 2, 0, 0, 0])
-    for name, (amplitude, frequency, direction) in zip(result.names, result.command, strict=True):
-        print(f"{name:<10} A {amplitude:.3f} rad  f {frequency:.3f} Hz  zero direction {direction:+.3f} rad")
-    print(f"heave delivered: {result.wrench[2]:.3f} N of 2 N")
+# %%
+with TemporaryDirectory() as folder:
+    path = Path(folder) / "tripod.yaml"
+    finlab.save_layout(layout, path)
+    print(path.read_text())
+    layout = finlab.load_layout(path)
 
+# %% [markdown]
+# Forces that it can give with no torque about z: a sheet in surge and heave. Of two thrusters side by side
+# both have to push alike.
 
-if __name__ == "__main__":
-    main()
+# %%
+attainable_set(layout, "force")
+
+# %%
+result = finlab.Allocator(layout).allocate([20, 0, 10, 0, 0, 2])
+for name, row in zip(result.names, result.command, strict=True):
+    print(f"{name:<10} {row[0]:6.2f} N")
+result

@@ -1,8 +1,9 @@
-"""From a swim to a robot that is not built as drawn: where its fins and its centre of gravity really are.
+# %% [markdown]
+# # A robot that is not built as drawn
+# From a swim to where its fins and its centre of gravity really are. You will see what the fit is worth, and
+# what an allocation for the drawn robot and for the fitted one gives.
 
-You will see what the fit is worth, and what an allocation for the drawn robot and for the fitted one gives.
-"""
-
+# %%
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,22 +15,23 @@ from finlab.fit.robot.swim import read_swim
 from finlab.sim import perturbed
 from finlab.sim.excite import excitation
 
-TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+drawn = finlab.load_layout("A")
+built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))
 
+# %% [markdown]
+# A real robot writes a CSV file in place of this simulated log; `10_swim_from_rosbag.py` makes one of a
+# rosbag.
 
-def main() -> None:
-    drawn = finlab.load_layout("A")
-    built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))
-    with TemporaryDirectory() as folder:
-        log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
-        # A real robot writes a CSV file instead; 10_swim_from_rosbag.py makes one of a rosbag.
-        excitation(drawn, 60.0, truth=built).run().save(log)
-        fit = fit_robot(drawn, [read_swim(log, drawn)], other_law=False)
-        print("\n".join(summary(fit)))
-        fitted = write_robot(fit, path)
-    for robot in (drawn, fitted):
-        print(finlab.Allocator(robot).allocate(TARGET))
+# %%
+with TemporaryDirectory() as folder:
+    log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
+    excitation(drawn, 60.0, truth=built).run().save(log)
+    fit = fit_robot(drawn, [read_swim(log, drawn)], other_law=False)
+    print("\n".join(summary(fit)))
+    fitted = write_robot(fit, path)
 
-
-if __name__ == "__main__":
-    main()
+# %%
+for robot in (drawn, fitted):
+    result = finlab.Allocator(robot).allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
+    print(result)
+result

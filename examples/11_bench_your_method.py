@@ -1,15 +1,17 @@
-"""Your own method on the benchmark: SciPy's least squares on the commands, in fifteen lines.
+# %% [markdown]
+# # Your own method on the benchmark
+# SciPy's least squares on the commands, in fifteen lines. You will see how much it delivers of what is asked
+# of robots that it has never seen, at what power and in what time, beside method `dual`.
 
-You will see how much of what is asked of the paper's layout A it delivers, at what power and in what time.
-"""
-
+# %%
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares
 
 import finlab
-from finlab.cli import main
+from finlab.evaluation.experiments.wrench import experiment
 from finlab.physics import plant_of
 
 
@@ -29,5 +31,16 @@ def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> n
     return np.reshape(found, (len(targets), -1, 3))
 
 
+# %% [markdown]
+# At the command line: `finlab bench 11_bench_your_method.py:allocate dual --quick`.
+
+# %%
 if __name__ == "__main__":
-    main(["bench", f"{__file__}:allocate", "--quick", "--splits", "id"])
+    methods = ("__main__:allocate", "dual")
+    rows = experiment.rows(split=("id",), layouts=5, targets=4, methods=methods, seed=8821)
+    for row in rows:
+        print("{method}: mean err_norm {err_norm_mean:.1e}, {power_mean:.2f} W".format(**row))
+    figure, axes = plt.subplots(figsize=(6, 2), layout="constrained")
+    axes.barh(methods, [row["solve_ms_p50"] for row in rows])
+    axes.set(xscale="log", xlabel="median time of a target [ms]")
+    plt.show()

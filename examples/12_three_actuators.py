@@ -1,9 +1,11 @@
-"""What method `dual` does, in thirty lines of numpy: two thrusters at the stern and an azimuth at the bow.
+# %% [markdown]
+# # What method `dual` does, in thirty lines of numpy
+# The robot has two thrusters at the stern and an azimuth at the bow. Each actuator answers a price [W/N] with
+# the force that is worth most; Newton finds the right prices. You will see the forces of a surge, a sway and
+# a yaw at the least watts, and what another answer could save.
 
-You will see the forces of a surge, a sway and a yaw at the least watts, and what another answer could save.
-Each actuator answers a price [W/N] with the force that is worth most; Newton finds the right prices.
-"""
-
+# %%
+import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -49,11 +51,16 @@ def solve(wrench: ArrayLike) -> tuple[Array, float, float]:
     return force, watts, best
 
 
-def main() -> None:
-    force, watts, bound = solve([40.0, 12.0, -5.0])
-    print("thrusters [N]:", np.round(force[:2], 3), " azimuth (x, y) [N]:", np.round(force[2:], 3))
-    print(f"{watts:.4f} W, of which any other answer saves at most {max(watts - bound, 0.0):.1e} W")
+# %%
+force, watts, bound = solve([40.0, 12.0, -5.0])
+print("thrusters [N]:", np.round(force[:2], 3), " azimuth (x, y) [N]:", np.round(force[2:], 3))
+print(f"{watts:.4f} W, of which any other answer saves at most {max(watts - bound, 0.0):.1e} W")
 
-
-if __name__ == "__main__":
-    main()
+# %%
+sway = np.linspace(-30.0, 30.0, 61)
+forces = np.array([solve([40.0, each, 0.0])[0] for each in sway])
+figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
+axes.plot(sway, forces, label=("left", "right", "azimuth, x", "azimuth, y"))
+axes.set(xlabel="sway asked for beside 40 N of surge [N]", ylabel="force [N]")
+axes.legend()
+plt.show()

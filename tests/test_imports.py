@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LEVELS = (
     ("errors", "arrays"),
     ("axes", "core", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
-    ("bundle_files", "executor"),
+    ("bundle_files", "executor", "display"),
     ("actuators",),
     ("interaction",),
     ("layout",),

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -11,9 +10,11 @@ from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
-from finlab.allocation.report import allocation_text, doubts, next_measurement
+from finlab.allocation.report import allocation_blocks, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData, Rows
 from finlab.arrays import Array
+from finlab.display import blocks
+from finlab.display.pictures import robot_picture
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
 from finlab.physics.expected_miss import expected_miss
@@ -290,11 +291,10 @@ class Allocation(Answer[float]):
         )
 
     def __str__(self) -> str:
-        return allocation_text(self)
+        return blocks.text(allocation_blocks(self))
 
     def _repr_html_(self) -> str:
-        """The table of the command line, for notebooks."""
-        return f"<pre>{escape(str(self))}</pre>"
+        return blocks.html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
 
 
 def chunks(n: int) -> Iterator[slice]:

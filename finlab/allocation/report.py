@@ -10,7 +10,7 @@ from msgspec import to_builtins
 
 from finlab.arrays import Array
 from finlab.axes import AXES
-from finlab.command_end import aligned
+from finlab.display.blocks import Block, Table
 from finlab.layout import Layout
 from finlab.physics.expected_miss import sources_of_miss
 from finlab.physics.plant import Plant
@@ -59,8 +59,8 @@ def _short_of(result: Allocation) -> str:
     return f"{AXES[worst]} is off by {abs(result.unallocated[worst]):.3g} {unit}"
 
 
-def allocation_text(result: Allocation) -> str:
-    """The answer as plain text."""
+def allocation_blocks(result: Allocation) -> list[Block]:
+    """The answer as two tables and sentences."""
     rows: list[tuple[str, ...]] = []
     for part, force in zip(result.layout.actuators, result.forces, strict=True):
         command = result.commands[part.name]
@@ -74,9 +74,9 @@ def allocation_text(result: Allocation) -> str:
         (name, *("free" if math.isnan(v) else f"{round(v, 3) + 0.0:.3f}" for v in row))
         for name, row in wrenches.items()
     ]
-    actuators = aligned(COLUMNS, rows, (True, True, True, False))
-    wrench = aligned(WRENCH_COLUMNS, table, (True, *(False,) * 6))
-    return "\n".join([actuators, "", wrench, "", summary(result), *remarks(result)])
+    actuators = Table(COLUMNS, rows, (True, True, True, False))
+    wrench = Table(WRENCH_COLUMNS, table, (True, *(False,) * 6))
+    return [actuators, wrench, "\n".join([summary(result), *remarks(result)])]
 
 
 def doubts(result: Allocation) -> tuple[str, ...]:

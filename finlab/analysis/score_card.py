@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
+from finlab.analysis.card_text import card_blocks
 from finlab.arrays import Array
+from finlab.display import blocks
+from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
@@ -55,6 +58,14 @@ class ScoreCard:
         """The loss that leaves least: the lowest rank, then the weakest direction, then the smallest
         shares."""
         return min(self.losses, key=_left, default=None)
+
+    def __str__(self) -> str:
+        return blocks.text(card_blocks(self))
+
+    def _repr_html_(self) -> str:
+        low, high = -np.array(self.authority.most_negative), np.array(self.authority.largest)
+        title = f"{self.layout}: largest wrench along each axis"
+        return blocks.html(card_blocks(self), lambda: ranges_picture(title, AXES, low, high))
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the card as numbers, strings, lists and None, for JSON."""

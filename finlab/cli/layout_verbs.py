@@ -14,6 +14,7 @@ from finlab.cli import shared_options
 from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
+    from finlab.analysis import Improvement
     from finlab.exchange import Exchange
     from finlab.layout import Layout
 
@@ -58,12 +59,11 @@ def show(
         lost: name of an actuator that does not work.
     """
     from finlab.analysis import score_card
-    from finlab.cli.layout_text import layout_text, score_card_text
 
     shared_options.check_json_file(json)
     robot, gone = shared_options.open_robot(layout, lost)
     card = score_card(robot, gone, flow)
-    shared_options.put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
+    shared_options.put_json(card.to_dict(), json, f"{robot}\n\n{card}")
 
 
 @verbs.command(name="convert")
@@ -147,7 +147,6 @@ def optimize(
 
     from finlab.analysis import Bounds, Progress, optimize_layout
     from finlab.analysis.goals import MISSION
-    from finlab.cli.layout_text import improvement_text
     from finlab.executor import on_cluster
     from finlab.layout import save_layout
 
@@ -181,4 +180,20 @@ def optimize(
             progress=report,
         )
     save_layout(improvement.layout, output)
-    print(improvement_text(improvement, output))
+    print(_improvement_text(improvement, output))
+
+
+def _improvement_text(improvement: Improvement, output: Path) -> str:
+    """Where the actuators went, the card after it, and where the layout was written."""
+    lines = [f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}", ""]
+    for name in improvement.moved:
+        part = improvement.layout.part(name)
+        place = "  ".join(f"{value:6.3f}" for value in part.position)
+        lines.append(f"{name:<16}  {place} m  {part.direction_words}")
+    lines += ["", str(improvement.card_after), ""]
+    lines.append(
+        f"{output}: written."
+        if improvement.improved
+        else f"{output}: written unchanged, nothing better was found."
+    )
+    return "\n".join(lines)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.assets import install
+from finlab.display.pictures import COLORS, drawn
 from finlab.errors import DataError
 from finlab.evaluation.document import Row
 from finlab.sim.log import RunLog
@@ -42,9 +42,7 @@ def check_picture(path: Path | None) -> None:
 
 def write_picture(picture: Callable[[Sequence[Row]], Figure], rows: Sequence[Row], path: Path) -> None:
     """Draw rows into a file, in the format of its ending; see `check_picture`."""
-    content = io.BytesIO()
-    picture(rows).savefig(content, format=path.suffix[1:].lower(), dpi=DPI, bbox_inches="tight")
-    write_whole(path, content.getvalue(), DataError)
+    write_whole(path, drawn(lambda: picture(rows), path.suffix[1:].lower(), DPI), DataError)
 
 
 def temperature_picture(rows: Sequence[Row]) -> Figure:
@@ -128,8 +126,6 @@ def _axes(title: str) -> tuple[Figure, Axes]:
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Okabe and Ito's, which most people can tell apart."""
 STYLES = ("-", "--", ":", "-.")
 """Of the lines of one color, which the first word of a name has."""
 

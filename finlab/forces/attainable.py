@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
+from finlab.display.blocks import Table, html
+from finlab.display.pictures import body_picture
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.forces.reach import UNPROVEN, largest
 from finlab.layout import Layout
@@ -49,6 +51,14 @@ class AttainableSet:
     """How far out (N,) those planes are."""
     gap: float = np.inf
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
+
+    def _repr_html_(self) -> str:
+        unit = "N" if self.kind == "force" else "N m"
+        ends = zip("xyz", self.vertices.min(axis=0), self.vertices.max(axis=0), strict=True)
+        rows = [(axis, f"{low + 0.0:.3f}", f"{high + 0.0:.3f}") for axis, low, high in ends]
+        table = Table(("axis", f"least [{unit}]", f"most [{unit}]"), rows, (True, False, False))
+        title = f"attainable {self.kind}, all else at zero"
+        return html([title, table], lambda: body_picture(title, unit, self))
 
 
 def _hull_of(points: Array, kind: Kind) -> AttainableSet:

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
+from finlab.axes import AXES
+from finlab.display.blocks import Table, html
+from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.forces.interior_point import minimize
 from finlab.layout import Layout
@@ -113,6 +116,11 @@ class Ranges(NamedTuple):
     """Smallest values (6,) [N, N m]."""
     high: Array
     """Largest values (6,) [N, N m]."""
+
+    def _repr_html_(self) -> str:
+        rows = [(axis, f"{a:.3f}", f"{b:.3f}") for axis, a, b in zip(AXES, *self, strict=True)]
+        table = Table(("axis", "least [N, N m]", "most [N, N m]"), rows, (True, False, False))
+        return html([table], lambda: ranges_picture("each axis, the others held", AXES, *self))
 
 
 def axis_ranges(

@@ -15,11 +15,14 @@ from finlab.actuators.fin.fin import Fin
 from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.arrays import Array
 from finlab.axes import AXES, CommandedAxes, mask_of
+from finlab.display import blocks
+from finlab.display.pictures import robot_picture
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Name
 from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
 from finlab.layout.body import Body
+from finlab.layout.layout_text import layout_blocks
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -71,6 +74,12 @@ class Layout(Checked):
     def __getstate__(self) -> dict[str, Any]:
         # Hashes of text differ between processes, and arrays are quickly made again.
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    def __str__(self) -> str:
+        return blocks.text(layout_blocks(self))
+
+    def _repr_html_(self) -> str:
+        return blocks.html(layout_blocks(self), lambda: robot_picture(self))
 
     @cached_property
     def fins(self) -> tuple[Fin, ...]:

@@ -10,6 +10,8 @@ import numpy as np
 from msgspec import defstruct
 
 from finlab.arrays import AnyArray
+from finlab.display.blocks import Table, html
+from finlab.display.pictures import path_picture
 from finlab.errors import DataError
 from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.files.schema import checked
@@ -122,6 +124,25 @@ class RunLog:
         """When the robot first lay on its side or stood on its end [s]; None where it never did."""
         over = np.flatnonzero(lies_over(self.quaternion))
         return float(self.time[over[0]]) if len(over) else None
+
+    def _repr_html_(self) -> str:
+        off = np.linalg.norm(self.position - self.reference, axis=1)
+        lost = {
+            f"{name} lost": self.position[np.argmin(works)]
+            for name, works in zip(self.names, self.alive.T, strict=True)
+            if not works.all()
+        }
+        rows = [
+            ("time [s]", f"{self.time[-1]:.1f}"),
+            ("off the reference, root mean square [m]", f"{np.sqrt(np.mean(off**2)):.3f}"),
+            ("off the reference, largest [m]", f"{off.max():.3f}"),
+            ("mean power with motor losses [W]", f"{self.driving_power.sum(axis=1).mean():.2f}"),
+        ]
+        title = f"{self.layout} along {self.task} by {self.method}, controller {self.controller}"
+        ends = [", ".join(lost)] if lost else []
+        ends += [] if self.capsized_s is None else [f"the robot capsized at {self.capsized_s:.1f} s"]
+        shown = title, self.reference, self.position, lost
+        return html([title, Table(("swim", ""), rows, (True, False)), *ends], lambda: path_picture(*shown))
 
     def npz(self) -> bytes:
         """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""

@@ -115,13 +115,6 @@ def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
 
 
-def test_notebooks_show_the_table_of_the_command_line(search: AnyRobot) -> None:
-    layout = load_layout("A")
-    layout = replace(layout, actuators=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
-    shown = search.allocate(layout, SURGE)._repr_html_()
-    assert shown.startswith("<pre>actuator") and "&lt;b&gt;bow&lt;/b&gt; &amp; co" in shown
-
-
 def test_another_command_is_judged_anew(search: AnyRobot) -> None:
     layout = load_layout("A")
     result = search.allocate(layout, SURGE, failed=["front_left"])

@@ -38,7 +38,7 @@ def test_check_wants_a_layout() -> None:
 def test_show_lists_fins_and_what_they_can_push(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layout", "show", "A"]) == 0
     out = capsys.readouterr().out
-    assert "front_right   fin   0.258  -0.150   0.000   shaft at -60.0 deg" in out
+    assert "front_right  fin    0.258  -0.150   0.000  shaft at -60.0 deg" in out
     assert "4 fins push in 6 of 6 independent directions." in out
 
 
@@ -60,8 +60,8 @@ def test_check_and_show_take_any_actuator(capsys: pytest.CaptureFixture[str]) ->
     assert capsys.readouterr().out == "turtle_hybrid: ok, layout turtle_hybrid with 4 fins and 2 thrusters\n"
     assert main(["layout", "show", "turtle_hybrid"]) == 0
     out = capsys.readouterr().out
-    assert "front_right       fin   0.258  -0.150   0.000   shaft at -60.0 deg  A 0.05..0.6 rad" in out
-    assert "axis (0, 0, 1)                           -39.91..51.44 N, power_law" in out
+    assert "front_right  fin        0.258  -0.150   0.000  shaft at -60.0 deg   A 0.05..0.6 rad" in out
+    assert "axis (0, 0, 1)       -39.91..51.44 N, power_law" in out
     assert main(["layout", "show", "turtle_hybrid", "--failed", "lift_left", "--json"]) == 0
     values = json.loads(capsys.readouterr().out)
     assert (values["counted"], values["failed"]) == ("4 fins and 1 thruster", ["lift_left"])

@@ -81,7 +81,7 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("finlab.cli.layout_text.layout_text", interrupted)
+    monkeypatch.setattr("finlab.analysis.score_card", interrupted)
     assert main(["layout", "show", "A"]) == 130
 
 
