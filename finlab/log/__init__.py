@@ -1,7 +1,7 @@
 """Logs of autopilots and of ROS: what a robot was asked for, what it gave, what it lost, what would have held it.
 
-    log = finlab.read_log("dive.ulg")
-    print(finlab.judge(log).sentence)
+log = finlab.read_log("dive.ulg")
+print(finlab.judge(log).sentence)
 """
 
 from finlab.log.judge import Judgement as Judgement

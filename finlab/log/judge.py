@@ -74,6 +74,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
     return Judgement(
         source=log.source,
         robot=log.robot,
+        scale=scale,
         seconds=float(span.sum()),
         asked=six(asked),
         missing=six(impulse),
@@ -122,7 +123,9 @@ def _bound(log: Log, at: Flags) -> Flags:
         return np.asarray(log.unmet.any(axis=1))
     if log.command is None:
         return np.asarray(at.any(axis=1))
-    ends = np.array([0.0 in part.force if isinstance(part, Thruster) else False for part in log.robot.actuators])
+    ends = np.array(
+        [0.0 in part.force if isinstance(part, Thruster) else False for part in log.robot.actuators]
+    )
     rests = (log.command[..., 0] == 0.0) & ends
     stopped = np.isnan(log.command).any(axis=-1)
     return np.asarray((at | rests | stopped).any(axis=1))

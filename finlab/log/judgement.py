@@ -57,6 +57,8 @@ class Judgement:
     """Name of the file."""
     robot: Layout
     """By whose laws it was judged."""
+    scale: Array
+    """The robot's yardstick (6,) [N, N m]."""
     seconds: float
     """Time that was judged [s]."""
     asked: tuple[float, ...]
@@ -111,11 +113,9 @@ class Judgement:
             where = "" if least.robot == "as it is" else ", on the improved layout,"
             return f"no policy would have held it; {least.name}{where} comes nearest and misses {amount(least.missing[i], i)}"
         where = "" if held.robot == "as it is" else " on the improved layout, and nothing on this one"
-        price = [
-            f"{amount(more, k)} of {MOTIONS[k]}"
-            for k, more in enumerate(np.subtract(held.missing, self.missing))
-            if k != i and more > 0.02 * max(self.asked[k], 1e-9)
-        ]
+        more = np.subtract(held.missing, self.missing)
+        least = 0.02 * self.missing[i] * self.scale / self.scale[i]
+        price = [f"{amount(more[k], k)} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
         return f"{held.name} would have held it{where}" + (f", for {' and '.join(price)}" if price else "")
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class Judgement:
 
 def amount(value: float, axis: int) -> str:
     """An impulse along an axis in words."""
-    return f"{three(value)} N{' m' * (axis > 2)} s"
+    return f"{three(value)} N{' m' * int(axis > 2)} s"
 
 
 def _plain(value: Any) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation.baselines.autopilots import ArduSub, Px4
 from finlab.allocation.solution import PlainData
 from finlab.arrays import Array
@@ -14,7 +15,8 @@ from finlab.axes import AXES
 from finlab.errors import DataError, LayoutError
 from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
-from finlab.log.px4_log import MAGIC, read_ulog
+from finlab.log import ardusub_log, px4_log, ros_bag
+from finlab.log.ardusub_log import FULL_US, REST_US
 from finlab.log.recorded import Event, Form, Recorded
 from finlab.physics.objective import yardstick
 
@@ -98,8 +100,12 @@ def read_log(
 
 def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
     head = b"" if place.is_dir() else read_file(place, MOST_BYTES, "a log", head=64)
-    if head.startswith(MAGIC):
-        return read_ulog(place)
+    if head.startswith(px4_log.MAGIC):
+        return px4_log.read_ulog(place)
+    if head.startswith(ardusub_log.MAGIC):
+        return ardusub_log.read_dataflash(place)
+    if place.is_dir() or place.suffix.lower() in ros_bag.ENDS:
+        return ros_bag.read_bag(place, demand, outputs)
     raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
 
 
@@ -135,7 +141,7 @@ def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: Arr
     unit = unit_of(found.form, robot) if scale is None else _scale(scale)
     time = found.demand.time if found.outputs is None else found.outputs.time
     demand = found.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
-    command = None if found.outputs is None else commands_of(found, robot, sides)
+    command = None if found.outputs is None else commands_of(found, found.outputs.values, robot, sides)
     unmet = None if found.unmet is None else found.unmet.at(time) * np.nan_to_num(np.abs(unit))
     kept = np.isfinite(demand).any(axis=1)
     notes, asks = [*found.notes], [*found.asks]
@@ -145,7 +151,9 @@ def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: Arr
         if idle.any():
             notes.append("Times at which no output moved, such as before arming, are left out.")
     else:
-        asks.append("It holds no outputs: what the autopilot gave is what its method gives, not what it sent.")
+        asks.append(
+            "It holds no outputs: what the autopilot gave is what its method gives, not what it sent."
+        )
     if not kept.any():
         raise DataError(f"{source}: holds no demand while outputs moved; there is nothing to judge")
     if len(time) > MOST_SAMPLES:
@@ -183,14 +191,26 @@ def _scale(scale: ArrayLike) -> Array:
     return values
 
 
-def commands_of(found: Recorded, robot: Layout, sides: Array) -> Array:
-    """Commands (M, n, 3) of the outputs in a log."""
-    assert found.outputs is not None
-    values = found.outputs.values[:, : robot.n]
-    if values.shape[1] < robot.n:
-        raise LayoutError(f"layout {robot.name!r:.60} has {robot.counted}, and the log {values.shape[1]} outputs")
-    command = np.zeros((len(values), robot.n, 3))
-    share = values * sides
-    command[..., 0] = np.where(share < 0.0, -share * robot.lower[:, 0], share * robot.upper[:, 0])
+def commands_of(found: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
+    """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
+    n, k = robot.n, outputs.shape[1]
+    if not found.of_shares and k == 3 * n:
+        return outputs.reshape(-1, n, 3)
+    if k < n or (k != n and found.form == "ros"):
+        thrice = "" if found.of_shares else f" or {3 * n}"
+        raise LayoutError(
+            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not {n}{thrice}"
+        )
+    robot.only("a log with one output for each actuator", "thruster")
+    values = outputs[:, :n] * sides
+    command = np.zeros((len(values), n, 3))
+    low, high = robot.lower[:, 0], robot.upper[:, 0]
+    command[..., 0] = np.where(values < 0.0, -values * low, values * high) if found.of_shares else values
+    for i, part in enumerate(robot.actuators):
+        model = getattr(part, "model", None)
+        if found.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
+            pulse, force, _ = model.columns
+            command[:, i, 0] = np.interp(REST_US + FULL_US * values[:, i], pulse, force)
+    command[..., 0] = np.clip(command[..., 0], low, high)
     command[np.isnan(values)] = np.nan
     return command

@@ -55,9 +55,9 @@ class Recorded:
     demand: Series
     """Wrenches (N, 6), x forward, y left, z up; setpoints without unit of an autopilot, of ROS [N, N m]."""
     outputs: Series | None = None
-    """Of an autopilot shares (M, n) of full output, NaN where it stops a motor; of ROS what was sent."""
-    pulses: Series | None = None
-    """Widths (M, n) of the pulses behind them [us]."""
+    """Shares (M, n) of full output, NaN where a motor is stopped; or what ROS sent."""
+    of_shares: bool = True
+    """Whether outputs are shares."""
     unmet: Series | None = None
     """What the autopilot says that it left of a demand (M, 6), in its unit."""
     layout: Layout | None = None

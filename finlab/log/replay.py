@@ -1,6 +1,6 @@
 """The demands of a log, asked again: other methods, policies and robots."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +17,9 @@ MOST, MOST_LOST = 2000, 400
 """Most demands that a replay asks, and one with an actuator lost."""
 FINEST = 0.001
 """Share of the yardstick that demands which are taken together spread over, doubled until they are few enough."""
+
+HASH = np.random.default_rng(0).integers(-(2**63), 2**63, 6, endpoint=False) | 1
+"""Factors that make one number of six, modulo 2^64."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,11 @@ def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
     those in one cell of a grid, ever wider, each as its mean over time."""
     spread, place = 0.0, np.nan_to_num(wrench / scale, nan=1e9)
     while True:
-        keys = place if spread == 0.0 else np.round(place / spread)
-        _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        cell = place.view(np.int64) if spread == 0.0 else np.round(place / spread).astype(np.int64)
+        _, first, group = np.unique(cell @ HASH, return_index=True, return_inverse=True)
         if len(first) <= most:
             break
         spread = max(2.0 * spread, FINEST)
-    group = group.ravel()
     held = np.bincount(group, span, len(first))
     sums = [np.bincount(group, span * column, len(first)) for column in np.nan_to_num(wrench).T]
     mean = np.stack(sums, axis=1) / np.maximum(held, 1e-12)[:, None]
@@ -73,7 +75,9 @@ def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
 
 def policy_words(policy: Policy) -> str:
     """A policy in words."""
-    return f"{policy.kind} {', '.join('+'.join(group) for group in policy.order)}" * (policy.kind == "priority") or policy.kind
+    if policy.kind != "priority":
+        return policy.kind
+    return f"priority {', '.join('+'.join(group) for group in policy.order)}"
 
 
 def replay(
@@ -82,7 +86,8 @@ def replay(
     """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both autopilots' methods
     where they take the robot; of a robot that is not `improved` with each actuator lost, too."""
     scale = yardstick(robot)
-    whole, rough = (demands_of(wrench, span, scale, most) for most in (MOST, MOST_LOST))
+    whole = demands_of(wrench, span, scale, MOST)
+    rough = demands_of(whole.wrench, whole.span, scale, MOST_LOST)
     asked = [("dual", policy) for policy in policies]
     asked += [(name, CLOSEST) for name in ("px4", "ardusub") if method_class(name).fits(robot)]
     made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in asked)}
