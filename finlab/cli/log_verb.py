@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli import shared_options
 
 if TYPE_CHECKING:
+    from finlab.layout import Layout
     from finlab.log import Log
 
 
@@ -25,8 +26,8 @@ def log(
     plot: Annotated[Path | None, arg(metavar="FILE", aliases=["-o"])] = None,
     json: shared_options.JsonFile = None,
 ) -> None:
-    """Say why a thruster saturated, which axis was lost, and what would have held it, from a log of PX4 (.ulg),
-    ArduSub (.bin) or ROS (a bag).
+    """Say from a log of PX4 (.ulg), ArduSub (.bin) or ROS (a bag) why a thruster saturated, which axis was
+    lost, and what would have held it.
 
     Args:
         file: log, or folder of a bag.
@@ -34,8 +35,8 @@ def log(
         scale: what a setpoint of 1 asks for on each axis [N, N m]; the autopilot's own rule by default.
         demand: topic of a bag with the wrench, where there are several.
         outputs: topic of a bag with what actuators were sent, where there are several.
-        priority: for policy priority: a group of axes with commas between, most important first; the axis that
-            lost most by default.
+        priority: for policy priority: a group of axes with commas between, most important first; the axis
+            that lost most by default.
         improve: search for a better layout and replay on it.
         save: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
@@ -59,7 +60,7 @@ def log(
     shared_options.put_json(judged.to_dict() if json else None, json, judgement_text(judged))
 
 
-def _read(file, robot, scale, demand, outputs):  # type: ignore[no-untyped-def]
+def _read(file: Path, robot: Layout | None, scale: Any, demand: str | None, outputs: str | None) -> Log:
     from finlab.log import read_log
 
     return read_log(file, robot, scale=scale, demand=demand, outputs=outputs)

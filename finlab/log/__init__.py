@@ -1,4 +1,4 @@
-"""Logs of autopilots and of ROS: what a robot was asked for, what it gave, what it lost, what would have held it.
+"""Logs of autopilots and of ROS: what a robot was asked for, gave and lost, and what would have held it.
 
 log = finlab.read_log("dive.ulg")
 print(finlab.judge(log).sentence)

@@ -1,8 +1,8 @@
-"""Logs of ArduSub (DataFlash), found by pymavlink and read as columns: demands, widths of pulses, parameters.
+"""Logs of ArduSub (DataFlash), indexed by pymavlink and read as columns: demands, pulses, parameters.
 
-Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot (RCIN, channels
-RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or less full (ArduSub,
-`AP_Motors6DOF`).
+Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot (RCIN,
+channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or less full
+(ArduSub, `AP_Motors6DOF`).
 """
 
 import io
@@ -29,7 +29,8 @@ Columns = dict[str, Any]
 
 
 def read_dataflash(path: Path) -> Recorded:
-    """Reads a log of ArduSub. Raises DataError: it is damaged, or lacks demands; ModuleNotFoundError: pymavlink."""
+    """Reads a log of ArduSub. Raises DataError: it is damaged, or lacks demands; ModuleNotFoundError: there is
+    no pymavlink."""
     tables = _tables(path, ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "MSG", "ERR"))
     if "RATE" not in tables:
         lacks = (
@@ -122,7 +123,7 @@ def _of_pilot(
     pulses = tables.get("RCIN", {}).get(f"C{channel}")
     if pulses is None:
         found.asks.append(
-            f"It holds no {stick.lower()} demand (RCIN, channel {channel}): 0 is taken; log RCIN (LOG_BITMASK)."
+            f"It holds no {stick.lower()} demand: 0 is taken; log RCIN, channel {channel} (LOG_BITMASK)."
         )
         return np.zeros(len(time))
     found.notes.append("Demands forward and lateral are the pilot's (RCIN); modes that steer them log none.")

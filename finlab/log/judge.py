@@ -36,8 +36,8 @@ Flags = NDArray[np.bool_]
 
 
 def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = True) -> Judgement:
-    """Returns what the log's robot could not, and replays its demands by other methods and policies, with each
-    actuator lost, and on an improved layout.
+    """Returns what the log's robot could not, and replays its demands by other methods and policies, with
+    each actuator lost, and on an improved layout.
 
     Args:
         log: of `read_log`.
@@ -76,14 +76,14 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         robot=log.robot,
         scale=scale,
         seconds=float(span.sum()),
-        asked=six(asked),
-        missing=six(impulse),
-        lost_s=six(span @ lost),
+        asked=six(asked, scale),
+        missing=six(impulse, scale),
+        lost_s=six(span @ lost, np.zeros(6)),
         saturated_s=float(span @ lost.any(axis=1)),
         watts=watts,
         axis=axis,
         spells=tuple(
-            _spell(log, rows, given, missing, lost, full, ended)
+            _spell(log, scale, rows, given, missing, lost, full, ended)
             for rows in sorted(told[:MOST_SPELLS], key=lambda rows: rows.start)
         ),
         n_spells=len(spells),
@@ -98,8 +98,8 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
 
 
 def _given(log: Log) -> tuple[Array, Flags, Flags, float | None]:
-    """Wrenches (N, 6) that the outputs gave, which actuators were at full thrust and which at the end of their
-    arc (N, n), and the mean power [W]."""
+    """Wrenches (N, 6) that the outputs gave, which actuators were at full thrust and which at the end of
+    their arc (N, n), and the mean power [W]."""
     robot, n = log.robot, len(log)
     if log.command is None and log.unmet is not None:
         none = np.zeros((n, robot.n), bool)
@@ -117,8 +117,8 @@ def _given(log: Log) -> tuple[Array, Flags, Flags, float | None]:
 
 
 def _bound(log: Log, at: Flags) -> Flags:
-    """Samples (N,) at which a limit kept the robot from giving more: of an actuator, of a thruster that does not
-    reverse, or, where the log has no outputs, because the autopilot says so."""
+    """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster which
+    does not reverse or was stopped, or, in a log without outputs, where the autopilot says so."""
     if log.command is None and log.unmet is not None:
         return np.asarray(log.unmet.any(axis=1))
     if log.command is None:
@@ -183,16 +183,16 @@ def _spells(log: Log, missing: Array, lost: Flags) -> Iterator[slice]:
 
 
 def _spell(
-    log: Log, rows: slice, given: Array, missing: Array, lost: Flags, full: Flags, ended: Flags
+    log: Log, scale: Array, rows: slice, given: Array, missing: Array, lost: Flags, full: Flags, ended: Flags
 ) -> Spell:
     span, some = log.span[rows], lost[rows].any(axis=1)
     return Spell(
         start=float(log.time[rows.start]),
         end=float(log.time[rows.stop - 1] + log.span[rows.stop - 1]),
         axes=tuple(axis for axis, one in zip(AXES, lost[rows].any(axis=0), strict=True) if one),
-        missing=six(span @ np.abs(missing[rows])),
-        asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum()),
-        gave=six(span @ given[rows] / span.sum()),
+        missing=six(span @ np.abs(missing[rows]), scale),
+        asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
+        gave=six(span @ given[rows] / span.sum(), scale),
         limits=limit_words(log.robot, *(flags[rows][some].any(axis=0) for flags in (full, ended))),
     )
 

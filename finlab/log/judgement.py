@@ -79,8 +79,8 @@ class Judgement:
     """How many there were."""
     replays: tuple[Replay, ...]
     held_by: Replay | None
-    """Replay on the robot as it is, or else on the improved one, that holds the axis, with least missing, then
-    least power; None where none does, or nothing was lost."""
+    """Replay on the robot as it is, or else on the improved one, that holds the axis, with least missing,
+    then least power; None where none does, or nothing was lost."""
     improved: Layout | None
     """Layout on which the hardest demands cost least; None where none was found, or asked for."""
     timeline: Timeline
@@ -94,7 +94,7 @@ class Judgement:
     def sentence(self) -> str:
         """The answer."""
         if self.axis is None:
-            return f"No axis was lost in {three(self.seconds)} s: no demand was cut while an actuator was at a limit."
+            return f"No axis was lost in {three(self.seconds)} s: no actuator at a limit cut a demand."
         i = AXES.index(self.axis)
         longest = max(self.spells, key=lambda spell: spell.end - spell.start)
         worst = max(self.spells, key=lambda spell: spell.missing[i])
@@ -111,7 +111,8 @@ class Judgement:
         if (held := self.held_by) is None:
             least = min(self.replays, key=lambda each: (each.lost is not None, each.missing[i]))
             where = "" if least.robot == "as it is" else ", on the improved layout,"
-            return f"no policy would have held it; {least.name}{where} comes nearest and misses {amount(least.missing[i], i)}"
+            misses = amount(least.missing[i], i)
+            return f"no policy would have held it; {least.name}{where} comes nearest and misses {misses}"
         where = "" if held.robot == "as it is" else " on the improved layout, and nothing on this one"
         more = np.subtract(held.missing, self.missing)
         least = 0.02 * self.missing[i] * self.scale / self.scale[i]

@@ -31,7 +31,8 @@ TOY = 6.5
 
 
 def read_ulog(path: Path) -> Recorded:
-    """Reads a log of PX4. Raises DataError: it is damaged, or lacks setpoints; ModuleNotFoundError: pyulog."""
+    """Reads a log of PX4. Raises DataError: it is damaged, or lacks setpoints; ModuleNotFoundError: there is
+    no pyulog."""
     from pyulog import ULog
 
     try:
@@ -127,6 +128,6 @@ def _geometry(found: Recorded, parameters: dict[str, Any], path: Path) -> None:
     sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(found.layout.n)]
     if set(sizes) == {TOY}:
         found.asks.append(
-            f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the robot "
-            "by --robot LAYOUT."
+            f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "
+            "robot by --robot LAYOUT."
         )

@@ -121,8 +121,8 @@ def _sides(own: Layout, robot: Layout, form: Form) -> Array:
     for part, share in zip(robot.actuators, along, strict=True):
         if abs(share) < 0.5:
             raise LayoutError(
-                f"{part.name!r:.60} of layout {robot.name!r:.60} pushes another way than the log's motor in its "
-                "place; list the actuators in the order of the motors"
+                f"{part.name!r:.60} of layout {robot.name!r:.60} pushes another way than the log's motor in "
+                "its place; list the actuators in the order of the motors"
             )
     return np.sign(along)
 

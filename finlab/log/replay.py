@@ -16,7 +16,7 @@ from finlab.physics.objective import REACHED, yardstick
 MOST, MOST_LOST = 2000, 400
 """Most demands that a replay asks, and one with an actuator lost."""
 FINEST = 0.001
-"""Share of the yardstick that demands which are taken together spread over, doubled until they are few enough."""
+"""Share of the yardstick that demands taken together spread over; doubled until these are few enough."""
 
 HASH = np.random.default_rng(0).integers(-(2**63), 2**63, 6, endpoint=False) | 1
 """Factors that make one number of six, modulo 2^64."""
@@ -83,8 +83,8 @@ def policy_words(policy: Policy) -> str:
 def replay(
     robot: Layout, wrench: Array, span: Array, policies: list[Policy], *, improved: bool = False
 ) -> Iterator[Replay]:
-    """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both autopilots' methods
-    where they take the robot; of a robot that is not `improved` with each actuator lost, too."""
+    """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both autopilots'
+    methods where they take the robot; of a robot that is not `improved` with each actuator lost, too."""
     scale = yardstick(robot)
     whole = demands_of(wrench, span, scale, MOST)
     rough = demands_of(whole.wrench, whole.span, scale, MOST_LOST)
@@ -104,12 +104,12 @@ def replay(
                 lost=lost,
                 method=name,
                 policy=policy_words(policy),
-                missing=six(missing),
+                missing=six(missing, scale),
                 watts=float(demands.span @ answer.power / demands.span.sum()),
                 saturated_s=float(demands.span[answer.err_norm > REACHED].sum()),
             )
 
 
-def six(values: Array) -> tuple[float, ...]:
-    """Plain numbers of axes (6,)."""
-    return tuple(map(float, values))
+def six(values: Array, scale: Array) -> tuple[float, ...]:
+    """Plain numbers of axes (6,); those below a millionth of a yardstick are rounding errors, and 0."""
+    return tuple(map(float, np.where(np.abs(values) < 1e-6 * scale, 0.0, values)))

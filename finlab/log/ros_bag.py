@@ -1,8 +1,8 @@
 """Bags of ROS 1 and 2, read by rosbags: a wrench that was asked for, and what actuators were sent.
 
-Wrenches are geometry_msgs/Wrench or WrenchStamped [N, N m], x forward, y left, z up, NaN for an axis that is free.
-Outputs are actuator_msgs/Actuators (`normalized`) or a Float64MultiArray: of n numbers forces of thrusters [N], of
-3 n numbers commands as the actuators' laws take them.
+Wrenches are geometry_msgs/Wrench or WrenchStamped [N, N m], x forward, y left, z up, NaN for an axis that is
+free. Outputs are actuator_msgs/Actuators (`normalized`) or a Float64MultiArray: of n numbers forces of
+thrusters [N], of 3 n numbers commands as the actuators' laws take them.
 """
 
 from collections import defaultdict
@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.log.recorded import Event, Recorded, Series
 
@@ -27,8 +26,8 @@ ENDS = (".bag", ".mcap", ".db3")
 
 
 def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
-    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it is damaged, lacks a topic,
-    or has several; ModuleNotFoundError: rosbags."""
+    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it is damaged, lacks a
+    topic, or has several; ModuleNotFoundError: there is no rosbags."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -77,7 +76,7 @@ def _topic(
     known = sorted(topic for topic, kind in kinds.items() if kind in wanted)
     if named is not None and named not in known:
         raise DataError(
-            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}, only {', '.join(known) or 'others'}"
+            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}; known: {', '.join(known) or 'none'}"
         )
     if named is None and len(known) > 1:
         raise DataError(f"{path}: has several topics for {option}: {', '.join(known)}; say --{option} TOPIC")

@@ -67,7 +67,7 @@ def _replays(judged: Judgement) -> Table:
 
 
 def picture(judged: Judgement) -> Figure:
-    """Demand and what the outputs gave over time, of each axis that was asked for, and actuators at limits."""
+    """Demand and what the outputs gave over time, of each axis asked for, and actuators at limits."""
     from matplotlib.figure import Figure
 
     line, names = judged.timeline, judged.robot.names
