@@ -119,6 +119,8 @@ def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
         return px4_log.read_ulog(place)
     if head.startswith(ardusub_log.MAGIC):
         return ardusub_log.read_dataflash(place)
+    if place.is_dir() and sum(each.stat().st_size for each in place.iterdir()) > MOST_BYTES:
+        raise DataError(f"{place}: is larger than {MOST_BYTES:,} bytes; cut it")
     if place.is_dir() or place.suffix.lower() in ros_bag.ENDS:
         return ros_bag.read_bag(place, demand, outputs)
     raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
