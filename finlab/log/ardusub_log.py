@@ -160,10 +160,9 @@ def _geometry(found: Recorded, parameters: dict[str, float], path: Path) -> None
     try:
         found.layout = read_parameters_of_ardusub("\n".join(lines), path.stem[:64] or "ardusub", exchange)
     except LayoutError as error:
-        found.asks.insert(0, f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+        found.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
         return
-    found.notes += exchange.notes
-    found.asks.insert(
-        0,
-        "A frame of ArduSub has no arms and no newtons: guesses are taken; name the robot by --robot LAYOUT.",
+    found.taken += exchange.notes
+    found.lacking.append(
+        "A frame of ArduSub has no arms and no newtons: guesses are taken; name the robot by --robot LAYOUT."
     )

@@ -83,7 +83,8 @@ def read_ulog(path: Path) -> Recorded:
 def _columns(data: dict[str, Any], fields: tuple[str, ...]) -> Array:
     """Columns of a topic; zeros for one that it lacks."""
     zero = np.zeros(len(data["timestamp"]))
-    return np.stack([np.asarray(data.get(name, zero), np.float64) for name in fields], axis=1)
+    with np.errstate(invalid="ignore"):  # numbers of a damaged file may be none
+        return np.stack([np.asarray(data.get(name, zero), np.float64) for name in fields], axis=1)
 
 
 def _bits(series: Series) -> Any:
@@ -118,12 +119,12 @@ def _geometry(found: Recorded, parameters: dict[str, Any], path: Path) -> None:
     try:
         found.layout = read_px4("\n".join(lines), path.stem[:64] or "px4", exchange)
     except LayoutError as error:
-        found.asks.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+        found.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
         return
-    found.notes += exchange.notes
+    found.taken += exchange.notes
     sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(found.layout.n)]
     if set(sizes) == {TOY}:
-        found.asks.append(
+        found.lacking.append(
             f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "
             "robot by --robot LAYOUT."
         )

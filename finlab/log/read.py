@@ -104,12 +104,12 @@ def read_log(
     layout = load_layout(robot) if isinstance(robot, str) else robot
     known = layout or found.layout
     if known is None:
-        raise DataError(f"{place}: {(found.asks or ['holds no robot; name it by --robot LAYOUT.'])[0]}")
+        raise DataError(f"{place}: {found.lacking[0]}")
     sides = np.ones(known.n)
-    if layout is not None:
-        found.asks = []
-        if found.layout is not None:
-            sides = _sides(found.layout, layout, found.form)
+    if layout is None:
+        found.notes, found.asks = found.notes + found.taken, found.lacking + found.asks
+    elif found.layout is not None:
+        sides = _sides(found.layout, layout)
     return _posed(place.name, found, known, sides, scale)
 
 
@@ -126,7 +126,7 @@ def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
     raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
 
 
-def _sides(own: Layout, robot: Layout, form: Form) -> Array:
+def _sides(own: Layout, robot: Layout) -> Array:
     """1 for each actuator (n,) that pushes as the log's motor in its place does, -1 for one mounted the other
     way round. Raises LayoutError: they do not fit."""
     if own.n != robot.n:

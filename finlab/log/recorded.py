@@ -67,6 +67,10 @@ class Recorded:
     """Sentences on how it was read."""
     asks: list[str] = field(default_factory=list)
     """Sentences on what it lacks, each with the option that gives it."""
+    taken: list[str] = field(default_factory=list)
+    """Notes of what was taken for the robot, where its layout is the log's."""
+    lacking: list[str] = field(default_factory=list)
+    """What the log lacks of the robot, as `asks` are."""
 
 
 def changes(time: Array, bits: NDArray[np.bool_], words: str, again: str) -> list[Event]:

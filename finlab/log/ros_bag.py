@@ -56,7 +56,7 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
                     if each.level >= WARNING
                 ]
     found = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
-    found.asks.append("A bag holds no robot; name it by --robot LAYOUT.")
+    found.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
     if sent is not None and rows["outputs"]:
         found.outputs, found.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
     return found

@@ -74,7 +74,7 @@ def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.n
     return time, demand
 
 
-def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: bool = True) -> Dive:
+def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares") -> Dive:
     """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
@@ -88,11 +88,20 @@ def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: bool = True) 
         "vehicle_thrust_setpoint": (time, {"xyz": setpoint[:, :3]}),
         "vehicle_torque_setpoint": (time, {"xyz": setpoint[:, 3:]}),
     }
-    if outputs:
+    if outputs == "pulses":
+        topics["actuator_outputs"] = (time, {"output": np.pad(1500 + 400 * force / FULL, ((0, 0), (0, 8)))})
+        for i in range(1, 9):
+            parameters |= {f"PWM_MAIN_FUNC{i}": 100 + i, f"PWM_MAIN_MIN{i}": 1100, f"PWM_MAIN_MAX{i}": 1900}
+    elif outputs:
         control = np.full((n, 12), np.nan)
         control[:, :8] = force / FULL
         topics["actuator_motors"] = (time + 0.001, {"control": control})
     left = (demand - given) / PX4_UNIT * FRD
+    late = time > time[n // 3]
+    topics["failure_detector_status"] = (time, {"motor_failure_mask": np.where(late, 4, 0).astype(np.uint16)})
+    escs = {"esc_count": np.full(n, 8, np.uint16)}
+    escs["esc_online_flags"] = np.where(late, 0x7F, 0xFF).astype(np.uint16)
+    topics["esc_status"] = (time, escs)
     status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
     topics["control_allocator_status"] = (time + 0.001, status)
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)

@@ -77,11 +77,25 @@ def replace_names(judged: finlab.Judgement) -> finlab.Judgement:
 
 
 def test_without_outputs_the_autopilots_own_word_counts(tmp_path: Path) -> None:
-    dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs=False)
+    dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs="")
     log = finlab.read_log(dive.path, dive.robot)
     judged = finlab.judge(log, improve=False)
     np.testing.assert_allclose(judged.missing, dive.missing, rtol=0.01, atol=0.01)
     assert judged.watts is None and any("no outputs" in each for each in judged.asks)
+
+
+def test_widths_of_pulses_stand_for_outputs(tmp_path: Path) -> None:
+    dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs="pulses")
+    judged = finlab.judge(finlab.read_log(dive.path, dive.robot), improve=False)
+    np.testing.assert_allclose(judged.missing, dive.missing, rtol=0.01, atol=0.01)
+    assert judged.watts is not None
+
+
+def test_the_robots_health_is_told(px4: Dive) -> None:
+    judged = finlab.judge(finlab.read_log(px4.path, px4.robot), improve=False)
+    words = ["rear_right failed, says PX4", "lift_rear_left has an ESC offline"]
+    assert sorted(said for _, said in judged.events) == sorted(words)
+    assert judged.events[0][0] == pytest.approx(px4.time[len(px4.time) // 3], abs=0.1)
 
 
 def test_the_scale_is_the_users_where_it_is_given(sub: Dive) -> None:
