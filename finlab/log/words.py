@@ -8,8 +8,8 @@ import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.axes import AXES
+from finlab.display.pictures import COLORS
 from finlab.evaluation.document import Block, Column, Row, Table, to_text
-from finlab.evaluation.plots import COLORS
 from finlab.log.judgement import Judgement
 
 if TYPE_CHECKING:
