@@ -118,17 +118,11 @@ class RadialTable:
 
     @cached_property
     def numbers(self) -> Array:
-        """The table as the core takes it: `top`, cells, `rest`, then force, its derivative and conjugate at
-        as few of the grid's prices as say the same."""
+        """The table as the core takes it, at as few of the grid's prices as say the same."""
         step = CELLS
         while step > 1 and not self._stands_for_all(step):
             step //= 2
-        force, slope = self.force[::step], self.slope[::step]
-        width = np.diff(self.top * _GRID[::step])
-        mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
-        start = np.concatenate([[0.0], np.cumsum(width * mean)]) - self.rest
-        knots = np.stack([force, slope, start], axis=-1)
-        return np.concatenate([[self.top, CELLS // step, self.rest], knots.ravel()])
+        return table_numbers(self.top, self.force[::step], self.slope[::step], self.rest)
 
     def _stands_for_all(self, step: int) -> bool:
         """Whether every `step`-th of the grid's prices says what all do."""
@@ -146,6 +140,16 @@ class RadialTable:
         price = price_grid(self.top) + 2.0 * weight * self.force
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
+
+
+def table_numbers(top: float, force: Array, slope: Array, rest: float) -> Array:
+    """Returns a table as the core takes it: `top`, cells k, `rest`, then force, its derivative and conjugate
+    (k + 1,) at prices top (j / k)^4."""
+    width = np.diff(top * np.linspace(0.0, 1.0, len(force)) ** 4)
+    mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
+    start = np.concatenate([[0.0], np.cumsum(width * mean)]) - rest
+    knots = np.stack([force, slope, start], axis=-1)
+    return np.concatenate([[top, len(force) - 1, rest], knots.ravel()])
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:

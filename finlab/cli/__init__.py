@@ -9,7 +9,11 @@ import io
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
+from functools import partial
+from importlib import import_module
+from typing import Any
 
+import tyro
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
@@ -73,31 +77,52 @@ def _run(argv: list[str]) -> int:
 
 def _parsed(argv: list[str]) -> int:
     """Parse and run; turn the parser's exit into a code."""
-    about = "Control allocation for underwater robots: a target wrench in, commands out."
     try:
-        code: int | None = _command_line(argv).cli(prog="finlab", description=about, args=argv)
+        code: int | None = _ran(argv)
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else FAILED
     return code or 0
 
 
-def _command_line(argv: Sequence[str]) -> SubcommandApp:
-    """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import eval_verbs, fit, layout_verbs, log_verb, robot_verbs, simulate, train_verbs
+VERBS = {
+    "allocate": ("robot_verbs", "allocate", None),
+    "layout": ("layout_verbs", "verbs", "Check, show and optimize layout files."),
+    "data": ("train_verbs", "data_verbs", "Generate what the paper's networks learn from."),
+    "train": ("train_verbs", "verbs", "Train the networks of methods `mdn` and `paper`."),
+    "eval": ("eval_verbs", "verbs", "Measure methods by the fins' own models."),
+    "bench": ("eval_verbs", "bench", None),
+    "fit": ("fit", "verbs", "Fit actuators and robots to measurements."),
+    "log": ("log_verb", "log", None),
+    "simulate": ("simulate", "simulate", None),
+    "export": ("robot_verbs", "export", None),
+    "app": ("robot_verbs", "app", None),
+}
+"""Verbs, or groups of them: module, what it has there, and its line of help where that is no docstring."""
 
+
+def _ran(argv: list[str]) -> Any:
+    """What the verb returns that arguments name, which alone is imported: an exit code, None means 0."""
+    if argv[:1] and argv[0] in VERBS:
+        verb, words = _verb(argv[0], argv), VERBS[argv[0]][2]
+        run = verb.cli if isinstance(verb, SubcommandApp) else partial(tyro.cli, verb)
+        return run(prog=f"finlab {argv[0]}", description=words, args=argv[1:])
+    about = "Control allocation for underwater robots: a target wrench in, commands out."
+    return _command_line(argv).cli(prog="finlab", description=about, args=argv)
+
+
+def _command_line(argv: Sequence[str]) -> SubcommandApp:
+    """All verbs."""
     root = SubcommandApp()
-    root.command(robot_verbs.allocate)
-    root.command(layout_verbs.verbs, name="layout", help="Check, show and optimize layout files.")
-    root.command(train_verbs.data_verbs, name="data", help="Generate what the paper's networks learn from.")
-    root.command(train_verbs.verbs, name="train", help="Train the networks of methods `mdn` and `paper`.")
-    root.command(eval_verbs.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
-    root.command(eval_verbs.bench)
-    root.command(fit.verbs, name="fit", help="Fit actuators and robots to measurements.")
-    root.command(log_verb.log)
-    root.command(simulate.simulate)
-    root.command(robot_verbs.export)
-    root.command(robot_verbs.app)
+    for name, (_, _, words) in VERBS.items():
+        root.command(_verb(name, argv), name=name, help=words)
     return root
+
+
+def _verb(name: str, argv: Sequence[str]) -> Any:
+    """A verb's function or group."""
+    module, what, _ = VERBS[name]
+    verb = getattr(import_module(f"finlab.cli.{module}"), what)
+    return verb(argv) if name == "eval" else verb
 
 
 def example(argv: Sequence[str]) -> str:

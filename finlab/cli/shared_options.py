@@ -62,11 +62,14 @@ def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[s
     those that a bundle marks as failed and those named now, each once. Raises LayoutError: neither a readable
     file nor a shipped layout."""
     from finlab.assets import shipped_layouts
-    from finlab.files.worker import in_worker
     from finlab.layout.load import layout_and_failed
 
-    shipped = text in shipped_layouts()
-    layout, lost = layout_and_failed(text) if shipped else in_worker(layout_and_failed, text)
+    if text in shipped_layouts():
+        layout, lost = layout_and_failed(text)
+    else:
+        from finlab.files.worker import in_worker
+
+        layout, lost = in_worker(layout_and_failed, text)
     return layout, tuple(dict.fromkeys([*lost, *failed]))
 
 

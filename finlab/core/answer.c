@@ -72,7 +72,8 @@ int fl_check(const real *block, int length) {
         return FL_BAD_NUMBER;
     if (!(block[(int)a->ahead] > 0 && (a->back == 0 || block[(int)a->back] > 0))) return FL_BAD_NUMBER;
     if (!(a->share > 0 && a->worth > 0 && a->most[0] > 0 && a->low <= a->high && a->half >= 0)) return FL_BAD_NUMBER;
-    if (!(a->band >= 0 && a->speed >= 0 && a->gain[0] >= 0 && a->gain[1] >= 0)) return FL_BAD_NUMBER;
+    if (!(a->band >= 0 && a->speed >= 0 && a->gain[0] >= 0 && a->gain[1] >= 0 && a->doubt >= 0)) return FL_BAD_NUMBER;
+    if (a->speed > 0 && !(a->form == FL_FOIL && a->rows == 2)) return FL_BAD_BLOCK;
   }
   return 0;
 }
@@ -101,7 +102,7 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
                    fl_answer *out) {
   int n = COUNT(block), r = RANGE(block);
   real target[6];
-  out->value = 0, out->status = FL_MET;
+  out->value = 0, out->status = FL_MET, out->placed = 0;
   memset(out->inner, 0, sizeof out->inner);
   memset(out->price, 0, sizeof out->price);
   memset(out->force, 0, n * sizeof out->force[0]);
@@ -112,13 +113,17 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     for (int k = 0; k < 6; k++) out->within &= wrench[k] == 0, out->aim[k] = 0;
     return;
   }
-  int torn = work->torn || work->drags, most = work->drags ? STEPS_WITH_DRAG : torn ? STEPS_AT_KINK : MOST_STEPS;
-  int status = newton(block, work, target, price, most);
-  int within = (status == FL_MET || (status == FL_STUCK && torn)) && in_range(block, wrench, target);
+  int torn = work->torn || work->drags, ranged = in_range(block, wrench, target);
+  int status = newton(block, work, target, price, torn ? STEPS_AT_KINK : MOST_STEPS);
+  int within = (status == FL_MET || (status == FL_STUCK && torn)) && ranged;
   out->status = status;
   memcpy(out->inner, work->now->price, sizeof out->inner);
   memcpy(out->force, work->now->force, n * sizeof out->force[0]);
-  if (may_have_gaps(block, work, out->force)) {
+  if (work->drags) {
+    within = ranged && with_drag(block, work, target, status, out);
+    if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
+  }
+  if (!work->drags && may_have_gaps(block, work, out->force)) {
     int inside = worst_gap(block, work, out->force, out->inner) >= 0;
     if (within && inside) {
       real value;
@@ -128,26 +133,27 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
     } else
       within &= status == FL_MET;
   }
-  for (int i = out->dragged = 0; work->drags && i < n; i++)
-    out->dragged |= out->force[i][1] > drag_of(block, i, out->force[i][0]) + NEARLY * ACTUATOR(block, i)->most[1];
-  out->within = within && !(policy && policy->always);
-  if (!out->within && policy) in_its_place(block, work, wrench, policy, out);
+  if (!(out->within = within) && policy) out->placed = 0, in_its_place(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
 }
 
 /* The commands that come nearest to an aim among those that may follow the previous ones. */
 static void in_a_tick(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
-  static const fl_policy nearest = {FL_CLOSEST, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  static const fl_policy nearest = {FL_CLOSEST, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
   const fl_head *h = HEAD(block);
   fl_answer own;
   real wrench[6], price[6];
   for (int k = 0; k < 6; k++) wrench[k] = out->aim[k] - h->beside[k];
   memcpy(price, out->inner, sizeof price);
+  memcpy(work->aim, out->aim, sizeof work->aim);
   tick_limits(block, q->previous, &work->box);
   set_limits(block, work, &work->box);
   answer(block, work, wrench, &nearest, price, &own);
   set_limits(block, work, 0);
-  commands_for(block, &work->box, own.force, q->previous, out->command);
+  if (own.within && own.placed)
+    memcpy(out->command, own.command, COUNT(block) * sizeof own.command[0]);
+  else
+    commands_for(block, &work->box, own.force, q->previous, out->command);
   out->error = refine(block, work, &work->box, out->aim, out->command, TICK_STEPS);
   rest_in_bands(block, &work->box, out->command);
   into_limits(block, out->command);
@@ -158,10 +164,12 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
   real wrench[6];
   for (int k = 0; k < 6; k++) wrench[k] = q->wrench[k] - h->beside[k];
   work->steps = work->ended = 0;
+  memcpy(work->aim, q->wrench, sizeof work->aim);
+  work->previous = q->previous;
+  all_limits(block, &work->box);
   answer(block, work, wrench, q->policy, q->price, out);
   for (int k = 0; k < 6; k++) out->aim[k] = out->within ? q->wrench[k] : out->aim[k] + h->beside[k];
-  all_limits(block, &work->box);
-  commands_for(block, &work->box, out->force, q->previous, out->command);
+  if (!out->placed) commands_for(block, &work->box, out->force, q->previous, out->command);
   out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
   rest_in_bands(block, &work->box, out->command);
   if (q->previous && !may_follow(block, q->previous, out->command)) in_a_tick(block, work, q, out);
@@ -219,13 +227,6 @@ real fl_look(const real *block, fl_work *work, const real *wrench, const real *i
   look(block, work, target, inner, work->state);
   memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
   return work->state->value;
-}
-
-/* Prices in the basis to begin with for a wrench. */
-void fl_first(const real *block, fl_work *work, const real *wrench, real *inner) {
-  real target[6], ridge;
-  to_basis(block, wrench, target);
-  first_price(block, work, target, inner, &ridge);
 }
 
 /* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 3): prices along its force, ahead and

@@ -13,11 +13,10 @@ from finlab.core.library import library
 
 MAGIC = 41721.0
 """First number of a block; its version is the second."""
-MET, BEYOND, STUCK = range(3)
-"""How Newton's method ends: at a target, where it is proved to be out of reach, at its bound of steps."""
-MOST = 64
-"""Actuators of a robot at most."""
-CODES = ("", "no block of a robot", "a block of another version", "a number out of range", "a bad argument")
+CODES = (
+    *("", "no block of a robot", "a block of another version", "a number out of range", "a bad argument"),
+    "a policy that needs double precision",
+)
 
 
 class Found(NamedTuple):
@@ -35,8 +34,6 @@ class Found(NamedTuple):
     """Targets within reach (N,)."""
     command: Array
     """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
-    dragged: bool
-    """Whether a foil is to drag more than its lift does."""
     ended: bool
     """Whether a search ended at its bound of steps."""
 
@@ -45,7 +42,6 @@ class _Policy(ctypes.Structure):
     _fields_ = [
         ("kind", ctypes.c_int),
         ("groups", ctypes.c_int),
-        ("always", ctypes.c_int),
         ("weight", ctypes.c_double * 6),
         ("group", ctypes.c_ubyte * 36),
     ]
@@ -60,30 +56,13 @@ class _Question(ctypes.Structure):
     ]
 
 
-class _Answer(ctypes.Structure):
-    _fields_ = [
-        ("force", ctypes.c_double * (2 * MOST)),
-        ("price", ctypes.c_double * 6),
-        ("inner", ctypes.c_double * 6),
-        ("aim", ctypes.c_double * 6),
-        ("value", ctypes.c_double),
-        ("error", ctypes.c_double),
-        ("command", ctypes.c_double * (3 * MOST)),
-        ("status", ctypes.c_int),
-        ("within", ctypes.c_int),
-        ("steps", ctypes.c_int),
-        ("ended", ctypes.c_int),
-        ("dragged", ctypes.c_int),
-    ]
-
-
 @lru_cache(maxsize=64)
-def _policy(policy: Any, always: bool) -> _Policy:
+def _policy(policy: Any) -> _Policy:
     groups = policy.groups
     weights = np.array(policy.axis_weights)
     masks = np.concatenate([*groups, np.zeros(36 - 6 * len(groups))]).astype(int).tolist()
     kind = ("closest", "direction", "priority").index(policy.kind)
-    return _Policy(kind, len(groups), always, tuple(weights / weights.max()), tuple(masks))
+    return _Policy(kind, len(groups), tuple(weights / weights.max()), tuple(masks))
 
 
 class Core:
@@ -93,36 +72,29 @@ class Core:
         """Takes the block of a robot of n = `count` actuators."""
         core = library()
         self._core, self._block, self._count = core, block, count
-        self._work = ctypes.create_string_buffer(core.fl_sizes(3))
-        self._question, self._answer, self._lock = _Question(), _Answer(), Lock()
-        self._to, self._from = ctypes.addressof(self._question), ctypes.addressof(self._answer)
+        self._work, self._lock, most = ctypes.create_string_buffer(core.fl_sizes(3)), Lock(), core.fl_sizes(6)
+        self._question, answer = _Question(), np.zeros(5 * most + 23)
+        self._to, self._from = ctypes.addressof(self._question), answer.ctypes.data
         self._wrench = np.frombuffer(memoryview(self._question), np.float64, 6)
         self._inner, self._previous = np.zeros(6), np.zeros((count, 3))
         self._inner_at, self._previous_at = self._inner.ctypes.data, self._previous.ctypes.data
-        self._force, self._command = (
-            np.ctypeslib.as_array(getattr(self._answer, name))[: width * count].reshape(1, count, width)
-            for name, width in (("force", 2), ("command", 3))
-        )
-        self._vectors = np.frombuffer(memoryview(self._answer), np.float64, 20, 16 * MOST)
+        self._force = answer[: 2 * count].reshape(1, count, 2)
+        self._vectors = answer[2 * most :][:20]  # price, inner, aim (6,), value, error
+        self._command = answer[2 * most + 20 :][: 3 * count].reshape(1, count, 3)
+        self._flags = answer[5 * most + 20 :].view(np.int32)  # status, within, steps, ended, placed
         self._at, self._area = block.ctypes.data, ctypes.addressof(self._work)
         if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area):
             raise ValueError(f"the core takes the robot for {CODES[error]}")
 
     def one(
-        self,
-        wrench: Array,
-        policy: Any,
-        inner: Array | None = None,
-        previous: Array | None = None,
-        always: bool = False,
-    ) -> tuple[Found, Array, int]:
-        """The answer to one wrench (6,), its prices (6,) in the robot's basis [W], and how Newton's method
-        ended (`MET` ...). It begins at prices `inner`, where there are some; commands may follow `previous`
-        ones (n, 3); a policy is served where the wrench is out of reach, or `always`."""
+        self, wrench: Array, policy: Any, inner: Array | None = None, previous: Array | None = None
+    ) -> Found:
+        """The answer to one wrench (6,). It begins at prices `inner` (6,) [W] in the basis, if there are
+        any; commands may follow `previous` ones (n, 3); a policy is served out of reach."""
         with self._lock:  # question and answer lie in one place for all threads
-            question, answer = self._question, self._answer
+            question = self._question
             self._wrench[:] = wrench
-            served = None if policy is None else _policy(policy, always)  # kept until the call ends
+            served = None if policy is None else _policy(policy)  # kept until the call ends
             question.policy = None if served is None else ctypes.addressof(served)
             question.inner = question.previous = None
             if inner is not None:
@@ -132,17 +104,15 @@ class Core:
             if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
                 raise ValueError(f"the core got {CODES[error]}")
             vectors = self._vectors.copy()
-            found = Found(
+            return Found(
                 self._force.copy(),
                 vectors[None, :6],
                 vectors[None, 12:18],
                 vectors[18:19],
-                np.array([answer.within != 0]),
+                self._flags[1:2] != 0,
                 self._command.copy(),
-                answer.dragged != 0,
-                answer.ended != 0,
+                bool(self._flags[3]),
             )
-            return found, vectors[6:12], answer.status
 
     def many(self, wrenches: Array, policy: Any) -> Found:
         """The answers to wrenches (N, 6)."""
@@ -150,13 +120,13 @@ class Core:
         force, value = np.empty((count, self._count, 2)), np.empty(count)
         price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
         command = np.empty((count, self._count, 3))
-        served = None if policy is None else _policy(policy, False)  # kept until the call ends
+        served = None if policy is None else _policy(policy)  # kept until the call ends
         own = None if served is None else ctypes.addressof(served)
         outs = [values.ctypes.data for values in (force, price, aim, value, command, within)]
         error = self._core.fl_answer_many(self._at, self._area, wrenches.ctypes.data, count, own, *outs)
         if error > 0:
             raise ValueError(f"the core got {CODES[error]}")
-        return Found(force, price, aim, value, within, command, False, error < 0)
+        return Found(force, price, aim, value, within, command, error < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep `previous` ones (n, 3)."""
@@ -166,12 +136,6 @@ class Core:
         data = (force.ctypes.data, len(force), start, command.ctypes.data)
         self._core.fl_commands(self._at, self._area, *data)
         return command
-
-    def first(self, wrench: Array) -> Array:
-        """Prices (6,) [W] in the basis at which a search for a wrench (6,) begins."""
-        wrench, inner = np.ascontiguousarray(wrench), np.zeros(6)
-        self._core.fl_first(self._at, self._area, wrench.ctypes.data, inner.ctypes.data)
-        return inner
 
     def look(self, wrench: Array, inner: Array) -> tuple[Array, float]:
         """What prices (6,) in the basis give: forces (n, 2), and the dual value [W] for a wrench (6,)."""

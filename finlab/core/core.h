@@ -19,9 +19,12 @@ typedef double fl_real;
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* of sets with gaps that are looked at for one target */
 #endif
-/* Newton's steps of one answer at most: two searches of two parts, each a dive and two for each cut. */
-#define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)))
-#define FL_VERSION 1
+/* Newton's steps of one answer at most: two searches of two parts, each a dive and two for each cut. Where foils drag,
+   steps of a start take FL_SETTLE more: starts of a part, of the foils' ends and of the shares of a ray. */
+#define FL_SETTLE (12 * 60)
+#define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2) + 48)
+#define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
+#define FL_VERSION 2
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* Layout of a block: an `fl_head`, then an `fl_actuator` for each of the n actuators, then their tables. All
@@ -57,6 +60,7 @@ typedef struct {
   fl_real sign;          /* of a thruster's command over its force */
   fl_real lean, uneven, uneven_at; /* of a fin: angle from command to force; 1 + uneven cos(angle - uneven_at) */
   fl_real pressure, turned, rest;  /* of a foil: force per coefficient [N], angle without lift, coefficient of drag there */
+  fl_real doubt;         /* of a foil: what a squared force costs beside its power [W/N^2] */
 } fl_actuator;
 enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
 
@@ -66,10 +70,15 @@ enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
    points p; then pairs, the first number ascending. A beat: cells k; then amplitude and frequency of the shares
    (j / k)^2 of the largest force. A grid: see law.c. */
 
+typedef struct { /* a foil near to a command: force, by angle, cost, by angle and squared angle */
+  fl_real force[2], slope[2], cost, pay, bend;
+} fl_tangent;
+
 typedef struct { /* what one actuator may give now */
   fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
   int flipped, forked;
+  const fl_tangent *tangent; /* of a foil near to a command, whose limits are angles from there; else 0 */
 } fl_set;
 
 typedef struct { /* prices, and what they give */
@@ -107,6 +116,9 @@ typedef struct {
   fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
+  fl_tangent tangent[FL_MOST];
+  const fl_real *previous; /* commands of the tick before; 0 for none */
+  fl_real aim[6], placed[FL_MOST][3], near[6]; /* wrench; commands of the best part where there are foils, prices there */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost, enough;
   int quick, torn, drags, steps, ended;
 } fl_work;
@@ -114,7 +126,7 @@ typedef struct {
 enum { FL_MET, FL_BEYOND, FL_STUCK };
 enum { FL_CLOSEST, FL_DIRECTION, FL_PRIORITY };
 typedef struct {
-  int policy, groups, always; /* always: also where a target seems within reach */
+  int policy, groups;
   fl_real weight[6];     /* of the axes, largest 1, for FL_CLOSEST */
   unsigned char group[6][6]; /* axes of each group, for FL_PRIORITY */
 } fl_policy;
@@ -129,7 +141,7 @@ typedef struct {
   fl_real command[FL_MOST][3];
   int status, within;        /* of Newton's method (FL_MET ...); within reach */
   int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
-  int dragged;               /* 1 where a foil is to drag more than its lift does */
+  int placed;                /* 1 where the commands are those of a search, for foils */
 } fl_answer;
 
 /* Error codes; 0 is none. FL_PRIORITY needs double precision. */
@@ -152,6 +164,5 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, i
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
 void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
-void fl_first(const fl_real *block, fl_work *work, const fl_real *wrench, fl_real *inner);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
 #endif

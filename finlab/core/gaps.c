@@ -17,15 +17,14 @@ static real between_ways(const fl_actuator *a, const fl_set *set, const real *fo
 }
 
 /* How far a force is in a gap of its set; 0 where it is not. One that comes from prices is in one where it is
-   between what an actuator gives forward and in reverse, but not where it drags more than lift does: that is
-   left to the commands. */
+   between what an actuator gives forward and in reverse. */
 static real gap_of(const real *block, int i, const fl_set *set, const real *force, real largest,
                    const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (!is_plane(a)) {
     real size = FABS(force[0]), over;
     if (a->speed > 0) {
-      over = price ? 0 : (force[1] - drag_of(block, i, force[0])) / a->most[1];
+      over = (force[1] - drag_of(block, i, force[0])) / a->most[1];
       return over > HOLLOW ? over : 0;
     }
     return size < a->band * (1 - NOTHING) && size > NOTHING * a->most[0] && set->low < set->high;
@@ -84,7 +83,7 @@ int nearer_side(const real *block, int i, const fl_set *set, const real *force) 
 /* Cuts a set by a force and keeps one side: of an arc the half towards smaller (-1) or larger angles (1), of a
    full circle that away from or around the force, of either way reverse or the rest, of a dead band rest or
    what is beyond, of drag less or more. */
-static void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
+void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (is_plane(a)) {
     if (set->reverse > 0) {
@@ -158,10 +157,13 @@ static void freeze_at_least(const real *block, int i, fl_set *set, const real *f
 }
 
 /* Remembers an answer without a gap; whether one with a gap could still be cheaper. */
-static int keep(const real *block, fl_work *work, int status, int gap, real *best) {
+static int keep(const real *block, fl_work *work, const real *target, int status, int gap, real *best) {
   real value = work->now->value;
   if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
-    if (value < *best) *best = value, memcpy(work->best, work->now->force, sizeof work->best);
+    if (work->drags)
+      place(block, work, target, best);
+    else if (value < *best)
+      *best = value, memcpy(work->best, work->now->force, sizeof work->best);
     return 0;
   }
   return (status == FL_MET || (status == FL_STUCK && gap >= 0)) && value < *best * (1 - CLOSE);
@@ -174,7 +176,7 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
     const fl_state *s = work->now;
     real largest = largest_of(block, (real(*)[2])s->force);
     int gap = worst_gap(block, work, (real(*)[2])s->force, s->price);
-    if (!keep(block, work, status, gap, best)) return;
+    if (!keep(block, work, target, status, gap, best)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
       const real *force = s->force[i];
@@ -219,6 +221,11 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   fl_node *node;
   memcpy(work->kept, work->set, sizeof work->kept);
   memcpy(price, work->now->price, sizeof price);
+  if (work->drags) {
+    place_starts(block, work, target, &best);
+    look(block, work, target, price, work->state);
+    work->now = work->state;
+  }
   dive(block, work, target, status, &best);
   memcpy(work->set, work->kept, sizeof work->kept);
   sums_of(block, work);
@@ -226,21 +233,21 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   work->now = work->state;
   for (status = root;;) {
     fl_state *s = work->now;
-    int gap = worst_gap(block, work, s->force, s->price), open = keep(block, work, status, gap, &best);
+    real own = s->value;
+    int gap = worst_gap(block, work, s->force, s->price), open = keep(block, work, target, status, gap, &best);
     if (open && gap < 0) { /* hollow: at their least forces */
-      real own = s->value;
       fl_set before[FL_MOST];
       memcpy(before, work->set, sizeof before);
       dive(block, work, target, status, &best);
       memcpy(work->set, before, sizeof before);
       bound = MIN(bound, own), status = FL_BEYOND, open = 0;
     }
-    if (open && parts < FL_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
+    if (open && ACTUATOR(block, gap)->speed == 0 && parts < FL_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
       status = cheaper_side(block, work, target, node), parts += 2;
       continue;
     }
-    work->ended |= open;
-    if (status != FL_BEYOND) bound = MIN(bound, s->value);
+    work->ended |= open && ACTUATOR(block, gap)->speed == 0;
+    if (status != FL_BEYOND) bound = MIN(bound, own);
     while ((node = last_open(block, work, &depth)) && !(node->score[0] < best * (1 - CLOSE)))
       bound = MIN(bound, node->score[0]);
     if (!node) break;

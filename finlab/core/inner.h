@@ -98,7 +98,6 @@ int undecided(const real *block, int i, const fl_set *set, const real *price, re
 
 /* newton.c */
 #define MOST_STEPS 200
-#define STEPS_WITH_DRAG (2 * ROUNDS) /* from the prices of commands near to a target */
 void sums_of(const real *block, fl_work *work);
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
@@ -114,15 +113,23 @@ void wrench_of(const real *block, real force[][2], real *wrench);
 int worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
 int nearer_side(const real *block, int i, const fl_set *set, const real *force);
 int may_have_gaps(const real *block, const fl_work *work, real force[][2]);
+void narrow(const real *block, int i, fl_set *set, const real *force, int side);
 fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force);
 void take_side(const real *block, fl_work *work, const fl_node *node, int side);
 fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
+/* drag.c */
+void place(const real *block, fl_work *work, const real *target, real *best);
+void place_starts(const real *block, fl_work *work, const real *target, real *best);
+int with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
+void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
+
 /* nearest.c */
 void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
                    real apart, fl_mixture *m);
-void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m);
+void farthest_along(const real *block, const fl_work *work, const real *weight, const real *begin,
+                    const real *ray, fl_mixture *m);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 
 /* law.c */

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 1
+VERSION = 2
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
 SIGNATURES = {
     "fl_sizes": "ii",
@@ -16,7 +16,6 @@ SIGNATURES = {
     "fl_answer_one": "ipppp",
     "fl_answer_many": "ipppippppppp",
     "fl_commands": "vpppipp",
-    "fl_first": "vpppp",
     "fl_look": "rppppp",
     "fl_worth": "vpppip",
 }

@@ -136,18 +136,19 @@ void nearest_point(const real *block, const fl_work *work, const real *weight, c
   }
 }
 
-/* The point that is the largest share, from 0 to 1, of a ray (6,), in weighted axes. A plane across the miss of a
+/* The point that is the largest share, from 0 to 1, of a ray (6,) from a point on, in weighted axes. A plane across the miss of a
    share bounds it from above; the next try is that bound (Dinkelbach). Where no share of the ray is in the set,
-   the point is the nearest one to rest. */
-void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m) {
+   the point is the nearest one to its beginning. */
+void farthest_along(const real *block, const fl_work *work, const real *weight, const real *begin, const real *ray,
+                    fl_mixture *m) {
   real share = 1, last = R(1e30), normal[6], force[FL_MOST][2], point[6], target[6];
   memcpy(normal, ray, sizeof normal);
   m->count = 0;
   for (int k = 0; k < MOST_SHARES; k++) {
     real across = dot(normal, ray, 6);
     farthest(block, work, weight, normal, force, point);
-    share = CLIP(across > 0 ? dot(point, normal, 6) / across : 0, 0, share);
-    for (int j = 0; j < 6; j++) target[j] = share * ray[j];
+    share = CLIP(across > 0 ? (dot(point, normal, 6) - dot(begin, normal, 6)) / across : 0, 0, share);
+    for (int j = 0; j < 6; j++) target[j] = begin[j] + share * ray[j];
     nearest_point(block, work, weight, target, CLOSE_BY, R(0.5), m);
     for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
     real miss = SQRT(dot(normal, normal, 6));

@@ -82,7 +82,7 @@ void sums_of(const real *block, fl_work *work) {
     work->most_cost += MAX(MAX(s->low_cost, s->high_cost), s->reverse > 0 ? s->reverse_cost : 0);
     if (s->forked || s->reverse > 0) work->torn = 1;
     if (ACTUATOR(block, i)->speed > 0) work->drags = 1;
-    if (s->forked || s->reverse > 0 || ACTUATOR(block, i)->band > 0) work->quick = 0;
+    if (s->forked || s->reverse > 0 || ACTUATOR(block, i)->band > 0 || ACTUATOR(block, i)->speed > 0) work->quick = 0;
   }
 }
 

@@ -25,13 +25,16 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
 
 static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], ray[6], size, rest;
-  to_basis(block, wrench, target);
-  rest = beside_range(block, wrench, target, &size);
-  for (int k = 0; k < 6; k++) weight[k] = 1 / h->yard[k];
+  real target[6], weight[6], begin[6], ray[6], all[6], size, rest;
+  for (int k = 0; k < 6; k++) {
+    weight[k] = 1 / h->yard[k];
+    all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
+  }
+  to_basis(block, all, target);
+  rest = beside_range(block, all, target, &size);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
     ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
-  farthest_along(block, work, weight, ray, &work->mixture);
+  farthest_along(block, work, weight, begin, ray, &work->mixture);
   mixed_force(block, &work->mixture, force);
 }
 
@@ -94,7 +97,7 @@ static void serve(const real *block, fl_work *work, const real *wrench, const fl
     closest(block, work, wrench, policy, force);
   wrench_of(block, force, got);
   memset(score, 0, FL_SCORES * sizeof *score);
-  for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = wrench[k] / h->yard[k];
+  for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = (wrench[k] + h->beside[k]) / h->yard[k];
   if (policy->policy == FL_PRIORITY)
     for (int g = 0; g < policy->groups; g++) score[g] = rounded(size_in(policy->group[g], missing));
   else if (policy->policy == FL_DIRECTION) {
@@ -178,14 +181,15 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
 }
 
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
-   that it began with are kept. */
+   that it began with are kept. Of a ray the share that it gives, and the most that all parts could. */
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                      real force[][2]) {
+                      real force[][2], real *share, real *most_share) {
   real score[FL_SCORES], best[FL_SCORES], own[FL_MOST][2];
   int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
   serve(block, work, wrench, policy, own, score);
+  *most_share = 1 - score[1];
   for (int parts = 0;; parts += 2) {
     int cut = worst_gap(block, work, own, 0);
     if (cut < 0 || !found) { /* of parts with a gap the last one, until there is one without */
@@ -204,13 +208,14 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
     serve(block, work, wrench, policy, own, score);
   }
   memcpy(work->set, work->best_set, sizeof work->set);
+  *share = 1 - best[1];
   sums_of(block, work);
 }
 
 void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
   const fl_head *h = HEAD(block);
-  real force[FL_MOST][2], middle[FL_MOST][2], inside[6] = {0}, wanted[6], target[6], value;
-  best_part(block, work, wrench, policy, force);
+  real force[FL_MOST][2], middle[FL_MOST][2], inside[6] = {0}, wanted[6], target[6], value, share, most;
+  best_part(block, work, wrench, policy, force, &share, &most);
   if (policy->policy != FL_DIRECTION) {
     middle_of(block, work, middle);
     wrench_of(block, middle, inside);
@@ -224,6 +229,12 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   if (!may_have_gaps(block, work, out->force)) return;
   to_basis(block, out->aim, target); /* another part of the sets may give it for less */
   int status = newton(block, work, target, 0, MOST_STEPS);
+  if (work->drags) {
+    for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + h->beside[k];
+    int met = with_drag(block, work, target, status, out);
+    if (policy->policy == FL_DIRECTION) on_ray(block, work, wrench, met * share, most, out);
+    return;
+  }
   if (status == FL_BEYOND) return;
   memcpy(out->inner, work->now->price, sizeof out->inner); /* those of all sets prove more than those of a part */
   int gap = worst_gap(block, work, work->now->force, work->now->price);

@@ -4,7 +4,7 @@
    choose between two answers, the ends of a wide arc or the two ways of a pod, it gives a blend of both: what
    the smooth larger one of their conjugates asks for. A foil gives lift and with it drag; with drag paid a
    [W/N], lift is as dear as r = 1 - a/U times its power: it answers v as v/r. Where r < 0 drag is welcome:
-   then r is softened to s(r) > 0, and (s - r) times the largest power is on top of the conjugate. */
+   then r is softened to s(r) > 0, and (s - r) times the chord of the power is on top of the conjugate. */
 #include "inner.h"
 
 #define SOFT R(0.2)
@@ -26,20 +26,24 @@ real cost_at(const real *block, int i, real force) {
   return a->worth * marginal(table_of(block, a, force < 0), FABS(force) / a->share, 0);
 }
 
-/* What follows from the limits of a set. */
-void set_up(const real *block, int i, fl_set *set) {
+/* What follows from the limits of a set, but for its angles. */
+static void set_ends(int plane, fl_set *set) {
   real least = NOTHING * set->high_cost / MAX(set->high, TINY);
   if (set->low > 0) least = MAX(least, (set->half <= NARROW ? CLOSE : TURNING) * set->low_cost / set->low);
   set->gap2 = least * least + TINY;
+  set->forked = plane && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
+}
+
+void set_up(const real *block, int i, fl_set *set) {
+  set_ends(is_plane(ACTUATOR(block, i)), set);
   set->cos_middle = COS(set->middle), set->sin_middle = SIN(set->middle);
   set->cos_half = COS(set->half), set->sin_half = SIN(set->half);
-  set->forked = is_plane(ACTUATOR(block, i)) && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
 }
 
 /* A set between two forces [N], of planes below 0 against their direction, in an arc [rad]. */
 void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
   int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
-  set->flipped = back && high <= 0;
+  set->flipped = back && high <= 0, set->tangent = 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
   set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;
@@ -144,9 +148,7 @@ static fl_set reversed(const fl_set *set) {
   fl_set r = *set;
   r.low = 0, r.high = set->reverse, r.high_cost = set->reverse_cost, r.reverse = 0, r.flipped = 1;
   r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
-  real least = NOTHING * r.high_cost / MAX(r.high, TINY);
-  r.gap2 = least * least + TINY;
-  r.forked = r.half < PI && r.half > PI / 2;
+  set_ends(1, &r);
   return r;
 }
 
@@ -165,17 +167,26 @@ static real rest_of(const real *block, const fl_actuator *a) { return a->worth *
 static reply foil(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
   real ratio = 1 - price[1] / a->speed, below = MIN(ratio / SOFT - 1, 0), power = EXP(below);
   real rate = power > CLOSE ? power : 0, soft = below < 0 ? SOFT * MAX(power, CLOSE) : ratio;
-  real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = price[0] / soft;
+  real rise = (set->high_cost - set->low_cost) / MAX(set->high - set->low, TINY);
+  real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = (price[0] + (soft - ratio) * rise) / soft;
   along o = limited(block, a, set, 1, own);
-  real cost = own * o.force - o.conjugate - rest, most = MAX(set->low_cost, set->high_cost) - rest;
-  o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * most - rest;
+  real cost = own * o.force - o.conjugate - rest, most = set->low_cost - rest + rise * (o.force - set->low);
+  o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * (set->low_cost - rest - rise * set->low) - rest;
   o.slope /= soft;
-  real lean = own * rate / a->speed;
+  real lean = (rate * own + (1 - rate) * rise) / a->speed;
   return (reply){{o.force, (rate * cost + (1 - rate) * most) / a->speed},
                  o.slope,
                  o.slope * lean,
                  o.slope * lean * lean + (most - cost) * bend / (a->speed * a->speed),
                  o.conjugate};
+}
+
+static reply on_tangent(const fl_set *set, const real *price) {
+  const fl_tangent *t = set->tangent;
+  real gain = dot(price, t->slope, 2) - t->pay, step = CLIP(gain / t->bend, set->low, set->high);
+  real x = t->slope[0], y = t->slope[1], free = step > set->low && step < set->high ? 1 / t->bend : 0;
+  return (reply){{t->force[0] + step * x, t->force[1] + step * y}, free * x * x, free * x * y, free * y * y,
+                 dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost};
 }
 
 reply reply_of(const real *block, int i, const fl_set *set, const real *price) {
@@ -184,7 +195,7 @@ reply reply_of(const real *block, int i, const fl_set *set, const real *price) {
     along o = limited(block, a, set, 1, price[0]);
     return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate};
   }
-  return a->speed > 0 ? foil(block, a, set, price) : plane(block, a, set, price);
+  return set->tangent ? on_tangent(set, price) : a->speed > 0 ? foil(block, a, set, price) : plane(block, a, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */

@@ -138,7 +138,7 @@ def _samples(layout: Layout, method: Dual, count: int) -> str:
         tick = allocator.allocate(0.5 * wrench).command if k % 4 == 3 else None
         answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
         given = answer.wrench * layout.commanded
-        alone = method.forces(far * wrench[None], Policy(policy)).found.command
+        alone = method.forces(far * wrench[None], Policy(policy)).command
         if tick is None and method.error(alone, given[None])[0] > ALONE:
             continue
         error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")

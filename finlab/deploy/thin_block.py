@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from finlab.actuators.response import table_numbers
 from finlab.allocation.dual.robot import EACH, HEAD
 from finlab.arrays import Array
 from finlab.precision import NOTHING
@@ -73,9 +74,7 @@ def _radial(table: Array) -> Array:
     price = table[0] * np.linspace(0.0, 1.0, len(force)) ** 4
     chord = np.diff(force) / np.diff(price)
     most = 3.0 * np.minimum(np.append(chord, chord[-1]), np.insert(chord, 0, chord[0]))
-    own = CubicHermiteSpline(price, force, np.minimum(slope, most))
-    knots = np.stack([own(price), own(price, 1), own.antiderivative()(price) - table[2]], axis=-1)
-    return np.concatenate([[table[0], len(force) - 1, table[2]], knots.ravel()])
+    return table_numbers(float(table[0]), force, np.minimum(slope, most), float(table[2]))
 
 
 def _gauge(table: Array) -> Array:

@@ -76,7 +76,7 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
             heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices))
     with pytest.raises(ValueError, match="argument"):
         heavy.one(wrench, None, previous=np.full((8, 3), np.inf))
-    assert heavy.one(wrench, None, previous=np.full((8, 3), np.nan))[0].within[0]  # of nothing is known
+    assert heavy.one(wrench, None, previous=np.full((8, 3), np.nan)).within[0]  # of nothing is known
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -88,7 +88,7 @@ def test_one_and_many_are_the_same(kind: str) -> None:
     policy = Policy("direction")
     many = core.many(targets, policy)
     for row, target in enumerate(targets):
-        single = core.one(target, policy)[0]
+        single = core.one(target, policy)
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.aim[row], single.aim[0])
         assert many.within[row] == single.within[0]
@@ -97,5 +97,5 @@ def test_one_and_many_are_the_same(kind: str) -> None:
 def test_threads_share_one_robot(heavy: Core) -> None:
     targets = np.random.default_rng(0).normal(0.0, 20.0, (2000, 6))
     with ThreadPoolExecutor(4) as pool:
-        shared = list(pool.map(lambda target: heavy.one(target, Policy())[0].aim[0], targets))
+        shared = list(pool.map(lambda target: heavy.one(target, Policy()).aim[0], targets))
     np.testing.assert_array_equal(shared, heavy.many(targets, Policy()).aim)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Plane, with_square
+from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -55,11 +55,13 @@ class Compiled:
                 if self.doubt is not None:
                     self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
                 weight = float(self.weight[place])
-                responses[place], forms[place] = with_square(response, weight) if weight else response, form
+                drags = isinstance(response, Line) and response.drag is not None
+                doubted = with_square(response, weight) if weight and not drags else response
+                responses[place], forms[place] = doubted, form
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
         self.robot = DualRobot(
-            responses, forms, self._limits, self._effectiveness, self._yardstick, self.beside
+            responses, forms, self._limits, self._effectiveness, self._yardstick, self.beside, self.weight
         )
 
     def at(self, inflow: Array | None) -> "Compiled":

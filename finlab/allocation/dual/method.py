@@ -4,19 +4,18 @@ The core in C (`finlab.core`) finds prices, forces and commands for a robot that
 tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the commands.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
-from finlab.allocation.dual.drag import EXACT, Search
 from finlab.allocation.dual.price_ascent import raised_price
 from finlab.allocation.dual.rates import Rates
-from finlab.allocation.dual.turns import Forces, Linear, settled
+from finlab.allocation.dual.turns import Linear, settled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
@@ -24,10 +23,12 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
-from finlab.core.calls import BEYOND, MET, Found
+from finlab.core.calls import Found
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
+EXACT = 1e-8
+"""Error, on the yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
 """Steps of a command of a tick that is not exact."""
 _ENDED = "the search for a better answer was ended by its limit of steps"
@@ -60,8 +61,9 @@ class Dual(Method):
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
-    def search(self) -> Search:
-        return Search(CommandProblem.of(self.plant, self.scale), self.compiled.weight)
+    def problem(self) -> CommandProblem:
+        """The robot by its own laws."""
+        return CommandProblem.of(self.plant, self.scale)
 
     @cached_property
     def rates(self) -> Rates:
@@ -99,9 +101,8 @@ class Dual(Method):
     ) -> Solution:
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
-        forces = self.forces(targets, policy, self.begin(prices), previous)
-        found = forces.found
-        command, aim = self.exact(forces, previous), targets if found.within.all() else found.aim
+        found = self.forces(targets, policy, self.begin(prices), previous)
+        command, aim = self.exact(found, previous), targets if found.within.all() else found.aim
         notes = {_ENDED} if found.ended else set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
@@ -114,21 +115,17 @@ class Dual(Method):
 
     def begin(self, prices: Array | None) -> Array | None:
         """Prices (6,) [W/N, W/(N m)] in the robot's basis (6,)."""
-        robot = self.compiled.robot
-        return None if prices is None else self._padded(robot.basis.T @ (robot.scale * prices))
-
-    @staticmethod
-    def _padded(inner: Array) -> Array:
-        """Prices (r,) in the basis as the core takes them (6,)."""
-        padded = np.zeros(6)
-        padded[: len(inner)] = inner
-        return padded
+        robot, inner = self.compiled.robot, np.zeros(6)
+        if prices is None:
+            return None
+        inner[: robot.basis.shape[1]] = robot.basis.T @ (robot.scale * prices)
+        return inner
 
     def linear(self, model: Linear) -> Self:
-        """The same on a linear model; its search, in commands, is that of the whole one."""
+        """The same on a linear model; its problem, in commands, is that of the whole one."""
         other = copy(self)
         other.compiled = self.compiled.tilted(model.effectiveness, model.beside)
-        other.__dict__["search"], other.__dict__["rates"] = self.search, self.rates
+        other.__dict__["problem"], other.__dict__["rates"] = self.problem, self.rates
         return other
 
     def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array) -> str:
@@ -146,7 +143,7 @@ class Dual(Method):
             its = self.exact(one)
             if self.error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
-                found.price[row], found.value[row] = one.found.price[0], one.found.value[0]
+                found.price[row], found.value[row] = one.price[0], one.value[0]
             else:
                 high = share
         if not kept and (rest := self._cancelled) is not None:
@@ -161,8 +158,14 @@ class Dual(Method):
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
         start = lower + share * (upper - lower)
-        best = self.search.exact(np.zeros(6), start)
-        return None if best is None else best.command
+        return self._meeting(np.zeros(6), start)
+
+    def _meeting(self, wrench: Array, starts: Array) -> Array | None:
+        """The cheapest command (n, 3) that gives a normalized wrench (6,) where steps from starts (R, n, 3)
+        lead; None where none does."""
+        ends = refine(self.problem, wrench[None], starts, 2 * ROUNDS, EXACT)
+        met = ends.command[ends.error <= NEARLY]
+        return met[self.plant.power(met).sum(axis=-1).argmin()] if len(met) else None
 
     def not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
@@ -214,122 +217,44 @@ class Dual(Method):
 
     def forces(
         self, targets: Array, policy: Policy | None, inner: Array | None = None, previous: Array | None = None
-    ) -> Forces:
+    ) -> Found:
         """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place; for a
         single one the search begins at prices `inner` (6,) in the basis, and commands may follow `previous`
         ones (n, 3)."""
         core = self.compiled.robot.core
-        if self.compiled.robot.speed.any():
-            each = [self._with_drag(one, policy, inner, previous) for one in targets]
-            return each[0] if len(each) == 1 else _joined(each)
         if len(targets) == 1:
-            return Forces(core.one(targets[0], policy, inner, previous)[0])
-        return Forces(core.many(targets, policy))
+            return core.one(targets[0], policy, inner, previous)
+        return core.many(targets, policy)
 
-    def _with_drag(
-        self, wrench: Array, policy: Policy | None, inner: Array | None, previous: Array | None
-    ) -> Forces:
-        """The same for one wrench (6,) where foils drag, and a command: what the dual leaves to the laws."""
-        robot, core = self.compiled.robot, self.compiled.robot.core
-        if not robot.basis.shape[1]:  # nothing pushes, such as foils at rest
-            return Forces(core.one(wrench, policy, previous=previous)[0])
-        found, prices, status = core.one(wrench, None, inner)
-        # With doubt the dual takes it for drag, and proves nothing.
-        sure = status == MET and not found.dragged and self.compiled.doubt is None
-        if sure and self.error(found.command, wrench[None])[0] <= EXACT:
-            command = found.command
-        else:
-            pushed = wrench - self.compiled.beside
-            first = core.look(pushed, core.first(pushed))[0][None]
-            starts = np.concatenate([core.commands(first), found.command])
-            if inner is None:
-                near = self._padded(self.search.prices(starts[0], self._directions))
-                found, prices, status = core.one(wrench, None, near)
-            command, prices = self._near(wrench, found.force, starts, prices, status)
-        within = not np.isnan(command).any()
-        if within:
-            found = found._replace(command=command, aim=wrench[None])
-        elif policy is not None:
-            found, prices, _ = core.one(wrench, policy, inner, always=True)
-        if previous is not None and not self.rates.allow(previous, found.command[0]):
-            follows = core.one(found.aim[0], None, prices, previous)[0]
-            found = found._replace(command=follows.command)
-        # What the tables prove leaves out what foils do beyond them.
-        price = robot.price(prices)[None]
-        known = found._replace(price=price, value=np.zeros(1), within=np.array([within]))
-        return Forces(known, command)
-
-    def _near(
-        self, wrench: Array, force: Array, starts: Array, prices: Array, status: int
-    ) -> tuple[Array, Array]:
-        """A command (1, n, 3) for a wrench (6,) from forces (1, n, 2) near to it, or other starts (S, n, 3),
-        NaN where there is none; and its prices (6,)."""
-        search, core = self.search, self.compiled.robot.core
-        begin, pushed = core.commands(force), wrench - self.compiled.beside
-        if status == MET and self.error(begin, wrench[None])[0] <= EXACT:
-            return begin, prices
-        value, best_of = core.look(pushed, prices)[1], partial(search.cheapest, wrench / self.scale)
-        # Steps from a cheap start may end early: each has its own valley.
-        found = [best_of(np.concatenate([begin, starts[:1]])), best_of(starts[1:])]
-        ways = [way for way in found if way is not None]
-        best = min(ways, key=lambda way: way.cost, default=None)
-        if best is not None:
-            if status != MET:
-                tried = self._padded(search.prices(best.command, self._directions))
-                prices, value = max(
-                    ((prices, value), (tried, core.look(pushed, tried)[1])), key=lambda known: known[1]
-                )
-            # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
-            if self.compiled.doubt is None and best.cost <= 2.0 * value:
-                return best.command[None], prices
-        starts = self.plant.sample(np.random.default_rng(0), (ROUNDS,))
-        for places, group in self.compiled.groups:
-            if not group.feels_flow:
-                starts[::2, places] = begin[0, places]
-        other = None if status == BEYOND else best_of(starts)
-        ways += [] if other is None else [other]
-        command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
-        return command[None], prices
-
-    @property
-    def _directions(self) -> Array:
-        """The basis' directions (6, r) on the yardstick."""
-        robot = self.compiled.robot
-        return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
-
-    def exact(self, forces: Forces, previous: Array | None = None) -> Array:
+    def exact(self, found: Found, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
         what may follow the `previous` ones (n, 3) comes."""
-        found, command = forces.found, forces.found.command
-        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
-            return self.plant.rested(forces.command)
+        command = found.command
         rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
         if not len(rough):
             return command
         if previous is not None:
             return self._follow(found, previous)
-        # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
-        for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
-            ends = refine(self.search.problem, found.aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
-            command[rows] = ends.command
-            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
-                # Such as idle fins in line, or a least force: no small change of these commands helps.
-                draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
-                shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
-                starts = command[row] + shares * draw * self.search.problem.width
-                other = self.search.exact(found.aim[row] / self.scale, starts)
-                command[row] = command[row] if other is None else other.command
+        ends = refine(self.problem, found.aim[rough] / self.scale, command[rough], ROUNDS, EXACT)
+        command[rough] = ends.command
+        for row in rough[(ends.error > NEARLY) & found.within[rough]].tolist():
+            # Such as idle fins in line, or a least force: no small change of these commands helps.
+            draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
+            shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
+            starts = command[row] + shares * draw * self.problem.width
+            other = self._meeting(found.aim[row] / self.scale, starts)
+            command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
     def _follow(self, found: Found, previous: Array) -> Array:
         """Steps by the laws on a command of a tick, in the box of what may follow the previous one (n, 3)."""
         if self.rates.allow(previous, found.command[0]):
-            free = self.exact(Forces(found._replace(command=found.command.copy())))
+            free = self.exact(found._replace(command=found.command.copy()))
             if self.rates.allow(previous, free[0]):
                 return free
         box = self.rates.box(previous)
         full = box.free[:, 2] & self.plant.full_turn
-        problem = replace(self.search.problem, lower=box.lower, upper=box.upper, full_turn=full)
+        problem = replace(self.problem, lower=box.lower, upper=box.upper, full_turn=full)
         start = box.clipped(found.command)
         command = refine(problem, found.aim / self.scale, start, TICK_STEPS, EXACT).command
         command = self.plant.feasible(box.clipped(command))
@@ -342,11 +267,3 @@ class Dual(Method):
     def _missing(self, wrench: Array, aim: Array) -> Array:
         missing = (wrench - aim) / self.scale
         return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
-
-
-def _joined(each: Sequence[Forces]) -> Forces:
-    """Those of single targets."""
-    rows: Any = list(zip(*(one.found for one in each), strict=True))
-    columns: Any = [np.concatenate(parts) for parts in rows[:-2]] + [any(flags) for flags in rows[-2:]]
-    commands: Any = [one.command for one in each]
-    return Forces(Found(*columns), None if commands[0] is None else np.concatenate(commands))

@@ -27,12 +27,15 @@ class DualRobot:
         effectiveness: Array,
         yardstick: Array,
         beside: Array | None = None,
+        doubt: Array | None = None,
     ) -> None:
         """Takes what the actuators offer, how forces become commands, least and largest commands, largest
         changes in a tick and free angles (n, 3), the wrench (n, 3, 6) per newton along their own axes, the
-        yardstick (6,) of errors, and the wrench (6,) on top of that of the forces [N, N m]."""
+        yardstick (6,) of errors, the wrench (6,) on top of that of the forces [N, N m], and what a squared
+        force of each foil costs beside its power (n,) [W/N^2]."""
         self.responses, self._forms, self._limits = responses, forms, limits
         self.yardstick, self.beside = yardstick, np.zeros(6) if beside is None else beside
+        self._doubt = np.zeros(len(responses)) if doubt is None else doubt
         self.ends = np.array([each.ends for each in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.lines = np.array([isinstance(each, Line) for each in responses])
@@ -116,12 +119,12 @@ class DualRobot:
                 *(rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band),
                 *(self.speed[i], self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()),
                 *(_KINDS.index(form.kind), lower, upper, np.minimum(step, 1e30), turns.any(), law, beat),
-                form.numbers,
+                *(form.numbers, self._doubt[i]),
             ]
         return np.hstack([*parts, self._tables]).astype(np.float64)
 
 
-HEAD, EACH = 59, 67
+HEAD, EACH = 59, 68
 """Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 _KINDS = "thruster", "pod", "fin", "foil"
 

@@ -17,7 +17,6 @@ from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.core.calls import Found
 from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, ROUNDS
 
@@ -32,15 +31,6 @@ IN_A_TICK, RANDOM, FOLLOWED = 2, 3, 2
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
 WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 """Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
-
-
-class Forces(NamedTuple):
-    """What the dual gives for N targets."""
-
-    found: Found
-    """Forces, prices and wrenches."""
-    command: Array | None = None
-    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
 
 
 class Linear(NamedTuple):
@@ -106,7 +96,7 @@ class Turns:
         dual = self.dual
         if self.previous is not None:
             return self._from(self.previous[None], prices)
-        laws = dual.forces(self.target, self.policy, dual.begin(prices)).found
+        laws = dual.forces(self.target, self.policy, dual.begin(prices))
         best = self._from(self._exact(laws.force), laws.price[0])
         if best.power > (1.0 + 10.0 * CLOSE) * self._power(laws.command):
             tried = self._exact(_turned_aside(laws.force[0], dual.compiled.robot.lines))
@@ -123,12 +113,12 @@ class Turns:
             linear = dual.linear(linear_at(dual.plant, force[0]))
             start = None if price is None else linear.begin(price)
             own = linear.forces(self.target, self.policy, start)
-            price = own.found.price[0]
+            price = own.price[0]
             # Twice what an error is worth at these prices: an exact penalty.
             worth = max(worth, 2.0 * float(np.linalg.norm(price * dual.scale)))
             before = self._merit(command, worth) if last is None else merit
             last = last or (linear, own)
-            command, merit = self._shorter(command, force[0], own.found.force[0], before, worth)
+            command, merit = self._shorter(command, force[0], own.force[0], before, worth)
             if merit < before:
                 last = linear, own
             if before - merit <= 2.0 * CLOSE * before:
@@ -152,8 +142,8 @@ class Turns:
         return command, merit
 
     def _ended(self, command: Array, linear: Any, own: Any, worth: float) -> Settled:
-        dual, found, aim = self.dual, own.found._replace(command=command), own.found.aim
-        command = linear.exact(own._replace(found=found), self.previous)
+        dual, found, aim = self.dual, own._replace(command=command), own.aim
+        command = linear.exact(found, self.previous)
         if self.policy.kind == "direction" and not found.within.all():
             command, aim = _on_the_ray(dual, self.target, command)
         return Settled(command, aim, found.price, self._power(command), worth, self._error(command))
@@ -162,9 +152,7 @@ class Turns:
         """Commands (K, n, 3) near to forces (K, n, 2) that give the target, nearly."""
         command = self.dual.compiled.robot.core.commands(force, self.previous)
         wanted = self.target / self.dual.scale
-        return np.asarray(
-            refine(self.dual.search.problem, wanted, command, ROUNDS // 3, 0.1 * NEARLY).command
-        )
+        return np.asarray(refine(self.dual.problem, wanted, command, ROUNDS // 3, 0.1 * NEARLY).command)
 
     def _merit(self, command: Array, worth: float) -> float:
         return self._power(command) + worth * self._error(command)
@@ -186,7 +174,7 @@ def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]
     low, high, best = 0.0, min(max(share * (1.0 + CLOSE), 0.0), 1.0), command
     for k in range(ROUNDS):
         tried = high if k == 0 else 0.5 * (low + high)
-        ends = refine(dual.search.problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
+        ends = refine(dual.problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
         if ends.error[0] <= NEARLY:
             low, best = tried, ends.command
         else:

@@ -54,7 +54,7 @@ static int is_other(const sample *s) {
 /* Whether an answer is as near as the library's: `direction` gives one point, `closest` a distance; commands of a
    tick, on which the library spends more steps, may be a little farther. */
 static int differs(const sample *s) {
-  fl_policy policy = {s->policy, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  fl_policy policy = {s->policy, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
   fl_question question = {{0}, &policy, 0, s->previous ? s->previous[0] : 0};
   for (int k = 0; k < 6; k++) question.wrench[k] = s->wrench[k];
   if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;

@@ -106,6 +106,19 @@ def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
         assert answer.bound is not None and answer.bound <= answer.power
 
 
+@pytest.mark.parametrize("number", range(3))
+def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_known(number: int) -> None:
+    layout, flow = load(random_robot("rudders", number, 21)), random_flow("rudders", number, 21)
+    allocator, plant, rng = Allocator(layout), Plant(layout), np.random.default_rng(number)
+    for _ in range(4):
+        wrench = plant.wrench(plant.sample(rng, ()), flow=flow)
+        for times in (1.5, 4.0):
+            answer = allocator.allocate(times * wrench, policy="direction", flow=flow)
+            share = answer.wrench @ wrench / (wrench @ wrench)
+            np.testing.assert_allclose(answer.wrench, share * wrench, atol=1e-6 * np.abs(wrench).max())
+            assert share >= 1.0 - 1e-3
+
+
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(policy: str) -> None:
     layout = load_layout("torpedo")

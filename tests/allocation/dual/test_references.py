@@ -12,7 +12,6 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.allocation.dual.robot import DualRobot
 from finlab.axes import AXES
-from finlab.core.calls import MET
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
@@ -104,8 +103,9 @@ def test_costly_reverse_is_within_reach() -> None:
     own[:, 0] = np.eye(6)[:3]
     robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
-    found, inner, status = robot.core.one(wrench, None)
-    assert status == MET and found.within[0]
+    found = robot.core.one(wrench, None)
+    inner = np.append(robot.basis.T @ (robot.scale * found.price[0]), np.zeros(3))
+    assert found.within[0]
     np.testing.assert_allclose(robot.core.look(wrench, inner)[1], 3 * 5.0 * 9.0**1.5, rtol=1e-9)
     np.testing.assert_allclose(found.command[0, :, 0], -9.0, atol=1e-9)
 

@@ -43,7 +43,7 @@ public:
 private:
   fl_work _work{};
   fl_answer _answer{};
-  fl_policy _policy{FL_DIRECTION, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  fl_policy _policy{FL_DIRECTION, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
   uORB::Subscription _thrust{ORB_ID(vehicle_thrust_setpoint)}, _torque{ORB_ID(vehicle_torque_setpoint)};
   uORB::Publication<actuator_motors_s> _motors{ORB_ID(actuator_motors)};
 };

@@ -33,7 +33,7 @@ private:
 
   fl_work work_{};
   fl_answer answer_{};
-  fl_policy policy_{FL_DIRECTION, 0, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
+  fl_policy policy_{FL_DIRECTION, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
   rclcpp::Publisher<std_msgs::msg::Float64MultiArray>::SharedPtr out_;
   rclcpp::Subscription<geometry_msgs::msg::Wrench>::SharedPtr in_;
 };
