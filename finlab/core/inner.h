@@ -120,9 +120,10 @@ fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
 /* nearest.c */
-void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
-                   real apart, fl_mixture *m);
-void farthest_along(const real *block, const fl_work *work, const real *weight, const real *ray, fl_mixture *m);
+void weigh(const real *block, fl_work *work, const real *weight);
+void nearest_point(const real *block, const fl_work *work, const real *target, real close, real apart, fl_mixture *m);
+real farthest_along(const real *block, const fl_work *work, const real *from, const real *ray, real least, real most,
+                    real close, fl_mixture *m, real *plane);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 
 /* law.c */

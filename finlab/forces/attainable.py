@@ -118,8 +118,6 @@ def attainable_set(
     scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
     spread = _sphere(N_DIRECTIONS) * scale
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
-    if sets.center is None:  # every actuator may rest
-        points = np.concatenate([points, np.zeros((1, 3))])
     result = _hull_of(points, kind)
     for round_ in count():
         new, reach = support(result.normals)
@@ -142,15 +140,17 @@ def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Arra
 
     def support(directions: Array) -> tuple[Array, Array]:
         rows = len(directions)
-        normal = np.zeros((n_parts * rows, 6))
-        normal[:, own] = np.tile(directions, (n_parts, 1))
-        basis = np.broadcast_to(np.eye(6)[:, other], (len(normal), 6, 3))
-        answer = largest(parts.repeat(rows), normal, basis)
+        along = np.tile(directions, (n_parts, 1))
+        asked = parts.repeat(rows)
+        # What is along the direction counts, and what has to be zero.
+        own_columns = asked.effectiveness[..., own] @ along[:, None, :, None]
+        seen = np.concatenate([own_columns, asked.effectiveness[..., other]], axis=-1)
+        answer = largest(asked._replace(effectiveness=seen), np.tile(np.eye(4)[0], (len(along), 1)))
         reach = answer.size.reshape(n_parts, rows)
         best = reach.argmax(axis=0) * rows + np.arange(rows)
         # The origin stands in for a point that is not proven to be attained.
         proven = answer.gap < UNPROVEN * (1.0 + answer.size)
-        points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
+        points = np.where(proven[:, None], asked.wrench(answer.force)[:, own], 0.0)
         points, size = points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
         near = np.linalg.norm(points, axis=-1) <= speck
         return np.where(near[:, None], 0.0, points), np.where(near, 0.0, size)
