@@ -33,7 +33,7 @@ MISSION = (
 )
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0  # what a wrench out of reach costs [W], more than allocations do
-QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "n_walks": 4, "fine": False}
+QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "fine": False}
 """How to find a weakest direction when it has to be quick."""
 
 

@@ -113,7 +113,7 @@ class ForceSets(NamedTuple):
         own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = self.effectiveness / unit[:, None, None, None]
         ends[..., :m] = origin / unit[:, None], ray
         size, normal, force = reach(self.block, own, *ends, close)
-        return size * unit, normal[:, :m], force
+        return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar forces (R,

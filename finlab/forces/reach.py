@@ -12,9 +12,9 @@ from finlab.arrays import Array
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.layout import Layout
 
-FINE, COARSE = 1e-8, 1e-4
-"""How close answers are, as a share of the strongest actuator's wrench: those to be shown, and those of
-searches that ask thousands of times."""
+FINE, COARSE = 1e-8, 1e-3
+"""How close answers are, as a share of the strongest actuator's wrench: those to be shown, and those that say
+where to look on."""
 BESIDE = 1e-6
 """Share of it that may be left beside the wrench asked for."""
 UNPROVEN = 1e-3
@@ -116,8 +116,8 @@ RANK_TOLERANCE = 1e-6
 """Share of the largest singular value below which another counts as zero."""
 N_RANDOM = 24
 """Random directions from which the weakest one is sought, beside axes and singular vectors."""
-N_WALKS = 6
-"""Steps from face to face of the set of wrenches."""
+N_WALKS, FINE_WALKS, KEPT = 4, 20, 6
+"""Steps from face to face of the set of wrenches, and further ones from the best ends, of so many."""
 
 
 class Extent(NamedTuple):
@@ -137,7 +137,7 @@ def singular_values(sets: ForceSets) -> tuple[Array, Array]:
     return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
 
 
-def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
+def weakest(sets: ForceSets, n_random: int = N_RANDOM, fine: bool = True) -> Extent:
     """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of that size
     is within reach. The walk starts from axes, singular vectors and random directions, goes to the face of
     the set that lies that way, turns to its normal and goes again; the least end of all is returned."""
@@ -156,15 +156,15 @@ def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, f
     starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
     if (sets.half[full] < np.pi).any() or sets.place.any():  # else opposite directions are alike
         starts = np.concatenate([starts, -starts], axis=1)
-    n_starts = starts.shape[1]
-    rows = sets.take(np.repeat(full, n_starts))
-    ends = starts.reshape(-1, axes)
-    for walk in range(n_walks):
-        last = fine and walk == n_walks - 1
-        normal = max_wrench_along(rows, ends, FINE if last else COARSE).normal
-        ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    reach = rows.farthest(ends)[0].reshape(len(full), n_starts)
-    best = reach.argmin(axis=1)
-    size[full] = np.maximum(reach[np.arange(len(full)), best], 0.0)
-    direction[full] = ends.reshape(len(full), n_starts, axes)[np.arange(len(full)), best]
+    for walks, close in ((N_WALKS, COARSE), (FINE_WALKS, FINE))[: 2 if fine else 1]:
+        rows = sets.take(np.repeat(full, starts.shape[1]))
+        ends = starts.reshape(-1, axes)
+        for _ in range(walks):
+            normal = max_wrench_along(rows, ends, close).normal
+            ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        reach = rows.farthest(ends)[0].reshape(starts.shape[:2])
+        best = np.argsort(reach, axis=1)[:, :KEPT]
+        starts = np.take_along_axis(ends.reshape(starts.shape), best[..., None], axis=1)
+    size[full] = np.maximum(reach.min(axis=1), 0.0)
+    direction[full] = starts[:, 0]
     return Extent(size, direction)

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from finlab.analysis import authority
 from finlab.forces.force_sets import SCALE, convex_parts, force_sets
-from finlab.forces.reach import axis_ranges, max_wrench_along, max_wrench_along_exactly, orthogonal_complement
+from finlab.forces.reach import axis_ranges, max_wrench_along, max_wrench_along_exactly
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.forces.conftest import THRUST, largest_by_polygons
@@ -101,13 +101,6 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
         best += np.maximum((plant.wrench(command) / SCALE @ directions.T).max(axis=0), 0.0)
     size, _ = force_sets(layout).tile(len(directions)).farthest(directions)
     assert size == pytest.approx(best, rel=1e-5, abs=1e-9)
-
-
-def test_across_is_a_basis() -> None:
-    drawn = np.random.default_rng(0).standard_normal((20, 6))
-    directions = np.concatenate([BOTH_WAYS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
-    whole = np.concatenate([directions[:, :, None], orthogonal_complement(directions)], axis=-1)
-    assert np.allclose(np.swapaxes(whole, -1, -2) @ whole, np.eye(6))
 
 
 CORNERS = 96
