@@ -23,8 +23,6 @@ from finlab.forces.force_sets import SCALE, ForceSets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness
 
-NEAR = 1e-5
-"""How close faces are looked at, a share of the strongest actuator's wrench."""
 KEPT, DRAWN = 60, 8
 """Most faces that are followed, and random directions, both ways, that look for further ones in each look."""
 FREE = 1e-3  # share of the largest effect on a face's distance up to which a force counts as free
@@ -116,7 +114,7 @@ class Directions:
         rows = sets.take(robot)
         for _ in range(1 if before else FIRST_WALKS):
             ends /= np.linalg.norm(ends, axis=-1, keepdims=True)
-            found = max_wrench_along(rows, ends, NEAR)
+            found = max_wrench_along(rows, ends)
             ends = found.normal
         ends = ends / np.linalg.norm(ends, axis=-1, keepdims=True)
         distance = rows.farthest(ends)[0]

@@ -184,7 +184,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
    that it began with are kept. */
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2]) {
-  real score[FL_SCORES], best[FL_SCORES], own[FL_MOST][2];
+  real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
   int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, product
 from typing import Literal
 
 import numpy as np
@@ -20,9 +20,7 @@ FLAT = 1e-5
 
 Kind = Literal["force", "torque"]
 
-N_DIRECTIONS = 120
-"""Directions that are looked at first; faces that are too far off add theirs."""
-MAX_ROUNDS = 4
+MAX_ROUNDS = 8
 SPECK = 1e-5
 """Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
 TOLERANCE = 0.01
@@ -110,14 +108,14 @@ def attainable_set(
     still lies further than `tolerance`, a share of the farthest vertex, inside the plane that touches the
     set, its normal is sent out too.
     """
-    sets = force_sets(layout, failed, flow)
-    support = _support(sets, kind)
+    support = _support(force_sets(layout, failed, flow), kind)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
-    # Flat robots have flat sets: directions are spread over the sphere that the set would be if scaled.
+    # Flat robots have flat sets: directions are spread over a cube that has been scaled as the set is.
     scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
-    spread = _sphere(N_DIRECTIONS) * scale
-    points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
+    spread = np.array(list(product((-1.0, 0.0, 1.0), repeat=3))) * scale
+    spread = spread[spread.any(axis=-1)]
+    points = support(spread / np.linalg.norm(spread, axis=-1, keepdims=True))[0]
     result = _hull_of(points, kind)
     for round_ in count():
         new, reach = support(result.normals)
@@ -156,11 +154,3 @@ def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Arra
         return np.where(near[:, None], 0.0, points), np.where(near, 0.0, size)
 
     return support
-
-
-def _sphere(n: int) -> Array:
-    """n unit vectors (n, 3), evenly spread along a spiral from pole to pole."""
-    z = 1.0 - (2.0 * np.arange(n) + 1.0) / n
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(n)
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1)

@@ -289,6 +289,5 @@ def convex_parts(sets: ForceSets) -> ForceSets:
         at = parts.place[behind & (parts.place > 0.0)]
         parts.place[behind & (parts.place > 0.0)] += 1.0 + 2.0 * sets.block[at.astype(np.intp)]
     return parts._replace(
-        middle=parts.middle + signs * parts.half,
-        half=np.where(signs == 0.0, 1.0, 0.5) * parts.half,
+        middle=parts.middle + signs * parts.half, half=np.where(signs == 0.0, 1.0, 0.5) * parts.half
     )

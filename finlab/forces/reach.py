@@ -30,8 +30,6 @@ class Largest(NamedTuple):
     """The truth is at most this much smaller (R,) [N]."""
     force: Array
     """Planar forces (R, n, 2) [N] that give it."""
-    wrench: Array
-    """Their scaled wrench (R, m)."""
     normal: Array
     """Direction (R, m) of the plane that touches the set of wrenches there, not normalized."""
 
@@ -50,7 +48,7 @@ def largest(sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: flo
     # A wrench that is not where it was asked for proves nothing.
     extra = np.linalg.norm(wrench - origin - along[:, None] * ray, axis=-1)
     proven = np.where(extra <= max(BESIDE, 3.0 * close) * sets.unit, along, 0.0)
-    return Largest(size, np.maximum(size - proven, 0.0), force, wrench, normal)
+    return Largest(size, np.maximum(size - proven, 0.0), force, normal)
 
 
 def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> Largest:

@@ -15,9 +15,8 @@ HALVES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
 
 def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
     """Robots of fins with arcs of one width."""
-    return ForceSets(
-        effectiveness, radius, middle, np.full_like(middle, half), np.zeros_like(middle), planes(middle.shape[1])
-    )
+    none = np.zeros_like(middle)
+    return ForceSets(effectiveness, radius, middle, none + half, none, planes(middle.shape[1]))
 
 
 def fins(half: float, rows: int = 200) -> ForceSets:
