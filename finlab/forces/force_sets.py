@@ -68,7 +68,8 @@ class ForceSets(NamedTuple):
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
-        return ForceSets(*(field[rows] for field in self[:-1]), self.block)
+        names = self._fields[:-1]
+        return self._replace(**{name: getattr(self, name)[rows] for name in names})
 
     def lose(self, rows: Any, places: Any) -> None:
         """Takes actuators out of some robots, in place."""
@@ -112,7 +113,7 @@ class ForceSets(NamedTuple):
         own[..., :4] = np.stack([self.place, self.radius, self.middle, self.half], axis=-1)
         own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = self.effectiveness / unit[:, None, None, None]
         ends[..., :m] = origin / unit[:, None], ray
-        size, normal, force = reach(self.block, own, *ends, close)
+        size, normal, force = reach(self.block, own, ends[0], ends[1], close)
         return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
@@ -179,10 +180,11 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
             numbers += [np.array([len(corners)]), corners.ravel()]
             end += 1 + corners.size
     directions = np.array([[shape.directions for shape in robot] for robot in shapes])
-    columns = np.array(fields, np.float64).reshape(len(shapes), -1, 4)
+    columns = np.moveaxis(np.array(fields, np.float64).reshape(len(shapes), -1, 4), -1, 0)
+    radius, middle, half, place = np.ascontiguousarray(columns)
     return ForceSets(
         np.ascontiguousarray(directions @ effectiveness / SCALE),
-        *np.ascontiguousarray(np.moveaxis(columns, -1, 0)),
+        *(radius, middle, half, place),
         np.concatenate(numbers),
     )
 
@@ -242,7 +244,7 @@ def _shape(response: Response, is_fin: bool) -> Shape:
 
 def _points(angle: Array, size: Array) -> Array:
     """Forces (S, 2) [N] of angles (S,) [rad] and sizes (S,) [N]."""
-    return size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.asarray(size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
