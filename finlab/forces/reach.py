@@ -70,8 +70,6 @@ def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array,
     return size, float((size - proven).max())
 
 
-CLOSE = 1e-7
-"""How close marks on a scale are."""
 NOTHING = 1e-6
 """Scaled wrench [N] by which the ends of a range may pass each other and it still is one."""
 
@@ -95,7 +93,7 @@ def axis_ranges(
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     held = np.where(axes == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
     rays, held = (np.tile(rows, (len(parts.radius) // len(axes), 1)) for rows in (axes, held))
-    size = largest(parts, rays, held, CLOSE).size.reshape(-1, 2, 6)
+    size = largest(parts, rays, held).size.reshape(-1, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -NOTHING
     high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
