@@ -19,7 +19,7 @@ from packaging.tags import platform_tags
 
 CORE = Path(__file__).with_name("finlab") / "core"
 # No fast math, no contraction, no instructions of this machine alone: results do not depend on the builder.
-FLAGS = shlex.split("-std=c99 -O2 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall")
+FLAGS = shlex.split("-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall")
 ZIG = [sys.executable, "-m", "ziglang", "cc", "-s", "-mcpu=baseline", "-target"]
 # Target as zig names it: platform in the name of the wheel, ending of a library.
 TARGETS = {

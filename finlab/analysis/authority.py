@@ -112,7 +112,7 @@ def _authorities(
     held = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
-    if sets.corners is not None:
+    if flow is not None and layout.by_flow:
         # The hull of a rudder's lift and drag has drag without lift, which pushes alone what nothing does.
         alone = np.array([[axis in own.alone for axis in AXES] for own in held])
         size = np.where(np.tile(alone, 2), size, 0.0)

@@ -15,7 +15,7 @@ from finlab.analysis.authority import AXES, authority, commanded_axes, named_axe
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import LayoutError
-from finlab.forces.force_sets import ForceSets, force_sets
+from finlab.forces.force_sets import ForceSets, shapes_of
 from finlab.forces.reach import weakest
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
@@ -33,7 +33,7 @@ MISSION = (
 )
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0  # what a wrench out of reach costs [W], more than allocations do
-QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "n_walks": 4, "fine": False}
+QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "fine": False}
 """How to find a weakest direction when it has to be quick."""
 
 
@@ -86,11 +86,11 @@ def make_goal(
     if name == "weakest_direction":
         return of_weakest
     if name == "worst_single_failure":
-        count = _directions(force_sets(layout, flow=flow))
-        if count.sum() - count.max() < len(places):
+        counts = [shape.axes for shape in shapes_of(layout, flow)]
+        if sum(counts) - max(counts) < len(places):
             raise LayoutError(
                 f"the goal {name} needs {len(places)} directions after a loss, and layout {layout.name} has "
-                f"{layout.counted}, which push in {count.sum()}; none can fail without losing an axis"
+                f"{layout.counted}, which push in {sum(counts)}; none can fail without losing an axis"
             )
         return after_worst_failure
     if name == "mission_power":
@@ -98,21 +98,14 @@ def make_goal(
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
-def _directions(sets: ForceSets) -> Array:
-    """In how many directions each actuator (n,) of one robot pushes."""
-    return np.asarray(np.where(sets.half[0] > 0.0, 2, 1) * (sets.radius[0] > 0.0))
-
-
 def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
     alone now where it has too few actuators to push both ways along all, wherever they go. Raises
     LayoutError: there are none."""
-    sets = force_sets(layout, flow=flow)
-    back = 0.0 if sets.back is None else sets.back[0]
-    one_way = (sets.half[0] <= 0.5 * np.pi) & ~sets.cornered[0] & (back == 0.0)
+    shapes, commanded = shapes_of(layout, flow), commanded_axes(layout)
     # What pushes one way only has to be one more than there are axes.
-    commanded = commanded_axes(layout)
-    if _directions(sets).sum() > len(commanded) - (not one_way.any()):
+    one_way = any(shape.one_way for shape in shapes)
+    if sum(shape.axes for shape in shapes) > len(commanded) - (not one_way):
         return commanded
     held = authority(layout, flow=flow).reachable
     if not held:

@@ -112,9 +112,9 @@ def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple
         if n_wide > MAX_CUT:
             what = "Largest wrenches, the weakest direction and energies are"
         notes.append(f"{what} of the convex hull: some arcs are wider than half a turn but not full circles.")
-    if sets.corners is not None:
-        notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     still = [name for name in layout.by_flow if name not in failed]
+    if flow is not None and still:
+        notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     if flow is None and still:
         notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):

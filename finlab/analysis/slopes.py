@@ -20,7 +20,7 @@ from finlab.analysis.moves import Moves
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.forces.force_sets import SCALE, ForceSets
-from finlab.forces.reach import COARSE, RANK_TOLERANCE, max_wrench_along, singular_values
+from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness
 
 KEPT, DRAWN = 60, 8
@@ -114,7 +114,7 @@ class Directions:
         rows = sets.take(robot)
         for _ in range(1 if before else FIRST_WALKS):
             ends /= np.linalg.norm(ends, axis=-1, keepdims=True)
-            found = max_wrench_along(rows, ends, COARSE)
+            found = max_wrench_along(rows, ends)
             ends = found.normal
         ends = ends / np.linalg.norm(ends, axis=-1, keepdims=True)
         distance = rows.farthest(ends)[0]

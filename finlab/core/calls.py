@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.core.library import library
 
+HEAD, EACH = 59, 68
+"""Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 MAGIC = 41721.0
 """First number of a block; its version is the second."""
 CODES = (
@@ -151,3 +153,28 @@ class Core:
         worth = np.empty((len(price), self._count, 3))
         self._core.fl_worth(self._at, self._area, price.ctypes.data, len(price), worth.ctypes.data)
         return worth
+
+
+def planes(count: int) -> Array:
+    """A block of n = `count` actuators of which it says that they push in planes, and no more."""
+    block = np.zeros(HEAD + EACH * count)
+    block[3], block[HEAD::EACH] = count, 2.0
+    return block
+
+
+def reach(block: Array, own: Array, origin: Array, ray: Array, close: float) -> tuple[Array, Array, Array]:
+    """How far (R,) rays (R, 6) from points (R, 6) go in what R robots push, minus infinity where they miss
+    it: at most, and as `close`; normals (R, 6) of the planes that prove it, and forces (R, n, 2) there.
+
+    Args:
+        block: of `planes`, and polygons behind: how many corners, then these.
+        own: of each actuator (R, n, 16) the place of its polygon, or 0 and radius, middle and half of a
+            sector, then the wrench (2, 6) per newton along its directions.
+    """
+    core, (count, n, _) = library(), own.shape
+    size, normal, force = np.empty(count), np.empty((count, 6)), np.empty((count, n, 2))
+    work = ctypes.create_string_buffer(core.fl_sizes(3))
+    ins = [values.ctypes.data for values in (own, origin, ray)]
+    outs = [values.ctypes.data for values in (size, normal, force)]
+    core.fl_reach(block.ctypes.data, ctypes.addressof(work), *ins, count, min(close, 1e30), *outs)
+    return np.where(size > -1e30, size, -np.inf), normal, force

@@ -113,6 +113,8 @@ typedef struct {
   fl_mixture mixture;
   fl_node node[FL_DEPTH];
   fl_box box;
+  fl_real column[FL_MOST][2][6]; /* wrench per newton of each row, in weighted axes */
+  int corners[FL_MOST];          /* places of polygons that stand for sets; 0 for none */
   fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
@@ -164,5 +166,7 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, i
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
 void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
+void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_real *from, const fl_real *ray, int count,
+              fl_real close, fl_real *size, fl_real *normal, fl_real *force);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
 #endif

@@ -126,10 +126,10 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
 void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
 
 /* nearest.c */
-void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
-                   real apart, fl_mixture *m);
-void farthest_along(const real *block, const fl_work *work, const real *weight, const real *begin,
-                    const real *ray, fl_mixture *m);
+void weigh(const real *block, fl_work *work, const real *weight);
+void nearest_point(const real *block, const fl_work *work, const real *target, real close, real apart, fl_mixture *m);
+real farthest_along(const real *block, const fl_work *work, const real *from, const real *ray, real least, real most,
+                    real close, fl_mixture *m, real *plane);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 
 /* law.c */

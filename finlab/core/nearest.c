@@ -9,23 +9,37 @@
 #define MOST_POINTS 400
 #define MOST_SHARES (5 * ROUNDS)
 
-/* The forces that are worth most at a normal (6,) in weighted axes, and the point (6,) that they give. */
-static void farthest(const real *block, const fl_work *work, const real *weight, const real *normal,
-                     real force[][2], real *point) {
+/* The wrench, in weighted axes, that each force gives per newton. */
+void weigh(const real *block, fl_work *work, const real *weight) {
   const fl_head *h = HEAD(block);
-  int r = RANGE(block);
-  real price[6] = {0}, given[6] = {0};
-  for (int j = 0; j < r; j++)
-    for (int k = 0; k < 6; k++) price[j] += h->basis[k][j] * h->scale[k] * weight[k] * normal[k];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real own[2];
-    own_price(block, i, price, own);
-    farthest_of(block, i, work->set + i, own, force[i]);
-    for (int q = 0; q < (int)a->rows; q++)
-      for (int j = 0; j < r; j++) given[j] += force[i][q] * a->matrix[q][j];
+    work->corners[i] = 0;
+    for (int q = 0; q < 2; q++)
+      for (int k = 0; k < 6; k++)
+        work->column[i][q][k] = q < a->rows ? weight[k] * h->scale[k] * dot(h->basis[k], a->matrix[q], RANGE(block)) : 0;
   }
-  for (int k = 0; k < 6; k++) point[k] = weight[k] * h->scale[k] * dot(h->basis[k], given, r);
+}
+
+/* The corner of a polygon, a count and pairs, that is worth most. */
+static void best_corner(const real *polygon, const real *price, real *force) {
+  real most = -R(1e30);
+  for (const real *at = polygon + 1, *end = at + 2 * (int)polygon[0]; at < end; at += 2)
+    if (dot(price, at, 2) > most) most = dot(price, at, 2), force[0] = at[0], force[1] = at[1];
+}
+
+/* The forces that are worth most at a normal (6,), and the point (6,) that they give. */
+static void farthest(const real *block, const fl_work *work, const real *normal, real force[][2], real *point) {
+  memset(point, 0, 6 * sizeof *point);
+  for (int i = 0; i < COUNT(block); i++) {
+    const real(*column)[6] = work->column[i];
+    real own[2] = {dot(column[0], normal, 6), dot(column[1], normal, 6)};
+    if (work->corners[i] > 0)
+      best_corner(block + work->corners[i], own, force[i]);
+    else
+      farthest_of(block, i, work->set + i, own, force[i]);
+    for (int k = 0; k < 6; k++) point[k] += force[i][0] * column[0][k] + force[i][1] * column[1][k];
+  }
 }
 
 static void drop(fl_mixture *m, int k) {
@@ -107,20 +121,19 @@ static void miss_of(fl_mixture *m, const real *target) {
   }
 }
 
-/* Makes a mixture the point nearest to a target (6,), in weighted axes; it begins at the mixture, where that has
-   points. Up to the distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. */
-void nearest_point(const real *block, const fl_work *work, const real *weight, const real *target, real close,
-                   real apart, fl_mixture *m) {
+/* Makes a mixture the point nearest to a target (6,); it begins at the mixture, where that has points. Up to the
+   distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. Where there is a miss,
+   what is worth most across it follows the mixture's points. */
+void nearest_point(const real *block, const fl_work *work, const real *target, real close, real apart, fl_mixture *m) {
   real last = R(1e30);
   if (m->count == 0) {
-    farthest(block, work, weight, target, m->force[0], m->point[0]);
+    farthest(block, work, target, m->force[0], m->point[0]);
     m->count = 1, m->done = 0, m->share[0] = 1;
   }
-  for (int k = 0; k < MOST_POINTS; k++) {
+  for (int k = 1;; k++) {
     miss_of(m, target);
     real size = SQRT(dot(m->miss, m->miss, 6)), normal[6], gain = 0;
-    if (size <= close || size >= last * (1 - ROUNDING)) return; /* the second is rounding */
-    last = size;
+    if (size <= close) return;
     if (m->count == FL_POINTS) { /* more than an affine basis: the one of least share goes */
       int least = 0;
       for (int p = 1; p < m->count; p++)
@@ -128,33 +141,55 @@ void nearest_point(const real *block, const fl_work *work, const real *weight, c
       drop(m, least);
     }
     for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
-    farthest(block, work, weight, normal, m->force[m->count], m->point[m->count]);
+    farthest(block, work, normal, m->force[m->count], m->point[m->count]);
     for (int j = 0; j < 6; j++) gain += m->miss[j] * (target[j] + m->miss[j] - m->point[m->count][j]);
-    if (gain <= MAX(close, apart * size) * size) return;
+    if (gain <= MAX(close, apart * size) * size || size >= last * (1 - ROUNDING) || k == MOST_POINTS) return;
+    last = size;
     m->share[m->count++] = 0;
     mix(m, target);
   }
 }
 
-/* The point that is the largest share, from 0 to 1, of a ray (6,) from a point on, in weighted axes. A plane across the miss of a
-   share bounds it from above; the next try is that bound (Dinkelbach). Where no share of the ray is in the set,
-   the point is the nearest one to its beginning. */
-void farthest_along(const real *block, const fl_work *work, const real *weight, const real *begin, const real *ray,
-                    fl_mixture *m) {
-  real share = 1, last = R(1e30), normal[6], force[FL_MOST][2], point[6], target[6];
+/* The point of the set that is farthest along a ray (6,) from a point (6,), at sizes from `least` to `most`. A plane
+   across the miss of a size bounds it from above, and is kept; the next try is that bound (Dinkelbach), until it
+   is as `close`. Returns the bound; where no size is in the set, the least one, and the point is the nearest to it. */
+real farthest_along(const real *block, const fl_work *work, const real *from, const real *ray, real least, real most,
+                    real close, fl_mixture *m, real *plane) {
+  real size = most, last = R(1e30), normal[6], target[6];
   memcpy(normal, ray, sizeof normal);
-  m->count = 0;
+  farthest(block, work, ray, m->force[0], m->point[0]);
+  m->count = m->done = 0, m->share[0] = 1;
   for (int k = 0; k < MOST_SHARES; k++) {
-    real across = dot(normal, ray, 6);
-    farthest(block, work, weight, normal, force, point);
-    share = CLIP(across > 0 ? (dot(point, normal, 6) - dot(begin, normal, 6)) / across : 0, 0, share);
-    for (int j = 0; j < 6; j++) target[j] = begin[j] + share * ray[j];
-    nearest_point(block, work, weight, target, CLOSE_BY, R(0.5), m);
+    real across = dot(normal, ray, 6), bound = least;
+    if (across > 0) bound = (dot(m->point[m->count], normal, 6) - dot(from, normal, 6)) / across;
+    if (bound < size) size = MAX(bound, least), memcpy(plane, normal, sizeof normal);
+    for (int j = 0; j < 6; j++) target[j] = from[j] + size * ray[j];
+    m->count = MAX(m->count, 1);
+    nearest_point(block, work, target, close, R(0.5), m);
     for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
     real miss = SQRT(dot(normal, normal, 6));
-    if (share == 0 || miss <= 2 * CLOSE_BY || (share >= last && miss <= STALLED)) return;
-    last = share >= last ? share - miss / (2 * SQRT(dot(ray, ray, 6))) : share;
-    share = last;
+    if (size == least || miss <= 2 * close || (size >= last && miss <= STALLED)) break;
+    last = size >= last ? size - miss / (2 * SQRT(dot(ray, ray, 6))) : size;
+    size = last;
+  }
+  return size;
+}
+
+/* Of `count` robots of n actuators in planes, which a block counts and no more, how far (count,) a ray (count, 6)
+   from a point (count, 6) goes in what they push: a bound that is as `close`, the normal (count, 6) of its plane, and
+   the forces (count, n, 2) there. Their sets are given (count, n, 16): place of a polygon's corners, or 0 and radius,
+   middle, half of a sector; then the wrench per newton along both directions. */
+void fl_reach(const real *block, fl_work *work, const real *own, const real *from, const real *ray, int count,
+              real close, real *size, real *normal, real *force) {
+  for (int k = 0; k < count; k++, from += 6, ray += 6, normal += 6, force += 2 * COUNT(block)) {
+    for (int i = 0; i < COUNT(block); i++, own += 16) {
+      work->set[i] = (fl_set){.high = own[1], .middle = own[2], .half = own[3]};
+      work->corners[i] = (int)own[0];
+      set_up(block, i, work->set + i);
+      memcpy(work->column[i], own + 4, sizeof work->column[i]);
+    }
+    size[k] = farthest_along(block, work, from, ray, -R(1e30), R(1e30), close, &work->mixture, normal);
+    mixed_force(block, &work->mixture, (real(*)[2])force);
   }
 }
 

@@ -18,14 +18,15 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
     weight[k] = MAX(policy->weight[k], CLOSE) / h->yard[k];
     target[k] = weight[k] * wrench[k];
   }
+  weigh(block, work, weight);
   work->mixture.count = 0;
-  nearest_point(block, work, weight, target, CLOSE_BY, 0, &work->mixture);
+  nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
   mixed_force(block, &work->mixture, force);
 }
 
 static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], begin[6], ray[6], all[6], size, rest;
+  real target[6], weight[6], begin[6], ray[6], all[6], plane[6], size, rest;
   for (int k = 0; k < 6; k++) {
     weight[k] = 1 / h->yard[k];
     all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
@@ -34,7 +35,8 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   rest = beside_range(block, all, target, &size);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
     ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
-  farthest_along(block, work, weight, begin, ray, &work->mixture);
+  weigh(block, work, weight);
+  farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
   mixed_force(block, &work->mixture, force);
 }
 
@@ -58,6 +60,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
     const unsigned char *group = policy->group[g];
     real weight[6], target[6], got[6], missing[6], missed = 0;
     for (int k = 0; k < 6; k++) weight[k] = (HELD * held[k] + group[k]) / h->yard[k];
+    weigh(block, work, weight);
     for (int round = 0; round < (any ? ROUNDS : 1); round++) {
       m->done = 0;
       for (int p = 0; p < m->count; p++) { /* the points so far, in the axes of this group */
@@ -65,7 +68,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
         for (int k = 0; k < 6; k++) m->point[p][k] *= weight[k];
       }
       for (int k = 0; k < 6; k++) target[k] = aim[k] * weight[k];
-      nearest_point(block, work, weight, target, CLOSE_BY * (any ? HELD : 1), 0, m);
+      nearest_point(block, work, target, CLOSE_BY * (any ? HELD : 1), 0, m);
       mixed_force(block, m, force);
       wrench_of(block, force, got);
       for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k];
@@ -184,7 +187,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
    that it began with are kept. Of a ray the share that it gives, and the most that all parts could. */
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *share, real *most_share) {
-  real score[FL_SCORES], best[FL_SCORES], own[FL_MOST][2];
+  real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
   int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);

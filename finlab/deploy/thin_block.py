@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.response import table_numbers
-from finlab.allocation.dual.robot import EACH, HEAD
 from finlab.arrays import Array
+from finlab.core.calls import EACH, HEAD
 from finlab.precision import NOTHING
 
 TOLERANCE = 1e-5

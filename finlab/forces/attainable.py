@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, product
 from typing import Literal
 
 import numpy as np
@@ -22,9 +22,7 @@ FLAT = 1e-5
 
 Kind = Literal["force", "torque"]
 
-N_DIRECTIONS = 120
-"""Directions that are looked at first; faces that are too far off add theirs."""
-MAX_ROUNDS = 4
+MAX_ROUNDS = 8
 SPECK = 1e-5
 """Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
 TOLERANCE = 0.01
@@ -120,16 +118,14 @@ def attainable_set(
     still lies further than `tolerance`, a share of the farthest vertex, inside the plane that touches the
     set, its normal is sent out too.
     """
-    sets = force_sets(layout, failed, flow)
-    support = _support(sets, kind)
+    support = _support(force_sets(layout, failed, flow), kind)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
-    # Flat robots have flat sets: directions are spread over the sphere that the set would be if scaled.
+    # Flat robots have flat sets: directions are spread over a cube that has been scaled as the set is.
     scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
-    spread = _sphere(N_DIRECTIONS) * scale
-    points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
-    if sets.center is None:  # every actuator may rest
-        points = np.concatenate([points, np.zeros((1, 3))])
+    spread = np.array(list(product((-1.0, 0.0, 1.0), repeat=3))) * scale
+    spread = spread[spread.any(axis=-1)]
+    points = support(spread / np.linalg.norm(spread, axis=-1, keepdims=True))[0]
     result = _hull_of(points, kind)
     for round_ in count():
         new, reach = support(result.normals)
@@ -152,25 +148,19 @@ def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Arra
 
     def support(directions: Array) -> tuple[Array, Array]:
         rows = len(directions)
-        normal = np.zeros((n_parts * rows, 6))
-        normal[:, own] = np.tile(directions, (n_parts, 1))
-        basis = np.broadcast_to(np.eye(6)[:, other], (len(normal), 6, 3))
-        answer = largest(parts.repeat(rows), normal, basis)
+        along = np.tile(directions, (n_parts, 1))
+        asked = parts.repeat(rows)
+        # What is along the direction counts, and what has to be zero.
+        own_columns = asked.effectiveness[..., own] @ along[:, None, :, None]
+        seen = np.concatenate([own_columns, asked.effectiveness[..., other]], axis=-1)
+        answer = largest(asked._replace(effectiveness=seen), np.tile(np.eye(4)[0], (len(along), 1)))
         reach = answer.size.reshape(n_parts, rows)
         best = reach.argmax(axis=0) * rows + np.arange(rows)
         # The origin stands in for a point that is not proven to be attained.
         proven = answer.gap < UNPROVEN * (1.0 + answer.size)
-        points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
+        points = np.where(proven[:, None], asked.wrench(answer.force)[:, own], 0.0)
         points, size = points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
         near = np.linalg.norm(points, axis=-1) <= speck
         return np.where(near[:, None], 0.0, points), np.where(near, 0.0, size)
 
     return support
-
-
-def _sphere(n: int) -> Array:
-    """n unit vectors (n, 3), evenly spread along a spiral from pole to pole."""
-    z = 1.0 - (2.0 * np.arange(n) + 1.0) / n
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(n)
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1)

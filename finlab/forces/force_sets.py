@@ -3,11 +3,11 @@
 A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its largest
 thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn is not convex: here
 it stands for its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has
-cut it in two. Where a fin pushes harder in some directions than in others, the disc is cut down to its convex
-hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a foil, pushes what
-its law gives between its limits: here the convex hull of that, a polygon. Dead bands, and the tiny thrust
-that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, one
-that pushes either way within an arc that around both parts.
+cut it in two. All else is a polygon: the line of a thruster, the convex hull of what a fin pushes that pushes
+harder in some directions than in others, and that of what the flow gives, such as the lift and drag of a foil
+between its limits. Dead bands, and the tiny thrust that a fin cannot go below, are left out; an azimuth that
+cannot stop has the polygon around what is left, one that pushes either way within an arc that around both
+parts.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -26,7 +26,8 @@ from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.kinds import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
-from finlab.axes import TURN, wrapped
+from finlab.axes import TURN
+from finlab.core.calls import planes, reach
 from finlab.layout import Layout
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
@@ -37,14 +38,13 @@ SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 """What a wrench is divided by, entry by entry."""
 HALF_TURN_TOLERANCE = 1e-9
 """By how much half an arc [rad] may exceed a quarter turn and still be convex."""
-BOUNDARY, POINTS = 48, 193
-"""Sides of the polygon around an uneven fin's forces, 0.2 % too wide; directions in its arc."""
-ALONG, SIDES = 193, 24
-"""Forces of an actuator along its limits, or its rim, of which a polygon is made; and sides of one for forces
-of the flow: they lie inside by at most 1 % of its width."""
+ALONG = 193
+"""Forces of an actuator along its limits, or its rim, of which a polygon is made."""
+UNEVEN, BOUNDARY, SIDES = 193, 48, 24
+"""Sides of the polygon of an uneven fin, of an azimuth and of forces of the flow: they lie inside by at most
+0.01 %, 0.2 % and 1 % of its width."""
 THINNEST = 1e-3
-"""Share of a set's length below which it has no width, and least distance of a side of a polygon from its
-centre, as a share of the radius."""
+"""Share of a set's length below which it has no width."""
 MAX_CUT = 3
 """Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts each time."""
 
@@ -55,41 +55,29 @@ class ForceSets(NamedTuple):
     effectiveness: Array
     """Scaled wrench per newton (R, n, 2, m) along both axes of each actuator's plane."""
     radius: Array
-    """Largest force (R, n) [N], of polygons from their centre."""
+    """Largest force (R, n) [N], of polygons that do not hold 0 from their middle."""
     middle: Array
     """Middle of the arc of force directions (R, n) [rad]."""
     half: Array
-    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line."""
-    boundary: Array | None = None
-    """How far the sets reach along M evenly spaced directions (R, n, M), the first at zero, as shares of the
-    radius; None where every fin is the same all round."""
-    back: Array | None = None
-    """Share (R, n) of the radius that a line gives backwards; None where none does."""
-    center: Array | None = None
-    """Force (R, n, 2) [N] from which an actuator's set is seen; None where all are seen from 0."""
-    corners: Array | None = None
-    """Corners (R, n, K, 2) [N] of polygons from their centres, counter-clockwise, the last one repeated;
-    0 for other actuators; None where there is none. An actuator of one command, such as a foil, has a half
-    of 0: it gives only one side of its polygon, and counts as one direction."""
+    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for an actuator of one command,
+    such as a foil, whatever its polygon."""
+    place: Array
+    """Where in the block the polygon (R, n) is; 0 for a sector."""
+    block: Array
+    """Polygons, of all robots, for the core."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
-        return ForceSets(*(None if field is None else field[rows] for field in self))  # type: ignore[arg-type]
+        names = self._fields[:-1]
+        return self._replace(**{name: getattr(self, name)[rows] for name in names})
 
     def lose(self, rows: Any, places: Any) -> None:
         """Takes actuators out of some robots, in place."""
-        for field in (self.radius, self.center, self.corners):
-            if field is not None:
-                field[rows, places] = 0.0
+        self.effectiveness[rows, places] = self.radius[rows, places] = 0.0
 
     def along(self, places: Sequence[int] | NDArray[np.intp]) -> ForceSets:
         """Returns the sets in some of the wrench's coordinates alone."""
         return self._replace(effectiveness=np.ascontiguousarray(self.effectiveness[..., places]))
-
-    @property
-    def offset(self) -> Array | float:
-        """Scaled wrenches (R, m) of what the sets are seen from."""
-        return 0.0 if self.center is None else self.wrench(self.center)
 
     def repeat(self, times: int) -> ForceSets:
         """Returns each robot several times, side by side."""
@@ -109,39 +97,30 @@ class ForceSets(NamedTuple):
         rows, n = self.radius.shape
         return (force.reshape(rows, 1, 2 * n) @ self.effectiveness.reshape(rows, 2 * n, -1))[:, 0]
 
+    @property
+    def unit(self) -> Array:
+        """Scaled wrench (R,) [N] of each robot's strongest actuator."""
+        size: Array = (np.sqrt((self.effectiveness**2).sum((-1, -2))) * self.radius).max(-1)
+        return np.where(size > 0.0, size, 1.0)
+
+    def reach(self, origin: Array, ray: Array, close: float) -> tuple[Array, Array, Array]:
+        """Returns how far (R,) rays (R, m) from points (R, m) go within all wrenches, minus infinity where
+        they meet none: never less than that, and the planar forces (R, n, 2) found are off the end by at most
+        twice `close`, in the strongest actuator's wrench; and the normal (R, m) of the plane that proves
+        it."""
+        rows, n, _, m = self.effectiveness.shape
+        own, unit, ends = np.zeros((rows, n, 16)), self.unit, np.zeros((2, rows, 6))
+        own[..., :4] = np.stack([self.place, self.radius, self.middle, self.half], axis=-1)
+        own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = self.effectiveness / unit[:, None, None, None]
+        ends[..., :m] = origin / unit[:, None], ray
+        size, normal, force = reach(self.block, own, ends[0], ends[1], close)
+        return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
+
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar forces (R,
         n, 2) that reach it; where a sector is wider than half a turn, those of its hull."""
-        pull = self.pull(normal)
-        size = np.sqrt((pull**2).sum(-1))
-        angle = wrapped(np.arctan2(pull[..., 1], pull[..., 0]) - self.middle)
-        held = np.clip(angle, -self.half, self.half)
-        share = np.cos(angle - held)
-        thrust = np.where(share > 1e-12, self.radius, 0.0)
-        if self.back is not None:
-            thrust = np.where(share < -1e-12, -self.back * self.radius, thrust)
-        direction = self.middle + held
-        reach = thrust * share
-        if self.boundary is not None:
-            support, inside = _along_boundary(self.boundary, self.middle + angle, direction)
-            reach, thrust = np.minimum(reach, self.radius * support), thrust * inside
-        reach = reach * size
-        force = thrust[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-        if self.corners is not None:
-            along = (self.corners @ pull[..., None])[..., 0]
-            best = np.take_along_axis(self.corners, along.argmax(-1)[..., None, None], axis=2)[:, :, 0]
-            reach = np.where(self.cornered, along.max(-1), reach)
-            force = np.where(self.cornered[..., None], best, force)
-        if self.center is not None:
-            reach, force = reach + (pull * self.center).sum(-1), force + self.center
-        return reach.sum(-1), force
-
-    @property
-    def cornered(self) -> NDArray[np.bool_]:
-        """Which actuators (R, n) have corners."""
-        if self.corners is None:
-            return np.zeros(self.radius.shape, bool)
-        return np.asarray(self.corners.any((-1, -2)))
+        size, _, force = self.reach(np.zeros_like(normal), normal, np.inf)
+        return size * (normal * normal).sum(-1), force
 
     def full_effectiveness(self) -> Array:
         """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane;
@@ -164,10 +143,21 @@ class Shape(NamedTuple):
     radius: float
     middle: float
     half: float
-    boundary: Array | None = None
-    back: float | None = None
-    center: Array | None = None
-    corners: Array | None = None
+    polygons: tuple[Array, ...] = ()
+    """Corners (K, 2) [N] of a polygon and, where its arc is wide, of those of the upper and the lower half of
+    it; none for a sector."""
+
+    @property
+    def axes(self) -> int:
+        """In how many directions it pushes."""
+        return (2 if self.half > 0.0 else 1) if self.radius > 0.0 else 0
+
+    @property
+    def one_way(self) -> bool:
+        """Whether it cannot push against the middle of its arc."""
+        ahead = np.array([math.cos(self.middle), math.sin(self.middle)])
+        back = min((float((corners @ ahead).min()) for corners in self.polygons), default=0.0)
+        return self.half <= 0.5 * math.pi and back >= -THINNEST * self.radius
 
 
 def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
@@ -182,28 +172,20 @@ def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | N
 
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
     """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
-    every = [shape for robot in shapes for shape in robot]
-    most = max((len(shape.corners) for shape in every if shape.corners is not None), default=0)
-
-    def gathered(name: str, rest: Any = None) -> Any:
-        values = [getattr(shape, name) for shape in every]
-        if all(value is None for value in values):
-            return None
-        if name == "corners":
-            last = np.arange(most)
-            values = [None if own is None else own[np.minimum(last, len(own) - 1)] for own in values]
-        result = np.array([rest if value is None else value for value in values], np.float64)
-        return result.reshape(len(shapes), -1, *result.shape[1:])
-
+    numbers = [planes(len(shapes[0]))]
+    fields, end = [], len(numbers[0])
+    for shape in (shape for robot in shapes for shape in robot):
+        fields.append((shape.radius, shape.middle, shape.half, end if shape.polygons else 0))
+        for corners in shape.polygons:
+            numbers += [np.array([len(corners)]), corners.ravel()]
+            end += 1 + corners.size
+    directions = np.array([[shape.directions for shape in robot] for robot in shapes])
+    columns = np.moveaxis(np.array(fields, np.float64).reshape(len(shapes), -1, 4), -1, 0)
+    radius, middle, half, place = np.ascontiguousarray(columns)
     return ForceSets(
-        np.ascontiguousarray(gathered("directions") @ effectiveness / SCALE),
-        gathered("radius"),
-        gathered("middle"),
-        gathered("half"),
-        gathered("boundary", np.ones(BOUNDARY)),
-        gathered("back", 0.0),
-        gathered("center", (0.0, 0.0)),
-        gathered("corners", np.zeros((most, 2))),
+        np.ascontiguousarray(directions @ effectiveness / SCALE),
+        *(radius, middle, half, place),
+        np.concatenate(numbers),
     )
 
 
@@ -230,35 +212,43 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
 
 def _shape(response: Response, is_fin: bool) -> Shape:
     """What an actuator with an answer to prices, by its own axes, can push."""
+    least, largest = response.ends
     if not isinstance(response, Plane):
         directions = np.stack([response.effectiveness[:3], np.zeros(3)])
-        low, high = response.ends
-        if low > 0.0 or high < 0.0:
-            center = np.array([0.5 * (low + high), 0.0])
-            return Shape(directions, 0.5 * (high - low), 0.0, 0.0, back=1.0, center=center)
-        far, near = max(high, -low), min(high, -low)
-        back = near / far if near > 0.0 else None
-        return Shape(directions, far, 0.0 if high >= -low else math.pi, 0.0, back=back)
-    directions, (least, largest) = response.effectiveness[:, :3], response.ends
-    boundary = None
-    if response.gauge is not None:
-        largest, boundary = largest * float(response.gauge.max()), _boundary(response, response.gauge)
-    middle, half = response.middle, response.half
+        radius = max(largest, -least) if least <= 0.0 <= largest else 0.5 * (largest - least)
+        return Shape(directions, radius, 0.0, 0.0, (np.array([[least, 0.0], [largest, 0.0]]),))
+    directions, middle, half = response.effectiveness[:, :3], response.middle, response.half
     turn = half * np.linspace(-1.0, 1.0, ALONG)
+    if response.gauge is not None or half == 0.0:
+        gauge = np.ones(1) if response.gauge is None else response.gauge
+        around = TURN / len(gauge) * np.arange(len(gauge) + 1)
+        arcs = (-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)
+        rims = [middle + half * np.linspace(*arc, ALONG) for arc in arcs[: 3 if _is_wide(half) else 1]]
+        sizes = [largest * np.interp(rim % TURN, around, np.append(gauge, gauge[0])) for rim in rims]
+        ends = [np.append(_points(*rim), [[0.0, 0.0]], axis=0) for rim in zip(rims, sizes, strict=True)]
+        hulls = [_polygon(directions, points, half, UNEVEN) for points in ends]
+        return hulls[0]._replace(
+            radius=largest * float(gauge.max()),
+            middle=middle,
+            polygons=tuple(hull.polygons[0] for hull in hulls),
+        )
     if least < 0.0 and half < np.pi:
-        angle, size = middle + np.append(turn, turn), np.repeat((largest, least), ALONG)
+        points = _points(middle + np.append(turn, turn), np.repeat((largest, least), ALONG))
     elif is_fin or least <= THINNEST * largest or half > 0.5 * np.pi:
-        return Shape(directions, max(largest, -least), middle, half, boundary)
+        return Shape(directions, max(largest, -least), middle, half)
     else:
         angle = middle + np.append(turn, (-half, half))
-        size = np.append(np.full(ALONG, largest), (least, least))
-    return _polygon(
-        directions, size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.pi, BOUNDARY
-    )
+        points = _points(angle, np.append(np.full(ALONG, largest), (least, least)))
+    return _polygon(directions, points, np.pi, BOUNDARY)
+
+
+def _points(angle: Array, size: Array) -> Array:
+    """Forces (S, 2) [N] of angles (S,) [rad] and sizes (S,) [N]."""
+    return np.asarray(size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon that fills the convex hull of forces (S, 2) [N]; a line or a point where it has no width."""
+    """A polygon that fills the convex hull of forces (S, 2) [N]; two of them where it has no width."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
@@ -266,52 +256,25 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
     length, width = high - low
     angle = math.atan2(axes[0, 1], axes[0, 0])
     if width <= THINNEST * length or length == 0.0:
-        center = middle + (0.5 * (low + high)) @ axes
-        if not center.any() and not length:
-            return Shape(directions, 0.0, 0.0, 0.0)
-        return Shape(directions, 0.5 * length, angle, 0.0, back=1.0, center=center)
+        ends = np.array([low, high])
+        ends[:, 1] = ends[:, 1].mean()
+        return Shape(directions, 0.5 * length, angle, 0.0, (middle + ends @ axes,))
     # Corners are the farthest points in directions around a set as wide as it is long.
     turn = TURN / sides * np.arange(sides)
     best = (along / (length, width) @ np.stack([np.cos(turn), np.sin(turn)])).argmax(axis=0)
     corners = points[best[best != np.roll(best, 1)]]
-    corners = corners if np.linalg.det(axes) > 0.0 else corners[::-1]
-    center = corners.mean(axis=0)
-    radius = float(np.linalg.norm(corners - center, axis=-1).max())
-    return Shape(directions, radius, angle, half, center=center, corners=corners - center)
+    radius = float(np.linalg.norm(corners - corners.mean(axis=0), axis=-1).max())
+    return Shape(directions, radius, angle, half, (corners,))
 
 
-def _boundary(plane: Plane, gauge: Array) -> Array:
-    """How far the hull of what an uneven fin can push reaches (BOUNDARY,), as shares of its largest force."""
-    angle = plane.middle + plane.half * np.linspace(-1.0, 1.0, POINTS)
-    gauge = np.append(gauge, gauge[0])
-    reach = np.interp(angle % TURN, TURN / (len(gauge) - 1) * np.arange(len(gauge)), gauge)
-    sides = TURN / BOUNDARY * np.arange(BOUNDARY)
-    ahead = (reach[:, None] * np.cos(angle[:, None] - sides)).max(axis=0)
-    return np.asarray(np.maximum(ahead, 0.0) / gauge.max())
-
-
-def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Array, Array]:
-    """How far (R, n) sets with rims (R, n, M) reach along the directions `pull` (R, n) [rad], and how far out
-    along `direction` (R, n) they end, both as shares of the radius."""
-    count = boundary.shape[-1]
-    gap = 2.0 * np.pi / count
-    place = np.mod(pull, 2.0 * np.pi) / gap
-    before = np.minimum(place.astype(np.intp), count - 1)
-    here = np.take_along_axis(boundary, before[..., None], axis=-1)[..., 0]
-    after = np.take_along_axis(boundary, (before[..., None] + 1) % count, axis=-1)[..., 0]
-    # The corner between two sides of the polygon.
-    part = (place - before) * gap
-    support = (here * np.sin(gap - part) + after * np.sin(part)) / np.sin(gap)
-    deflection = np.cos(direction[..., None] - np.arange(count) * gap)
-    ends = np.where(deflection > 0.1, boundary / np.where(deflection > 0.1, deflection, 1.0), np.inf)
-    return support, np.minimum(ends.min(-1), 1.0)
+def _is_wide(half: Any) -> Any:
+    """Whether an arc of half an angle [rad] is wider than half a turn and no full circle."""
+    return (half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi)
 
 
 def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
     """Returns the places of working actuators whose arcs are wider than half a turn and no full circle."""
-    alive = (sets.radius > 0.0).any(axis=0)
-    half = sets.half[0]
-    return np.flatnonzero((half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi) & alive)
+    return np.flatnonzero(_is_wide(sets.half[0]) & (sets.radius > 0.0).any(axis=0))
 
 
 def convex_parts(sets: ForceSets) -> ForceSets:
@@ -324,6 +287,9 @@ def convex_parts(sets: ForceSets) -> ForceSets:
     signs = np.repeat(signs, len(sets.radius), axis=1)
     signs = signs.reshape(-1, signs.shape[-1])
     parts = sets.tile(2 ** len(cut))
+    for behind in (signs != 0.0, signs < 0.0):  # the upper and the lower half follow the whole arc
+        at = parts.place[behind & (parts.place > 0.0)]
+        parts.place[behind & (parts.place > 0.0)] += 1.0 + 2.0 * sets.block[at.astype(np.intp)]
     return parts._replace(
         middle=parts.middle + signs * parts.half, half=np.where(signs == 0.0, 1.0, 0.5) * parts.half
     )

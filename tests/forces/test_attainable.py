@@ -11,7 +11,6 @@ from finlab.actuators.thrust_model import PowerLaw
 from finlab.analysis import AttainableSet, attainable_set, authority, score_card
 from finlab.axes import AXES as WRENCH
 from finlab.errors import LayoutError
-from finlab.forces.attainable import _sphere
 from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import axis_ranges, max_wrench_along_exactly
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
@@ -104,16 +103,6 @@ def test_faces_are_seen_from_outside(shipped: Layouts) -> None:
 def test_an_unknown_failed_fin_is_an_error(shipped: Layouts) -> None:
     with pytest.raises(LayoutError, match="has no fin 'nobody'"):
         attainable_set(shipped("A"), "force", failed=("nobody",))
-
-
-def test_directions_are_spread_evenly() -> None:
-    """As far apart as the same number of circles that tile the sphere, or nearly."""
-    for n in (50, 400):
-        points = _sphere(n)
-        np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
-        near = np.sort(points @ points.T, axis=1)[:, -2]
-        gap = np.arccos(near) / np.sqrt(4.0 * np.pi / n)
-        assert gap.min() > 0.86 and gap.max() < 1.0  # the golden angle leaves no near pair
 
 
 AXES = np.concatenate([np.eye(6), -np.eye(6)])

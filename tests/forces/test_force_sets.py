@@ -4,10 +4,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.forces.force_sets import MAX_CUT, ForceSets, convex_parts
+from finlab.core.calls import planes
+from finlab.forces.force_sets import MAX_CUT, ForceSets, Shape, assembled, convex_parts, force_sets
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
-HALVES = [0.0, 0.4, np.pi / 2, 1.9, 2.9, np.pi]
+HALVES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
+
+
+def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
+    """Robots of fins with arcs of one width."""
+    none = np.zeros_like(middle)
+    return ForceSets(effectiveness, radius, middle, none + half, none, planes(middle.shape[1]))
 
 
 def fins(half: float, rows: int = 200) -> ForceSets:
@@ -15,8 +24,7 @@ def fins(half: float, rows: int = 200) -> ForceSets:
     rng = np.random.default_rng(0)
     effectiveness = np.zeros((rows, 1, 2, 6))
     effectiveness[:, 0, 0, 0] = effectiveness[:, 0, 1, 1] = 1.0
-    middle = rng.uniform(-np.pi, np.pi, (rows, 1))
-    return ForceSets(effectiveness, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
+    return sectors(effectiveness, np.full((rows, 1), 3.0), rng.uniform(-np.pi, np.pi, (rows, 1)), half)
 
 
 def pulls(rows: int = 200) -> Array:
@@ -41,44 +49,46 @@ def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
         assert best - 1e-9 <= reach[row] <= best + 1e-3
 
 
-@pytest.mark.parametrize("count", [12, 48])
-def test_an_uneven_fin_reaches_as_far_as_the_polygon_around_it(count: int) -> None:
-    """Ellipses off their centres, by their polygons' corners; what is pushed lies on the polygon itself."""
-    side = 2.0 * np.pi / count * np.arange(count)
-    normals = np.stack([np.cos(side), np.sin(side)], axis=-1)
-    rng, sets, pull = np.random.default_rng(4), fins(np.pi), pulls()
-    long, short, tilt = rng.uniform(0.6, 0.8, 200), rng.uniform(0.3, 0.6, 200), rng.uniform(0.0, 3.0, 200)
-    ahead = np.hypot(
-        long[:, None] * np.cos(side - tilt[:, None]), short[:, None] * np.sin(side - tilt[:, None])
-    )
-    boundary = ahead + 0.15 * np.cos(side - 1.0)
-    uneven = sets._replace(boundary=boundary[:, None])
-    reach, force = uneven.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4))))
-    corners = np.linalg.solve(
-        np.stack([normals, np.roll(normals, -1, axis=0)], axis=1)[None],
-        3.0 * np.stack([boundary, np.roll(boundary, -1, axis=1)], axis=2)[..., None],
-    )[..., 0]
-    np.testing.assert_allclose(reach, np.einsum("rkc,rc->rk", corners, pull[:, 0]).max(1), rtol=1e-9)
-    outward = (force[:, 0] @ normals.T) / (3.0 * boundary)
-    np.testing.assert_allclose(outward.max(1), 1.0, rtol=1e-9)
-    np.testing.assert_allclose(
-        np.arctan2(force[:, 0, 1], force[:, 0, 0]), np.arctan2(pull[:, 0, 1], pull[:, 0, 0]), atol=1e-9
-    )
-    # A polygon farther out than the disc leaves the disc.
-    plain = sets._replace(boundary=np.full((200, 1, count), 1.5))
-    for found, known in zip(
-        plain.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
-        sets.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
-        strict=True,
-    ):
-        np.testing.assert_allclose(found, known)
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_a_polygon_reaches_to_its_best_corner(turn: float) -> None:
+    corners = np.array([[3.0, 1.0], [2.0, 4.0], [1.0, 1.0], [2.5, -0.5]])
+    line = np.array([[-1.0, 0.0], [2.0, 0.0]]) @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    for polygon in (corners, line):
+        sets = assembled([[Shape(np.eye(2, 3), 1.0, 0.0, 0.0, (polygon,))]], np.eye(3, 6)[None, None])
+        pull = pulls()[:, 0]
+        reach, force = sets.tile(200).farthest(np.pad(pull, ((0, 0), (0, 4))))
+        np.testing.assert_allclose(reach, (polygon @ pull.T).max(axis=0), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose((force[:, 0] * pull).sum(-1), reach, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("half", [0.8, 2.5, np.pi])
+def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
+    """Its polygon, and those of both halves of a wide arc, beside the forces of many commands."""
+    numbers = {"k": 3.0, "p": 1.5, "x0": 0.9, "q": 4.0, "e": 0.2, "phi_e": 1.0, "d": 0.1}
+    limits = Limits(zero_direction=(0.3 - half, 0.3 + half))
+    fin = Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, FinModelSpec("soft", tuple(sorted(numbers.items()))))
+    layout = Layout("one", (fin,))
+    axes = [np.linspace(low, high, 40) for low, high in zip(fin.lower, fin.upper, strict=True)]
+    axes[2] = np.linspace(*limits.zero_direction, 2001)
+    command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    force = np.concatenate([Plant(layout).wrench(command)[:, 1:3], np.zeros((1, 2))])
+    angle = np.arange(60) * 2.0 * np.pi / 60
+    normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    sets = force_sets(layout)
+    parts = convex_parts(sets)
+    ahead = [sets.middle[0, 0], *parts.middle[:, 0]] if len(parts.radius) > 1 else [sets.middle[0, 0]]
+    for number, part in enumerate([sets, *(parts.take(np.array([k])) for k in range(len(ahead) - 1))]):
+        turned = (np.arctan2(force[:, 1], force[:, 0]) - ahead[number] + np.pi) % (2.0 * np.pi) - np.pi
+        own = force[(np.abs(turned) <= part.half[0, 0] + 1e-6) | (force == 0.0).all(-1)]
+        reach = part.tile(60).farthest(np.pad(normal, ((0, 0), (1, 3))))[0]
+        np.testing.assert_allclose(reach, (own @ normal.T).max(axis=0), atol=2e-3 * sets.radius[0, 0])
 
 
 def five_fins(half: float) -> ForceSets:
     """Two robots of five fins with the same arcs."""
     effectiveness = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
     middle = np.tile(np.linspace(-2.0, 2.0, 5), (2, 1))
-    return ForceSets(effectiveness, np.ones((2, 5)), middle, np.full((2, 5), half))
+    return sectors(effectiveness, np.ones((2, 5)), middle, half)
 
 
 @pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**MAX_CUT)])

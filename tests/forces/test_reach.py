@@ -7,11 +7,13 @@ import pytest
 from scipy.optimize import linprog
 
 from finlab.analysis import authority
-from finlab.forces.force_sets import SCALE, convex_parts, force_sets
-from finlab.forces.reach import axis_ranges, max_wrench_along, max_wrench_along_exactly, orthogonal_complement
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
+from finlab.forces.reach import axis_ranges, largest, max_wrench_along, max_wrench_along_exactly
 from finlab.layout import Layout
 from finlab.physics import Plant
+from tests.exhaustive import crossed
 from tests.forces.conftest import THRUST, largest_by_polygons
+from tests.forces.test_force_sets import HALVES, sectors
 
 Layouts = Callable[[str], Layout]
 BOTH_WAYS = np.concatenate([np.eye(6), -np.eye(6)])
@@ -103,11 +105,44 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
     assert size == pytest.approx(best, rel=1e-5, abs=1e-9)
 
 
-def test_across_is_a_basis() -> None:
-    drawn = np.random.default_rng(0).standard_normal((20, 6))
-    directions = np.concatenate([BOTH_WAYS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
-    whole = np.concatenate([directions[:, :, None], orthogonal_complement(directions)], axis=-1)
-    assert np.allclose(np.swapaxes(whole, -1, -2) @ whole, np.eye(6))
+def robots(half: float, scale: float) -> ForceSets:
+    rng = np.random.default_rng(5)
+    effectiveness = scale * rng.standard_normal((40, 5, 2, 6))
+    return sectors(effectiveness, rng.uniform(0.5, 3.0, (40, 5)), rng.uniform(-3.0, 3.0, (40, 5)), half)
+
+
+@pytest.mark.parametrize(("half", "scale"), crossed(HALVES, [1e-3, 1.0, 1e3], every=2))
+def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
+    sets, rng = robots(half, scale), np.random.default_rng(6)
+    ray = rng.standard_normal((40, 6))
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    inside = sets.farthest(rng.standard_normal((40, 6)))[1]
+    origin = 0.5 * sets.wrench(inside)
+    found = largest(sets, ray, origin)
+    end = origin + found.size[:, None] * ray
+    normal = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
+    small = 1e-7 * float(sets.unit.max())
+    assert (normal * end).sum(-1) == pytest.approx(sets.farthest(normal)[0], rel=1e-9, abs=small)
+    assert sets.wrench(found.force) == pytest.approx(end, abs=small)
+    assert found.gap.max() < small
+    assert (np.linalg.norm(found.force, axis=-1) <= sets.radius * (1.0 + 1e-9)).all()
+    if half <= np.pi / 2:
+        angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.middle
+        assert (np.cos(angle) >= np.cos(half) - 1e-6)[np.linalg.norm(found.force, axis=-1) > 1e-3].all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_robots_without_anything_to_push_with() -> None:
+    sets = robots(1.0, 1.0)
+    ray = np.tile(np.eye(6)[0], (40, 1))
+    for dead in (
+        sets._replace(radius=np.zeros((40, 5))),
+        sets._replace(effectiveness=np.zeros((40, 5, 2, 6))),
+        sets._replace(effectiveness=np.repeat(sets.effectiveness[:, :1], 5, axis=1)),
+    ):
+        found = max_wrench_along(dead, ray)
+        assert found.size == pytest.approx(np.zeros(40), abs=1e-6) and np.isfinite(found.normal).all()
+        assert largest(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max() == -np.inf
 
 
 CORNERS = 96
@@ -145,6 +180,8 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, .
         ("penta", [5, 1, -3, 0.1, 0.2, 0.3], ()),
         ("restricted", [0, 0, 0, 0, 0, 0], ()),
         ("no_yaw", [1.2, 0, 0, 0, 0, 0.25], ()),
+        ("A", [1, 0.5, -4, 0.5, 0.8, 0.3], ("front_right",)),
+        ("restricted", [1, 1, 5, 0.5, 0.2, -1], ("front_right",)),
     ],
 )
 def test_ranges_are_those_of_linear_programmes(

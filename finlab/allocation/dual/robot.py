@@ -11,7 +11,7 @@ from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
 from finlab.arrays import AnyArray, Array
 from finlab.axes import TURN
-from finlab.core.calls import MAGIC, Core
+from finlab.core.calls import EACH, HEAD, MAGIC, Core
 from finlab.core.library import VERSION
 from finlab.precision import CLOSE, NEARLY, NOTHING
 
@@ -124,8 +124,6 @@ class DualRobot:
         return np.hstack([*parts, self._tables]).astype(np.float64)
 
 
-HEAD, EACH = 59, 68
-"""Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 _KINDS = "thruster", "pod", "fin", "foil"
 
 
