@@ -19,6 +19,7 @@ SIGNATURES = {
     "fl_first": "vpppp",
     "fl_look": "rppppp",
     "fl_worth": "vpppip",
+    "fl_jets": "vppipppp",
 }
 """What each function returns and takes: i int, r real, p pointer, v nothing."""
 _TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "v": None}
