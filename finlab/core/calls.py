@@ -92,7 +92,7 @@ class Core:
     def __init__(self, block: Array, count: int) -> None:
         """Takes the block of a robot of n = `count` actuators."""
         core = library()
-        self._core, self._block, self._count = core, block, count
+        self._core, self.block, self._count = core, block, count
         self._work = ctypes.create_string_buffer(core.fl_sizes(3))
         self._question, self._answer, self._lock = _Question(), _Answer(), Lock()
         self._to, self._from = ctypes.addressof(self._question), ctypes.addressof(self._answer)
@@ -129,7 +129,7 @@ class Core:
                 self._inner[:], question.inner = inner, self._inner_at
             if previous is not None:
                 self._previous[:], question.previous = previous, self._previous_at
-            if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
+            if error := self._ask():
                 raise ValueError(f"the core got {CODES[error]}")
             vectors = self._vectors.copy()
             found = Found(
@@ -143,6 +143,10 @@ class Core:
                 answer.ended != 0,
             )
             return found, vectors[6:12], answer.status
+
+    def _ask(self) -> int:
+        code: int = self._core.fl_answer_one(self._at, self._area, self._to, self._from)
+        return code
 
     def many(self, wrenches: Array, policy: Any) -> Found:
         """The answers to wrenches (N, 6)."""

@@ -1,0 +1,168 @@
+/* Answers where actuators act on each other, in turns: the dual of the model made linear at the last forces, then
+   Levenberg-Marquardt steps on the whole model. finlab/allocation/dual/turns.py says why they settle. */
+#include "inner.h"
+
+#define HALVINGS 4 /* most times that a step is made shorter, and by how much */
+#define SHORTER R(0.3)
+#define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model */
+
+/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
+typedef void (*effect)(const real *known, const real *force, int count, const real *inflow, real *change, real *wrench,
+                       real *slope);
+typedef struct {
+  effect effect;
+  const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
+  const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
+  real counts[6];     /* 1 of axes that count, else 0 */
+} whole;
+
+/* Makes the wrench of a block linear at commands; their miss of an aim, on the yardstick. */
+static real linear_at(const whole *w, real *block, const real *aim, real command[][3], real *miss) {
+  int n = COUNT(block);
+  real force[FL_MOST][3], body[FL_MOST][3] = {{0}}, none[FL_MOST][3], offset[6], slope[FL_MOST][3][6];
+  fl_head *h = (fl_head *)block;
+  for (int i = 0; i < n; i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    force_of(w->plain, i, command[i], force[i], 0);
+    for (int c = 0; c < 3; c++) {
+      real own = force[i][c] + (a->form == FL_FOIL && c == 1 ? a->pressure * a->rest : 0);
+      for (int b = 0; b < 3; b++) body[i][b] += own * w->frames[9 * i + 3 * c + b];
+    }
+  }
+  w->effect(w->known, *body, 1, w->inflow, *none, offset, **slope);
+  for (int k = 0; k < 6; k++) {
+    h->beside[k] = HEAD(w->plain)->beside[k] + w->counts[k] * offset[k];
+    miss[k] = (aim[k] - h->beside[k]) / h->yard[k];
+  }
+  for (int i = 0; i < n; i++) {
+    const fl_actuator *from = ACTUATOR(w->plain, i);
+    fl_actuator *to = (fl_actuator *)ACTUATOR(block, i);
+    for (int c = 0; c < 3; c++)
+      for (int k = 0; k < 6; k++) {
+        const real *frame = w->frames + 9 * i + 3 * c;
+        real more = w->counts[k] * (frame[0] * slope[i][0][k] + frame[1] * slope[i][1][k] + frame[2] * slope[i][2][k]);
+        to->own[c][k] = from->own[c][k] + more / h->yard[k];
+        h->beside[k] -= force[i][c] * more, miss[k] -= force[i][c] * from->own[c][k];
+      }
+  }
+  return SQRT(dot(miss, miss, 6));
+}
+
+/* Scale, basis and matrices of a block by its wrenches along the laws' axes, and the work area. */
+static int span(real *block, fl_work *work) {
+  fl_head *h = (fl_head *)block;
+  real row[2 * FL_MOST][6], rest[2 * FL_MOST][6], size[6] = {0}, most = 0, first = 0;
+  int n = COUNT(block), r = 0;
+  for (int p = 0; p < 2 * n; p++) {
+    const fl_actuator *a = ACTUATOR(block, p / 2);
+    real along = p % 2 >= a->rows ? 0 : a->form == FL_THRUSTER ? a->sign : 1;
+    for (int k = 0; k < 6; k++) {
+      row[p][k] = along * h->yard[k] * a->own[p % 2 + is_plane(a)][k], rest[p][k] = row[p][k] * a->most[p % 2];
+      size[k] += rest[p][k] * rest[p][k];
+    }
+  }
+  for (int k = 0; k < 6; k++) most = MAX(most, size[k]);
+  for (int k = 0; k < 6; k++) h->scale[k] = size[k] > NOTHING * NOTHING * most ? SQRT(size[k]) : 1;
+  memset(h->basis, 0, sizeof h->basis);
+  for (int p = 0; p < 2 * n; p++)
+    for (int k = 0; k < 6; k++) rest[p][k] /= h->scale[k];
+  for (; r < 6; r++) { /* Gram and Schmidt, the largest first */
+    real best = 0, *chosen = 0;
+    for (int p = 0; p < 2 * n; p++) {
+      real own = dot(rest[p], rest[p], 6);
+      if (own > best) best = own, chosen = rest[p];
+    }
+    if (r == 0) first = best;
+    if (!(best > NOTHING * NOTHING * first)) break;
+    real q[6];
+    for (int k = 0; k < 6; k++) h->basis[k][r] = q[k] = chosen[k] / SQRT(best);
+    for (int p = 0; p < 2 * n; p++) {
+      real along = dot(rest[p], q, 6);
+      for (int k = 0; k < 6; k++) rest[p][k] -= along * q[k];
+    }
+  }
+  h->range = r;
+  for (int p = 0; p < 2 * n; p++) {
+    fl_actuator *a = (fl_actuator *)ACTUATOR(block, p / 2);
+    for (int k = 0; k < 6; k++) row[p][k] /= h->scale[k];
+    for (int j = 0; j < r; j++) {
+      a->matrix[p % 2][j] = 0;
+      for (int k = 0; k < 6; k++) a->matrix[p % 2][j] += h->basis[k][j] * row[p][k];
+    }
+  }
+  return fl_prepare(block, work);
+}
+
+/* Steps on commands to the aim, by the whole model, which the block is linear at where they end; the error left. */
+static real exact(const whole *w, real *block, fl_work *work, const real *aim, real command[][3]) {
+  real miss[6], share = 1, error = linear_at(w, block, aim, command, miss);
+  fl_box box;
+  all_limits(block, &box);
+  for (int k = 0; k < STEPS && error > EXACT; k++) {
+    real tried[FL_MOST][3], near[6], other[6], new_error;
+    memcpy(tried, command, COUNT(block) * sizeof *tried);
+    for (int c = 0; c < 6; c++) near[c] = aim[c] - (1 - share) * miss[c] * HEAD(block)->yard[c];
+    refine(block, work, &box, near, tried, STEPS);
+    new_error = linear_at(w, block, aim, tried, other);
+    if (new_error < error) {
+      memcpy(command, tried, COUNT(block) * sizeof *tried);
+      memcpy(miss, other, sizeof miss);
+      error = new_error, share = 1;
+    } else
+      share *= SHORTER, linear_at(w, block, aim, command, miss);
+  }
+  return error;
+}
+
+/* Forces along the directions of the dual, of commands; their power [W]. */
+static real along_of_all(const real *block, real command[][3], real along[][2]) {
+  real power = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    real force[3], size;
+    force_of(block, i, command[i], force, 0);
+    along[i][0] = a->form == FL_THRUSTER ? a->sign * force[0] : force[is_plane(a)], along[i][1] = force[1 + is_plane(a)];
+    size = a->form == FL_POD ? command[i][1] : is_plane(a) ? size_of(along[i]) : along[i][0];
+    if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(along[i][1], along[i][0]));
+    power += cost_at(block, i, size);
+  }
+  return power;
+}
+
+/* Turns from commands (n, 3) on, as many as are given: the commands that they come to, the last answer of the dual by
+   which they got better, and what they end with (3,): power [W], what an error as large as the yardstick counts [W],
+   and the error. Prices of the question are those of the wrench. An error code. */
+int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *commands,
+              fl_answer *out, real *end) {
+  fl_question q = *question;
+  real(*command)[3] = (real(*)[3])commands, (*tried)[3], worth = end[1], here[FL_MOST][2], there[FL_MOST][2], inner[6];
+  fl_answer own;
+  real error = exact(w, block, work, q.wrench, command), power = along_of_all(block, command, here);
+  for (int turn = 0; turn < turns; turn++) {
+    int failed = span(block, work), better = 0;
+    if (q.price) price_in_basis(block, q.price, inner), q.price = inner;
+    if (failed || (failed = fl_answer_one(block, work, &q, &own))) return failed;
+    real scaled[6], merit, size = 1;
+    for (int k = 0; k < 6; k++) scaled[k] = own.price[k] * HEAD(block)->yard[k];
+    worth = MAX(worth, 2 * SQRT(dot(scaled, scaled, 6))); /* twice what it is worth at these prices: an exact penalty */
+    merit = power + worth * error;
+    if (turn == 0) *out = own;
+    for (int k = 0; k < HALVINGS && !better; k++, size *= SHORTER) {
+      fl_box box;
+      real force[FL_MOST][2], new_error, new_power;
+      all_limits(block, &box);
+      for (int i = 0; i < 2 * COUNT(block); i++) (*force)[i] = (*here)[i] + size * ((*own.force)[i] - (*here)[i]);
+      tried = own.command;
+      if (k > 0 || q.previous) commands_for(block, &box, force, q.previous, tried);
+      new_error = exact(w, block, work, q.wrench, tried), new_power = along_of_all(block, tried, there);
+      if (!(new_power + worth * new_error < merit)) continue;
+      better = 1, power = new_power, error = new_error, *out = own;
+      memcpy(command, tried, COUNT(block) * sizeof *tried);
+      memcpy(here, there, COUNT(block) * sizeof *here);
+      q.price = out->price;
+    }
+    if (!better || merit - power - worth * error <= 2 * CLOSE * merit) break;
+  }
+  end[0] = power, end[1] = worth, end[2] = error;
+  return 0;
+}
