@@ -151,7 +151,8 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
       fl_box box;
       real force[FL_MOST][2], new_error, new_power;
       all_limits(block, &box);
-      for (int i = 0; i < 2 * COUNT(block); i++) (*force)[i] = (*here)[i] + size * ((*own.force)[i] - (*here)[i]);
+      for (int i = 0; i < COUNT(block); i++)
+        for (int c = 0; c < 2; c++) force[i][c] = here[i][c] + size * (own.force[i][c] - here[i][c]);
       tried = own.command;
       if (k > 0 || q.previous) commands_for(block, &box, force, q.previous, tried);
       new_error = exact(w, block, work, q.wrench, tried), new_power = along_of_all(block, tried, there);
