@@ -23,7 +23,7 @@ static real linear_at(const whole *w, real *block, const real *aim, real command
   fl_head *h = (fl_head *)block;
   for (int i = 0; i < n; i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    force_of(w->plain, i, command[i], force[i], 0);
+    force_of(block, i, command[i], force[i], 0);
     for (int c = 0; c < 3; c++) {
       real own = force[i][c] + (a->form == FL_FOIL && c == 1 ? a->pressure * a->rest : 0);
       for (int b = 0; b < 3; b++) body[i][b] += own * w->frames[9 * i + 3 * c + b];
@@ -93,16 +93,30 @@ static int span(real *block, fl_work *work) {
   return fl_prepare(block, work);
 }
 
-/* Steps on commands to the aim, by the whole model, which the block is linear at where they end; the error left. */
-static real exact(const whole *w, real *block, fl_work *work, const real *aim, real command[][3]) {
+/* Has fins of a block commanded as they are, or by direction and size of the force, without their tables. */
+static void command_fins(const whole *w, real *block, int by_force) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *from = ACTUATOR(w->plain, i);
+    fl_actuator *to = (fl_actuator *)ACTUATOR(block, i);
+    real low[3] = {from->middle - from->half, from->low}, high[3] = {from->middle + from->half, from->high};
+    if (from->form != FL_FIN) continue;
+    to->form = by_force ? FL_POD : FL_FIN, to->turns = by_force ? from->half >= PI : from->turns;
+    memcpy(to->lower, by_force ? low : from->lower, sizeof low);
+    memcpy(to->upper, by_force ? high : from->upper, sizeof high);
+  }
+}
+
+/* Steps on commands to the aim, by the whole model, which the block is linear at where they end, until an error is
+   enough; what is left. */
+static real exact(const whole *w, real *block, fl_work *work, const real *aim, real enough, real command[][3]) {
   real miss[6], share = 1, error = linear_at(w, block, aim, command, miss);
   fl_box box;
   all_limits(block, &box);
-  for (int k = 0; k < STEPS && error > EXACT; k++) {
+  for (int k = 0; k < STEPS && error > enough; k++) {
     real tried[FL_MOST][3], near[6], other[6], new_error;
     memcpy(tried, command, COUNT(block) * sizeof *tried);
     for (int c = 0; c < 6; c++) near[c] = aim[c] - (1 - share) * miss[c] * HEAD(block)->yard[c];
-    refine(block, work, &box, near, tried, STEPS);
+    refine(block, work, &box, near, tried, 1);
     new_error = linear_at(w, block, aim, tried, other);
     if (new_error < error) {
       memcpy(command, tried, COUNT(block) * sizeof *tried);
@@ -122,22 +136,26 @@ static real along_of_all(const real *block, real command[][3], real along[][2]) 
     real force[3], size;
     force_of(block, i, command[i], force, 0);
     along[i][0] = a->form == FL_THRUSTER ? a->sign * force[0] : force[is_plane(a)], along[i][1] = force[1 + is_plane(a)];
-    size = a->form == FL_POD ? command[i][1] : is_plane(a) ? size_of(along[i]) : along[i][0];
-    if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(along[i][1], along[i][0]));
-    power += cost_at(block, i, size);
+    size = is_plane(a) ? size_of(along[i]) / (a->gauge > 0 ? gauge_at(block + (int)a->gauge, ATAN2(along[i][1], along[i][0])) : 1) : along[i][0];
+    power += cost_at(block, i, a->form == FL_POD ? command[i][1] : size);
   }
   return power;
 }
 
-/* Turns from commands (n, 3) on, as many as are given: the commands that they come to, the last answer of the dual by
-   which they got better, and what they end with (3,): power [W], what an error as large as the yardstick counts [W],
-   and the error. Prices of the question are those of the wrench. An error code. */
-int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *commands,
+/* Turns from forces (n, 2) on, as many as are given, or from the previous commands of the question; its price is one
+   of the wrench. The forces that they come to, the last answer of the dual by which they got better, with their
+   commands, and what they end with (3,): power [W], what an error as large as the yardstick counts [W], the error. */
+int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *forces,
               fl_answer *out, real *end) {
   fl_question q = *question;
-  real(*command)[3] = (real(*)[3])commands, (*tried)[3], worth = end[1], here[FL_MOST][2], there[FL_MOST][2], inner[6];
   fl_answer own;
-  real error = exact(w, block, work, q.wrench, command), power = along_of_all(block, command, here);
+  fl_box box;
+  real(*here)[2] = (real(*)[2])forces, command[FL_MOST][3], there[FL_MOST][2], inner[6], worth = end[1];
+  command_fins(w, block, !q.previous);
+  if (q.previous) along_of_all(block, (real(*)[3])q.previous, here);
+  all_limits(block, &box);
+  commands_for(block, &box, here, q.previous, command);
+  real error = exact(w, block, work, q.wrench, NEARLY / 10, command), power = along_of_all(block, command, here);
   for (int turn = 0; turn < turns; turn++) {
     int failed = span(block, work), better = 0;
     if (q.price) price_in_basis(block, q.price, inner), q.price = inner;
@@ -148,22 +166,23 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
     merit = power + worth * error;
     if (turn == 0) *out = own;
     for (int k = 0; k < HALVINGS && !better; k++, size *= SHORTER) {
-      fl_box box;
-      real force[FL_MOST][2], new_error, new_power;
-      all_limits(block, &box);
+      real force[FL_MOST][2], (*tried)[3] = own.command, new_error, new_power;
       for (int i = 0; i < COUNT(block); i++)
         for (int c = 0; c < 2; c++) force[i][c] = here[i][c] + size * (own.force[i][c] - here[i][c]);
-      tried = own.command;
       if (k > 0 || q.previous) commands_for(block, &box, force, q.previous, tried);
-      new_error = exact(w, block, work, q.wrench, tried), new_power = along_of_all(block, tried, there);
+      new_error = exact(w, block, work, q.wrench, NEARLY / 10, tried), new_power = along_of_all(block, tried, there);
       if (!(new_power + worth * new_error < merit)) continue;
       better = 1, power = new_power, error = new_error, *out = own;
-      memcpy(command, tried, COUNT(block) * sizeof *tried);
       memcpy(here, there, COUNT(block) * sizeof *here);
       q.price = out->price;
     }
     if (!better || merit - power - worth * error <= 2 * CLOSE * merit) break;
   }
   end[0] = power, end[1] = worth, end[2] = error;
+  if (turns == 0) return 0;
+  command_fins(w, block, 0);
+  all_limits(block, &box);
+  commands_for(block, &box, here, q.previous, out->command);
+  end[2] = exact(w, block, work, q.wrench, EXACT, out->command);
   return 0;
 }

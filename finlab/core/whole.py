@@ -35,7 +35,8 @@ class Ended(NamedTuple):
     """What turns end with."""
 
     found: Found
-    """The dual's last answer by which the command got better, with the command."""
+    """The dual's last answer by which the command got better, with the command; its force is that of the
+    command."""
     power: float
     """[W]."""
     worth: float
@@ -67,25 +68,26 @@ class Whole(Core):
             *(None if own is None else own.ctypes.data for own in arrays),
             tuple(beside.counts),
         )
-        self._command, self._end, self._turns = np.empty((1, self._count, 3)), np.zeros(3), 0
-        self._ends = self._command.ctypes.data, self._from, self._end.ctypes.data
+        self._begin, self._end, self._turns = np.zeros((1, self._count, 2)), np.zeros(3), 0
+        self._ends = self._begin.ctypes.data, self._from, self._end.ctypes.data
 
     def settled(
         self,
         wrench: Array,
-        command: Array,
+        force: Array,
         turns: int,
         policy: Any = None,
         price: Array | None = None,
         previous: Array | None = None,
         worth: float = 0.0,
     ) -> Ended:
-        """What turns from a command (n, 3) on come to, for a wrench (6,): at most so many, of which the first
-        begins at a price (6,) of the wrench; an error counts `worth` [W] at least. Else as for `one`."""
+        """What turns from forces (n, 2) on, or from a `previous` command (n, 3), come to for a wrench (6,): at
+        most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of the
+        wrench. An error counts `worth` [W] at least. Else as for `one`."""
         with self._turn:
-            self._command[0], self._end[1], self._turns = command, worth, turns
+            self._begin[0], self._end[1], self._turns = force, worth, turns
             found = self.one(wrench, policy, price, previous)[0]
-            return Ended(found._replace(command=self._command.copy()), *self._end.tolist())
+            return Ended(found._replace(force=self._begin.copy()), *self._end.tolist())
 
     def _ask(self) -> int:
         ins = ctypes.addressof(self._whole), self._at, self._area, self._to, self._turns

@@ -75,15 +75,15 @@ def _settled(
     """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
     whole, robot = dual.whole, dual.compiled.robot
     if previous is not None:
-        return whole.settled(target, previous, IN_A_TICK, policy, prices, previous).found
+        return whole.settled(target, 0.0, IN_A_TICK, policy, prices, previous).found
     laws = dual.forces(target[None], policy, dual.begin(prices)).found
-    best = whole.settled(target, laws.command[0], ROUNDS, policy, laws.price[0])
+    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0])
     if best.power > (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command).sum()):
-        starts = robot.core.commands(_turned_aside(laws.force[0], robot.lines))
+        starts = _turned_aside(laws.force[0], robot.lines)
         tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
         merits = [one.power + best.worth * one.error for one in tried]
         for k in np.argsort(merits)[:FOLLOWED]:
-            other = whole.settled(target, tried[k].found.command[0], ROUNDS, policy, laws.price[0])
+            other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
             best = other if _beats(other, best) else best
     return best.found
 
