@@ -92,7 +92,7 @@ class Core:
     def __init__(self, block: Array, count: int) -> None:
         """Takes the block of a robot of n = `count` actuators."""
         core = library()
-        self._core, self.block, self._count = core, block, count
+        self._core, self._block, self._count = core, block, count
         self._work = ctypes.create_string_buffer(core.fl_sizes(3))
         self._question, self._answer, self._lock = _Question(), _Answer(), Lock()
         self._to, self._from = ctypes.addressof(self._question), ctypes.addressof(self._answer)

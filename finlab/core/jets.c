@@ -35,7 +35,10 @@ static meeting meeting_of(const water *w, const place *from, const jet *j, const
   meeting o;
   for (int c = 0; c < 3; c++) o.way[c] = (to->position[c] - from->position[c]) / from->diameter;
   real x = o.along = -dot(o.way, j->ahead, 3), beside = dot(o.way, o.way, 3) - x * x, q = x / w->length;
-  real wide = x * x + w->width * w->width, falls = 1 + q * q * q * q, turn = TANH(x / BEHIND);
+  real wide = x * x + w->width * w->width, falls = 1 + q * q * q * q;
+  o.speed = o.slope = 0; /* to rounding, in double precision: */
+  if (x < -20 * BEHIND || w->spread * beside > 40 * wide) return o;
+  real turn = TANH(x / BEHIND);
   real plain = j->speed * EXP(-w->spread * beside / wide) / SQRT(SQRT(falls)) / 2;
   o.speed = plain * (1 + turn);
   o.slope = plain * (1 - turn * turn) / BEHIND +
@@ -110,7 +113,7 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
       add_wrench(p[i].position, by_water[c], 1, by[c]);
     }
     for (int j = 0; j < n; j++) {
-      if (j == i || !(p[j].diameter > 0) || w->formula == 0) continue;
+      if (j == i || !(p[j].diameter > 0) || w->formula == 0 || meets[j].speed == 0) continue;
       const meeting *m = meets + j;
       const real *a = jets[j].ahead;
       for (int c = 0; c < 3; c++) {

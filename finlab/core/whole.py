@@ -55,12 +55,12 @@ class _Whole(ctypes.Structure):
 class Whole(Core):
     """One robot in the core, with what comes beside its forces."""
 
-    def __init__(self, plain: Core, beside: Beside) -> None:
-        """Takes the robot by its laws alone."""
-        super().__init__(plain.block.copy(), len(beside.frames))
-        self._plain, self._beside, self._turn = plain, beside, Lock()
+    def __init__(self, block: Array, beside: Beside) -> None:
+        """Takes the block of the robot by its laws alone."""
+        super().__init__(block.copy(), len(beside.frames))
+        self._beside, self._turn = beside, Lock()
         self._raised: BaseException | None = None
-        arrays = (beside.jets, beside.inflow, plain.block, np.ascontiguousarray(beside.frames))
+        arrays = (beside.jets, beside.inflow, block, np.ascontiguousarray(beside.frames))
         effect = _EFFECT(self._effect) if beside.jets is None else library().fl_jets
         self._kept = arrays, effect
         self._whole = _Whole(
@@ -81,9 +81,9 @@ class Whole(Core):
         previous: Array | None = None,
         worth: float = 0.0,
     ) -> Ended:
-        """What turns from forces (n, 2) on, or from a `previous` command (n, 3), come to for a wrench (6,): at
-        most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of the
-        wrench. An error counts `worth` [W] at least. Else as for `one`."""
+        """What turns from forces (n, 2) on, or from a `previous` command (n, 3), come to for a wrench (6,):
+        at most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of
+        the wrench. An error counts `worth` [W] at least. Else as for `one`."""
         with self._turn:
             self._begin[0], self._end[1], self._turns = force, worth, turns
             found = self.one(wrench, policy, price, previous)[0]

@@ -24,8 +24,10 @@ from finlab.precision import CLOSE, NEARLY, ROUNDS
 
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""
-IN_A_TICK, RANDOM, FOLLOWED = 2, 3, 2
-"""Turns of a tick; other beginnings at random, and how many of all are followed."""
+IN_A_TICK, RANDOM = 2, 3
+"""Turns of a tick; beginnings at random."""
+BACK, FOLLOWED = 2, 1
+"""How many beginnings are followed of those where one force is turned back, and of the others."""
 
 
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
@@ -48,7 +50,7 @@ def whole_of(dual: Any) -> Whole:
     known, inflow = plant.interaction, plant.met_by_all(None)
     frames = robot.axes @ plant.layout.frames
     jets = known.table if isinstance(known, JetInteraction) else None
-    return Whole(robot.core, Beside(frames, plant.counts, inflow, jets, known.effect))
+    return Whole(robot.block, Beside(frames, plant.counts, inflow, jets, known.effect))
 
 
 def settled(
@@ -69,9 +71,7 @@ def settled(
     return Solution(command, bound, prices=price, notes=tuple(sorted(notes - {""})))
 
 
-def _settled(
-    dual: Any, target: Array, policy: Policy, previous: Array | None, prices: Array | None
-) -> Found:
+def _settled(dual: Any, target: Array, policy: Policy, previous: Array | None, prices: Array | None) -> Found:
     """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
     whole, robot = dual.whole, dual.compiled.robot
     if previous is not None:
@@ -79,12 +79,14 @@ def _settled(
     laws = dual.forces(target[None], policy, dual.begin(prices)).found
     best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0])
     if best.power > (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command).sum()):
-        starts = _turned_aside(laws.force[0], robot.lines)
-        tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
-        merits = [one.power + best.worth * one.error for one in tried]
-        for k in np.argsort(merits)[:FOLLOWED]:
-            other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
-            best = other if _beats(other, best) else best
+        back = best.found.force * (1.0 - 2.0 * np.eye(len(robot.lines))[..., None])
+        aside = _turned_aside(laws.force[0], robot.lines)
+        for starts, followed in ((back, BACK), (aside, FOLLOWED)):
+            tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
+            merits = [one.power + best.worth * one.error for one in tried]
+            for k in np.argsort(merits)[:followed]:
+                other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
+                best = other if _beats(other, best) else best
     return best.found
 
 
