@@ -176,7 +176,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
       memcpy(here, there, COUNT(block) * sizeof *here);
       q.price = out->price;
     }
-    if (!better || merit - power - worth * error <= 2 * CLOSE * merit) break;
+    if (!better || merit - power - worth * error <= CLOSE / 2 * merit) break;
   }
   end[0] = power, end[1] = worth, end[2] = error;
   if (turns == 0) return 0;
