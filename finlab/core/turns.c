@@ -155,7 +155,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   if (q.previous) along_of_all(block, (real(*)[3])q.previous, here);
   all_limits(block, &box);
   commands_for(block, &box, here, q.previous, command);
-  real error = exact(w, block, work, q.wrench, NEARLY / 10, command), power = along_of_all(block, command, here);
+  real error = exact(w, block, work, q.wrench, q.previous ? 1 / NOTHING : NEARLY / 10, command), power = along_of_all(block, command, here);
   for (int turn = 0; turn < turns; turn++) {
     int failed = span(block, work), better = 0;
     if (q.price) price_in_basis(block, q.price, inner), q.price = inner;

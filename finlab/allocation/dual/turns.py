@@ -73,20 +73,30 @@ def settled(
 
 def _settled(dual: Any, target: Array, policy: Policy, previous: Array | None, prices: Array | None) -> Found:
     """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
-    whole, robot = dual.whole, dual.compiled.robot
+    whole: Whole = dual.whole
     if previous is not None:
         return whole.settled(target, 0.0, IN_A_TICK, policy, prices, previous).found
     laws = dual.forces(target[None], policy, dual.begin(prices)).found
     best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0])
-    if best.power > (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command).sum()):
-        back = best.found.force * (1.0 - 2.0 * np.eye(len(robot.lines))[..., None])
-        aside = _turned_aside(laws.force[0], robot.lines)
-        for starts, followed in ((back, BACK), (aside, FOLLOWED)):
-            tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
-            merits = [one.power + best.worth * one.error for one in tried]
-            for k in np.argsort(merits)[:followed]:
-                other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
-                best = other if _beats(other, best) else best
+
+    def better(starts: Array, followed: int) -> bool:
+        """Whether some of other forces (K, n, 2) come to less; then the best is that."""
+        nonlocal best
+        before = best
+        tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
+        merits = [one.power + one.worth * one.error for one in tried]
+        for k in np.argsort(merits)[:followed]:
+            other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
+            best = other if _beats(other, best) else best
+        return best.power < (1.0 - 10.0 * CLOSE) * before.power
+
+    dearer = (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command).sum())
+    if best.power > dearer:
+        back, lines = 1.0 - 2.0 * np.eye(len(laws.force[0]))[..., None], dual.compiled.robot.lines
+        for _ in range(ROUNDS):
+            if not better(back * best.found.force, BACK):
+                break
+        better(_turned_aside(laws.force[0], lines), FOLLOWED)
     return best.found
 
 
