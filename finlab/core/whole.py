@@ -74,7 +74,7 @@ class Whole(Core):
     def settled(
         self,
         wrench: Array,
-        force: Array,
+        force: Array | None,
         turns: int,
         policy: Any = None,
         price: Array | None = None,
@@ -85,7 +85,7 @@ class Whole(Core):
         at most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of
         the wrench. An error counts `worth` [W] at least. Else as for `one`."""
         with self._turn:
-            self._begin[0], self._end[1], self._turns = force, worth, turns
+            self._begin[0], self._end[1], self._turns = 0.0 if force is None else force, worth, turns
             found = self.one(wrench, policy, price, previous)[0]
             return Ended(found._replace(force=self._begin.copy()), *self._end.tolist())
 

@@ -75,8 +75,8 @@ def _settled(dual: Any, target: Array, policy: Policy, previous: Array | None, p
     """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
     whole: Whole = dual.whole
     if previous is not None:
-        return whole.settled(target, 0.0, IN_A_TICK, policy, prices, previous).found
-    laws = dual.forces(target[None], policy, dual.begin(prices)).found
+        return whole.settled(target, None, IN_A_TICK, policy, prices, previous).found
+    laws: Found = dual.forces(target[None], policy, dual.begin(prices)).found
     best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0])
 
     def better(starts: Array, followed: int) -> bool:
