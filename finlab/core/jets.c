@@ -1,14 +1,11 @@
 /* What jets take from forces by a formula of eight constants, and what speed takes; docs/interaction.md has both. */
 #include "inner.h"
 
-#define BEHIND R(0.2)  /* distance, in diameters, over which a jet begins */
-#define GRAZING R(0.3) /* width of a jet's rim on the hull, as a share of its distance from the centre squared */
-
 /* Numbers of a robot: a `water`, then a `place` for each of its n actuators. */
 typedef struct {
   real n, formula; /* formula: 1 where jets count, else speed alone takes */
   real density, still; /* speed of a jet below which it counts as none [m/s] */
-  real length, width, spread, lag, most, side, housing, hull; /* the constants */
+  real length, width, spread, lag, most, side, housing, hull, behind, grazing; /* the constants */
   real center[3], half[3]; /* of the ellipsoid that stands for the hull [m]; 0 for none */
 } water;
 typedef struct { real position[3], diameter, advance; } place;
@@ -37,11 +34,11 @@ static meeting meeting_of(const water *w, const place *from, const jet *j, const
   real x = o.along = -dot(o.way, j->ahead, 3), beside = dot(o.way, o.way, 3) - x * x, q = x / w->length;
   real wide = x * x + w->width * w->width, falls = 1 + q * q * q * q;
   o.speed = o.slope = 0; /* to rounding, in double precision: */
-  if (x < -20 * BEHIND || w->spread * beside > 40 * wide) return o;
-  real turn = TANH(x / BEHIND);
+  if (x < -20 * w->behind || w->spread * beside > 40 * wide) return o;
+  real turn = TANH(x / w->behind);
   real plain = j->speed * EXP(-w->spread * beside / wide) / SQRT(SQRT(falls)) / 2;
   o.speed = plain * (1 + turn);
-  o.slope = plain * (1 - turn * turn) / BEHIND +
+  o.slope = plain * (1 - turn * turn) / w->behind +
             o.speed * (2 * w->spread * x * (wide + beside) / (wide * wide) - q * q * q / (falls * w->length));
   return o;
 }
@@ -52,8 +49,8 @@ static real met_by_hull(const water *w, const place *p, const real *ahead, real 
   for (int c = 0; c < 3; c++) at[c] = (p->position[c] - w->center[c]) / w->half[c], course[c] = -ahead[c] / w->half[c];
   size = SQRT(dot(course, course, 3) + TINY), facing = -dot(at, course, 3) / size;
   far = dot(at, at, 3) - facing * facing;
-  real rim = TANH((1 - far) / GRAZING), side = TANH(facing / GRAZING);
-  real by = (2 * facing * (1 - rim * rim) * (1 + side) + (1 + rim) * (1 - side * side)) / (4 * GRAZING);
+  real rim = TANH((1 - far) / w->grazing), side = TANH(facing / w->grazing);
+  real by = (2 * facing * (1 - rim * rim) * (1 + side) + (1 + rim) * (1 - side * side)) / (4 * w->grazing);
   for (int c = 0; c < 3; c++) slope[c] = by * (at[c] + facing * course[c] / size) / (size * w->half[c]);
   return (1 + rim) * (1 + side) / 4;
 }

@@ -2,9 +2,7 @@
    Levenberg-Marquardt steps on the whole model. finlab/allocation/dual/turns.py says why they settle. */
 #include "inner.h"
 
-#define HALVINGS 4 /* most times that a step is made shorter, and by how much */
-#define SHORTER R(0.3)
-#define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model */
+#define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model; most times that a step is made shorter */
 
 /* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
 typedef void (*effect)(const real *known, const real *force, int count, const real *inflow, real *change, real *wrench,
@@ -123,7 +121,7 @@ static real exact(const whole *w, real *block, fl_work *work, const real *aim, r
       memcpy(miss, other, sizeof miss);
       error = new_error, share = 1;
     } else
-      share *= SHORTER, linear_at(w, block, aim, command, miss);
+      share *= R(0.3), linear_at(w, block, aim, command, miss);
   }
   return error;
 }
@@ -155,7 +153,9 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   if (q.previous) along_of_all(block, (real(*)[3])q.previous, here);
   all_limits(block, &box);
   commands_for(block, &box, here, q.previous, command);
-  real error = exact(w, block, work, q.wrench, q.previous ? 1 / NOTHING : NEARLY / 10, command), power = along_of_all(block, command, here);
+  /* A tick begins where the robot is; forces that are only looked at need not be exact. */
+  real enough = q.previous ? 1 / NOTHING : turns ? NEARLY / 10 : 10 * CLOSE;
+  real error = exact(w, block, work, q.wrench, enough, command), power = along_of_all(block, command, here);
   for (int turn = 0; turn < turns; turn++) {
     int failed = span(block, work), better = 0;
     if (q.price) price_in_basis(block, q.price, inner), q.price = inner;
@@ -165,7 +165,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
     worth = MAX(worth, 2 * SQRT(dot(scaled, scaled, 6))); /* twice what it is worth at these prices: an exact penalty */
     merit = power + worth * error;
     if (turn == 0) *out = own;
-    for (int k = 0; k < HALVINGS && !better; k++, size *= SHORTER) {
+    for (int k = 0; k < STEPS && !better; k++, size *= R(0.3)) {
       real force[FL_MOST][2], (*tried)[3] = own.command, new_error, new_power;
       for (int i = 0; i < COUNT(block); i++)
         for (int c = 0; c < 2; c++) force[i][c] = here[i][c] + size * (own.force[i][c] - here[i][c]);

@@ -76,13 +76,13 @@ class AtPlaces(Interaction):
     """An interaction that is a force at each actuator's place."""
 
     def __init__(self, places: Places, constants: Sequence[float] | None = None) -> None:
-        """Takes the places of the n actuators, and the eight constants of the formula of jets; None where
-        something else says what jets take."""
+        """Takes the places of the n actuators, and the constants of the formula of jets; None where something
+        else says what jets take."""
         self.places = places
         arms = np.cross(places.position[:, None], np.eye(3))
         self.lever: Array = np.concatenate([np.broadcast_to(np.eye(3), arms.shape), arms], axis=-1)
         """Wrench (n, 3, 6) of 1 N along the body's axes at each place."""
-        head = [len(self.lever), constants is not None, DENSITY, STILL, *(constants or np.zeros(8))]
+        head = [len(self.lever), constants is not None, DENSITY, STILL, *(constants or np.zeros(10))]
         rows = np.column_stack([places.position, places.diameter, places.advance])
         self.table: Array = np.concatenate([head, places.hull.ravel(), rows.ravel()], dtype=np.float64)
         """The numbers of finlab/core/jets.c."""

@@ -21,6 +21,10 @@ from finlab.interaction.interaction import AtPlaces, Places
 
 Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
 Share = Annotated[float, Meta(ge=0.0, le=10.0)]
+BEHIND = 0.2
+"""Distance, in diameters, over which a jet begins."""
+GRAZING = 0.3
+"""Width of a jet's rim on the hull, as a share of its distance from the centre squared."""
 MISSED = 0.1
 """Share of an actuator's force that counts as taken where the formula says that nothing is."""
 
@@ -59,7 +63,7 @@ class JetInteraction(AtPlaces):
     """The formula for one robot."""
 
     def __init__(self, constants: Jets, places: Places) -> None:
-        super().__init__(places, astuple(constants)[:-1])
+        super().__init__(places, (*astuple(constants)[:-1], BEHIND, GRAZING))
         self.constants = constants
 
     def at_rest(self, force: Array) -> Array:
