@@ -103,7 +103,7 @@ class Core:
                 self._inner[:], question.inner = inner, self._inner_at
             if previous is not None:
                 self._previous[:], question.previous = previous, self._previous_at
-            if error := self._core.fl_answer_one(self._at, self._area, self._to, self._from):
+            if error := self._ask():
                 raise ValueError(f"the core got {CODES[error]}")
             vectors = self._vectors.copy()
             return Found(
@@ -115,6 +115,10 @@ class Core:
                 self._command.copy(),
                 bool(self._flags[3]),
             )
+
+    def _ask(self) -> int:
+        code: int = self._core.fl_answer_one(self._at, self._area, self._to, self._from)
+        return code
 
     def many(self, wrenches: Array, policy: Any) -> Found:
         """The answers to wrenches (N, 6)."""

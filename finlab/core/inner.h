@@ -13,6 +13,7 @@ typedef fl_real real;
 #define COS cosf
 #define ATAN2 atan2f
 #define EXP expf
+#define TANH tanhf
 #define FLOOR floorf
 #define FABS fabsf
 #define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
@@ -30,6 +31,7 @@ typedef fl_real real;
 #define COS cos
 #define ATAN2 atan2
 #define EXP exp
+#define TANH tanh
 #define FLOOR floor
 #define FABS fabs
 #define TOLERANCE 1e-10

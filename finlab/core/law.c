@@ -96,9 +96,15 @@ void force_of(const real *block, int i, const real *command, real *force, real (
   if (a->form == FL_THRUSTER)
     force[0] = command[0], slope[0][0] = 1;
   else if (a->form == FL_POD) {
-    real c = COS(command[0]), s = SIN(command[0]);
+    real c = COS(command[0]), s = SIN(command[0]), bend = 0;
+    if (a->gauge > 0) { /* of a fin by its force */
+      const real *gauge = block + (int)a->gauge;
+      real rho = gauge_at(gauge, command[0]), h = R(1e-3);
+      if (steep) bend = (gauge_at(gauge, command[0] + h) - gauge_at(gauge, command[0] - h)) / (2 * h * rho);
+      c *= rho, s *= rho;
+    }
     force[1] = command[1] * c, force[2] = command[1] * s;
-    slope[0][1] = -force[2], slope[0][2] = force[1], slope[1][1] = c, slope[1][2] = s;
+    slope[0][1] = bend * force[1] - force[2], slope[0][2] = bend * force[2] + force[1], slope[1][1] = c, slope[1][2] = s;
   } else if (a->form == FL_FOIL) {
     real at[3] = {0, 0, command[0] - a->lean}, by[3][3] = {{0}};
     grid_at(grid, at, force, steep ? by : 0);
@@ -161,7 +167,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
 /* Angle and force of a pod, one way or the other: what comes nearer to a force, or the cheaper one. */
 static void pod_command(const real *block, int i, const fl_box *box, const real *force, real before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real size = size_of(force);
+  real size = size_of(force) / (a->gauge > 0 ? gauge_at(block + (int)a->gauge, ATAN2(force[1], force[0])) : 1);
   real angle = size > 0 ? ATAN2(force[1], force[0]) : before, way[2][2], missing[2], watts[2];
   for (int k = 0; k < 2; k++) {
     way[k][0] = held_in(box, i, 0, 0, angle + k * PI), way[k][1] = held_in(box, i, 1, 0, k ? -size : size);

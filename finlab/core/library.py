@@ -19,6 +19,8 @@ SIGNATURES = {
     "fl_look": "rppppp",
     "fl_worth": "vpppip",
     "fl_reach": "vpppppirppp",
+    "fl_jets": "vppipppp",
+    "fl_settle": "ippppippp",
 }
 """What each function returns and takes: i int, r real, p pointer, v nothing."""
 _TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "v": None}

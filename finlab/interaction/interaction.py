@@ -5,13 +5,15 @@ comes at each actuator's place beside the actuator's own, from the forces of all
 frame; derivatives are those by the forces, not by the commands.
 """
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.arrays import AnyArray, Array
+from finlab.core.library import library
 
 DENSITY = 1000.0
 """Of the water [kg/m^3]."""
@@ -73,47 +75,35 @@ class Interaction(ABC):
 class AtPlaces(Interaction):
     """An interaction that is a force at each actuator's place."""
 
-    def __init__(self, places: Places) -> None:
-        """Takes the places of the n actuators."""
+    def __init__(self, places: Places, constants: Sequence[float] | None = None) -> None:
+        """Takes the places of the n actuators, and the constants of the formula of jets; None where something
+        else says what jets take."""
         self.places = places
         arms = np.cross(places.position[:, None], np.eye(3))
         self.lever: Array = np.concatenate([np.broadcast_to(np.eye(3), arms.shape), arms], axis=-1)
         """Wrench (n, 3, 6) of 1 N along the body's axes at each place."""
+        head = [len(self.lever), constants is not None, DENSITY, STILL, *(constants or np.zeros(10))]
+        rows = np.column_stack([places.position, places.diameter, places.advance])
+        self.table: Array = np.concatenate([head, places.hull.ravel(), rows.ravel()], dtype=np.float64)
+        """The numbers of finlab/core/jets.c."""
 
     @abstractmethod
     def at_rest(self, force: Array) -> Array:
         """Returns the forces (..., n, 3) [N] that come beside forces (..., n, 3) [N] in still water."""
 
-    @abstractmethod
-    def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
-        """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
-
-    def __call__(self, force: Array, inflow: Array | None = None) -> Array:
-        """Returns `at_rest` and what speed takes: velocities (..., n, 3) [m/s] of the places through the
-        water, body frame, None at rest."""
-        change = self.at_rest(force)
-        return change if inflow is None else change + self._lost(force, inflow)
-
-    def slope(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """Returns the same, and its derivatives as `slope_at_rest`."""
-        change, slope = self.slope_at_rest(force)
-        if inflow is not None:
-            lost, own = complex_slope(lambda some: self._lost(some, inflow), force)
-            change, slope = change + lost, with_own(slope, own)
-        return change, slope
-
-    def offset(self, force: Array, inflow: Array | None = None) -> Array:
-        return np.asarray(np.einsum("...ib,ibw->...w", self(force, inflow), self.lever))
-
-    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        change, slope = self.slope(force, inflow)
-        by_force = np.einsum("...jaib,ibw->...jaw", slope, self.lever)
-        return np.asarray(np.einsum("...ib,ibw->...w", change, self.lever)), np.asarray(by_force)
-
-    def _lost(self, force: AnyArray, inflow: Array) -> Any:
-        _, ahead, speed = jets_of(force, self.places.diameter)
-        share = self.places.advance * (inflow * ahead).sum(-1) / speed
-        return -share[..., None] * force
+    def by_core(self, force: Array, inflow: Array | None, steep: bool) -> tuple[Array, Array, Array]:
+        """Returns what the core gives for forces (..., n, 3): forces of the same shape by the formula, where
+        it counts, and by what speed takes, the wrench (..., 6), and its derivatives (..., n, 3, 6) where
+        `steep`."""
+        shape = force.shape if inflow is None else np.broadcast_shapes(force.shape, inflow.shape)
+        force, change = np.ascontiguousarray(np.broadcast_to(force, shape)), np.empty(shape)
+        met = None if inflow is None else np.ascontiguousarray(np.broadcast_to(inflow, shape))
+        wrench, slope = np.empty((*shape[:-2], 6)), np.empty((*shape, 6) if steep else 0)
+        count = math.prod(shape[:-2])
+        ins = (self.table.ctypes.data, force.ctypes.data, count, None if met is None else met.ctypes.data)
+        outs = (change.ctypes.data, wrench.ctypes.data, slope.ctypes.data if steep else None)
+        library().fl_jets(*ins, *outs)
+        return change, wrench, slope
 
 
 def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:

@@ -64,6 +64,19 @@ class LearnedInteraction(AtPlaces):
     def at_rest(self, force: Array) -> Array:
         return np.asarray(self._each(force).mean(axis=0))
 
+    def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        offset = np.asarray(np.einsum("...ib,ibw->...w", self.at_rest(force), self.lever))
+        return offset if inflow is None else offset + self.by_core(force, inflow, False)[1]
+
+    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        change, slope = self._slope_at_rest(force)
+        offset = np.asarray(np.einsum("...ib,ibw->...w", change, self.lever))
+        by_force = np.asarray(np.einsum("...jaib,ibw->...jaw", slope, self.lever))
+        if inflow is None:
+            return offset, by_force
+        _, lost, more = self.by_core(force, inflow, True)
+        return offset + lost, by_force + more
+
     def deviation(self, force: Array) -> Array:
         each = np.einsum("m...ib,ibw->m...w", self._each(force), self.lever)
         return np.asarray(self._trust * each.std(axis=0, ddof=1))
@@ -80,7 +93,8 @@ class LearnedInteraction(AtPlaces):
         features, vectors = unpacked(name, rows)
         return np.asarray((numbers(self._weights, name, features)[..., None] * vectors).sum(axis=-2))
 
-    def slope_at_rest(self, force: Array) -> tuple[Array, Array]:
+    def _slope_at_rest(self, force: Array) -> tuple[Array, Array]:
+        """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
         n, pairs = force.shape[-2], self._pairs
         source, receiver = force[..., pairs.source, :], force[..., pairs.receiver, :]
         sent, by_source, by_receiver = self._slopes(

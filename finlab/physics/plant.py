@@ -112,7 +112,7 @@ class Plant:
         known = self.interaction
         if known is None:
             return np.zeros((*force.shape[:-2], 6))
-        return known.offset(body_force(force, self.layout.frames), self._met_by_all(flow)) * self.counts
+        return known.offset(body_force(force, self.layout.frames), self.met_by_all(flow)) * self.counts
 
     def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted, near
@@ -120,10 +120,10 @@ class Plant:
         known, frames = self.interaction, self.layout.frames
         if known is None:
             return self.offset(force), self.effectiveness
-        offset, slope = known.effect(body_force(force, frames), self._met_by_all(flow))
+        offset, slope = known.effect(body_force(force, frames), self.met_by_all(flow))
         return offset * self.counts, self.effectiveness + (frames @ slope) * self.counts
 
-    def _met_by_all(self, flow: Array | None) -> Array | None:
+    def met_by_all(self, flow: Array | None) -> Array | None:
         flow = self.flow if flow is None else flow
         return None if flow is None else self._moved(flow)
 

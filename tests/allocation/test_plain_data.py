@@ -65,6 +65,7 @@ NO_CHOICE = {
     "PI",
     "TINY",
     "LARGEST",
+    "NONE",
     "STALLED",
     "FL_MOST",
     "FL_VERSION",

@@ -1,7 +1,6 @@
 """A layout compiled for the dual: the answers of its actuators, and the commands for the forces found."""
 
 from copy import copy
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,27 +72,6 @@ class Compiled:
             (places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups
         ]
         other._prepare()
-        return other
-
-    @cached_property
-    def _directions(self) -> Array:
-        """Directions (n, 2, 3) of each actuator's forces in its own axes."""
-        own = np.zeros((self.count, 2, 6))
-        for places, group in groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))):
-            for place, response in zip(places, group.responses, strict=True):
-                own[place] = response.rows
-        return own[..., :3]
-
-    def forces_along(self, force: Array) -> Array:
-        """Forces (n, 2) [N] along each actuator's directions of forces (n, 3) [N] in own axes."""
-        return np.asarray(np.einsum("nka,na->nk", self._directions, force))
-
-    def tilted(self, effectiveness: Array, beside: Array) -> "Compiled":
-        """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench
-        `beside`."""
-        other = copy(self)
-        along = np.einsum("nka,naw->nkw", self._directions, effectiveness)
-        other.robot, other.beside = self.robot.tilted(along, effectiveness, beside), beside
         return other
 
     def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:

@@ -5,7 +5,6 @@ tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquar
 """
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Self
@@ -15,7 +14,7 @@ import numpy as np
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.price_ascent import raised_price
 from finlab.allocation.dual.rates import Rates
-from finlab.allocation.dual.turns import Linear, settled
+from finlab.allocation.dual.turns import settled, whole_of
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
@@ -24,6 +23,7 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import axes_in, mask_of
 from finlab.core.calls import Found
+from finlab.core.whole import Whole
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
@@ -68,6 +68,10 @@ class Dual(Method):
     @cached_property
     def rates(self) -> Rates:
         return Rates(self.plant, self.layout.rates * self.settings.period_s)
+
+    @cached_property
+    def whole(self) -> Whole:
+        return whole_of(self)
 
     def at(self, flow: Array | None) -> Self:
         key = b"" if flow is None else flow.tobytes()
@@ -120,13 +124,6 @@ class Dual(Method):
             return None
         inner[: robot.basis.shape[1]] = robot.basis.T @ (robot.scale * prices)
         return inner
-
-    def linear(self, model: Linear) -> Self:
-        """The same on a linear model; its problem, in commands, is that of the whole one."""
-        other = copy(self)
-        other.compiled = self.compiled.tilted(model.effectiveness, model.beside)
-        other.__dict__["problem"], other.__dict__["rates"] = self.problem, self.rates
-        return other
 
     def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do

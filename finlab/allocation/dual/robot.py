@@ -1,7 +1,6 @@
 """A robot as the core sees it: scaled effectiveness in the range that its actuators span, and tables."""
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from functools import cached_property
 from typing import Any, cast
 
@@ -56,14 +55,12 @@ class DualRobot:
         tables = _Tables(HEAD + EACH * len(responses))
         self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
         self._tables = tables.numbers
-        self._span(np.array([each.rows for each in responses]), effectiveness)
-
-    def _span(self, effectiveness: Array, own: Array) -> None:
-        self.effectiveness = effectiveness
+        self.effectiveness = np.array([each.rows for each in responses])
         """Wrench (n, 2, 6) per newton along each direction."""
-        axes = np.array([np.eye(3) if form.axes is None else form.axes for form in self._forms])
-        self._own = axes @ own / self.yardstick
-        scaled = (effectiveness * self._sizes[..., None]).reshape(-1, 6)
+        self.axes = np.array([np.eye(3) if form.axes is None else form.axes for form in forms])
+        """Axes (n, 3, 3) of the laws' forces in the actuators' own ones."""
+        self._own = self.axes @ effectiveness / yardstick
+        scaled = (self.effectiveness * self._sizes[..., None]).reshape(-1, 6)
         size = np.sqrt((scaled**2).sum(axis=0))
         self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
@@ -72,16 +69,8 @@ class DualRobot:
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
         self.block = self._block()
         """The numbers of finlab/core/core.h."""
-        self.core = Core(self.block, len(self.responses))
+        self.core = Core(self.block, len(responses))
         """The robot in the core."""
-
-    def tilted(self, effectiveness: Array, own: Array, beside: Array) -> "DualRobot":
-        """The same actuators with another effectiveness (n, 2, 6) along their directions and (n, 3, 6) along
-        their own axes, and another wrench on top."""
-        other = copy(self)
-        other.beside = beside
-        other._span(effectiveness, own)
-        return other
 
     @cached_property
     def largest_power(self) -> float:
