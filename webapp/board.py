@@ -42,6 +42,8 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,
+        "drawer": session.drawer,
+        "opened": session.opened,
         "undo": session.history.undo_name,
         "redo": session.history.redo_name,
         "stop": session.guide.stop,

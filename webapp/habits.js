@@ -62,6 +62,10 @@
     else if (box.tagName === 'INPUT' && ['Enter', 'ArrowUp', 'ArrowDown'].includes(key)) commit();
   });
 
+  // What is typed into a list takes the place of what is chosen there.
+  listen('click', ({ target }) => { if (target.matches?.('.mantine-Select-input')) target.select(); });
+  listen('focusin', ({ target }) => { if (target.matches?.('.mantine-Select-input')) target.select(); });
+
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
     const others = event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.('[role=slider]');

@@ -1,8 +1,8 @@
 """Other ways to give the same wrench: the null space of the effectiveness matrix, in the space of forces.
 
-Forces y (m,) along the directions in which the working actuators push give the wrench B y. Where N (m, k) is a
-basis of the null space of B, y + N s gives the same wrench for every s (k,) [N], and is another way to do it
-as long as every actuator has a command for its part.
+Forces y (m,) along the directions in which the working actuators push give the wrench B y. Where N (m, k) is
+a basis of the null space of B, y + N s gives the same wrench for every s (k,) [N], and is another way to do
+it as long as every actuator has a command for its part.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from finlab.physics import plant_of
 HELD = 1e-3
 """Share of an actuator's largest force by which that of its command may differ from the one asked for."""
 TRIED, ROUNDS = 33, 3
-"""Places along a direction at which commands are tried, between the last two of which they are tried again."""
+"""Places along a direction at which commands are tried, and how often, anew between the last two."""
 STEPS, EXACT = 20, 1e-9
 """Steps that make commands exact, and the normalized error that is enough."""
 TURNS = 100
@@ -43,7 +43,7 @@ class NullSpace:
         self._wrench = self._problem.wrench(self._command[None])
         self._force = compiled.forces_along(self._plant.force(self._command))
         self._most = np.abs(robot.ends).max(axis=1)
-        moves = np.stack([np.ptp(robot.ends, axis=1) > 0.0] * 2, axis=-1)
+        moves: NDArray[np.bool_] = np.repeat(np.ptp(robot.ends, axis=1, keepdims=True) > 0.0, 2, axis=1)
         moves[robot.lines, 1] = False
         columns = (robot.effectiveness / answer.scale)[moves]
         moves[moves] = np.abs(columns).max(axis=1) > 0.0
@@ -62,27 +62,26 @@ class NullSpace:
     def commands(self, shift: Array) -> Array:
         """Returns commands (R, n, 3) of all actuators for shifts (R, k) [N] along the directions, made exact
         by the actuators' own laws; NaN for failed ones."""
-        begin = np.where(shift.any(axis=1)[:, None, None], self._begin(shift), self._command)
-        exact = refine(self._problem, self._wrench, begin, STEPS, EXACT).command
-        return among_all(np.where(shift.any(axis=1)[:, None, None], exact, self._command), self._alive)
+        exact = refine(self._problem, self._wrench, self._begin(shift), STEPS, EXACT).command
+        moved = np.linalg.norm(shift, axis=1)[:, None, None] > 0.0
+        return among_all(np.where(moved, exact, self._command), self._alive)
 
-    def ranges(self, shift: Array) -> Array:
-        """Returns how far one may go along each direction (k, 2) [N], at most and at least 0 from where the
-        others of `shift` (k,) are, until an actuator has no command for its force."""
-        count = len(self.basis)
-        way = np.repeat(np.eye(count), 2, axis=0) * np.tile([-1.0, 1.0], count)[:, None]
-        force = self._force + np.tensordot(shift, self.basis, 1)
+    def ranges(self, shift: Array, count: int) -> Array:
+        """Returns from where to where one may go along each of the first directions (count, 2) [N], the
+        others as they are in `shift` (k,), until an actuator has no command for its force."""
+        way = np.repeat(np.eye(count, len(shift)), 2, axis=0) * np.tile([-1.0, 1.0], count)[:, None]
+        force = self._forces(shift)
         part = np.linalg.norm(np.tensordot(way, self.basis, 1), axis=-1)
         room = (self._most + np.linalg.norm(force, axis=-1)) / np.maximum(part, 1e-12)
         low, width = np.zeros(2 * count), room.min(axis=1)
         for _ in range(ROUNDS):
             size = low[:, None] + np.linspace(0.0, 1.0, TRIED) * width[:, None]
             tried = shift + size[..., None] * way[:, None]
-            holds = self._has_commands(tried.reshape(-1, count)).reshape(size.shape)
+            holds = self._has_commands(tried.reshape(-1, len(shift))).reshape(size.shape)
             holds[:, 0] = True
             last = np.minimum(holds.cumprod(axis=1).sum(axis=1) - 1, TRIED - 2)
             low, width = size[np.arange(len(size)), last], width / (TRIED - 1)
-        return np.asarray(shift[:, None] + low.reshape(-1, 2) * [-1.0, 1.0])
+        return np.asarray(shift[:count, None] + low.reshape(-1, 2) * [-1.0, 1.0])
 
     def mean(self, first: Array, second: Array) -> Array:
         """Returns the mean (n, 3) of two commands (n, 3), of angles that turn freely the shorter way round:
@@ -102,7 +101,9 @@ class NullSpace:
         """Whether all actuators have commands for shifts (R, k)."""
         wanted, command = self._forces(shift), self._begin(shift)
         got = np.stack([self._compiled.forces_along(force) for force in self._plant.force(command)])
-        off = np.linalg.norm((got - wanted) * np.where(self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0), axis=-1)
+        off = np.linalg.norm(
+            (got - wanted) * np.where(self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0), axis=-1
+        )
         return np.asarray((off <= HELD * self._most).all(axis=1))
 
 

@@ -123,11 +123,11 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
     raise AssertionError("no place is free")
 
 
-def blank() -> Layout:
-    """A robot to begin with: a round hull, and a fin on its left that pushes ahead, back, up and down."""
-    hull = Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))
-    fin = Fin("left", (0.0, 0.17, 0.0), math.pi / 2)
-    return Layout("New robot", (fin,), body=Body(hull=hull))
+def blank(kind: str) -> Layout:
+    """A robot to begin with: a round hull, and one actuator of a type."""
+    part = KINDS[chosen(kind, "actuator", KINDS)].sample()
+    body = Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2)))
+    return added(Layout("New robot", (part,), body=body), kind)[0].without([part.name])
 
 
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:

@@ -101,9 +101,10 @@ class Guide:
             self._left = {key: getattr(session, key) for key in KEPT}
         self._enter(History(stop.state))  # what can be undone is what is done here
         self.stop, self.solved = stop, False
-        session.saved, session.chosen, session.mode = stop.state.layout, (), stop.mode
+        session.saved, session.chosen = stop.state.layout, ()
         session.desk = Desk()
         session.show_drawer(stop.drawer)
+        session.mode = stop.mode
         session.display = replace(session.display, drawn="none")
 
     def _enter(self, history: History) -> None:

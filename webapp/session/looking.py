@@ -15,10 +15,12 @@ from webapp.session.state import chosen, number
 TASKS = ("Design", "Allocate", "Simulate", "Export")
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
-    "Allocate": ("Candidates", "Comparison"),
+    "Allocate": ("Candidates", "Null space", "Comparison"),
     "Simulate": ("Swim over time",),
     "Export": (),
 }
+WAYS = DRAWERS["Allocate"][:2]
+"""What shows several ways to do the same; the first is of robots of fins alone."""
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
