@@ -124,10 +124,11 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
 
 
 def blank(kind: str) -> Layout:
-    """A robot to begin with: a round hull, and one actuator of a type."""
-    part = KINDS[chosen(kind, "actuator", KINDS)].sample()
-    body = Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2)))
-    return added(Layout("New robot", (part,), body=body), kind)[0].without([part.name])
+    """A robot to begin with: a round hull, and one actuator of a type on its left."""
+    part = replace(KINDS[chosen(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0))
+    if isinstance(part, Fin):
+        part = replace(part, mounting_angle=math.pi / 2)
+    return Layout("New robot", (part,), body=Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))))
 
 
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
