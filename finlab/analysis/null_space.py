@@ -61,7 +61,7 @@ class NullSpace:
 
     def commands(self, shift: Array) -> Array:
         """Returns commands (R, n, 3) of all actuators for shifts (R, k) [N] along the directions, made exact
-        by the actuators' own laws; NaN for failed ones."""
+        by the actuators' own laws, as an answer is (an error of at most 0.001); NaN for failed ones."""
         exact = refine(self._problem, self._wrench, self._begin(shift), STEPS, EXACT).command
         moved = np.linalg.norm(shift, axis=1)[:, None, None] > 0.0
         return among_all(np.where(moved, exact, self._command), self._alive)
@@ -77,7 +77,7 @@ class NullSpace:
         for _ in range(ROUNDS):
             size = low[:, None] + np.linspace(0.0, 1.0, TRIED) * width[:, None]
             tried = shift + size[..., None] * way[:, None]
-            holds = self._has_commands(tried.reshape(-1, len(shift))).reshape(size.shape)
+            holds = self._has_commands(tried.reshape(size.size, len(shift))).reshape(size.shape)
             holds[:, 0] = True
             last = np.minimum(holds.cumprod(axis=1).sum(axis=1) - 1, TRIED - 2)
             low, width = size[np.arange(len(size)), last], width / (TRIED - 1)
@@ -100,10 +100,9 @@ class NullSpace:
     def _has_commands(self, shift: Array) -> NDArray[np.bool_]:
         """Whether all actuators have commands for shifts (R, k)."""
         wanted, command = self._forces(shift), self._begin(shift)
-        got = np.stack([self._compiled.forces_along(force) for force in self._plant.force(command)])
-        off = np.linalg.norm(
-            (got - wanted) * np.where(self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0), axis=-1
-        )
+        got = self._compiled.forces_along(self._plant.force(command))
+        free = np.where(self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0)  # drag comes with the lift
+        off = np.linalg.norm((got - wanted) * free, axis=-1)
         return np.asarray((off <= HELD * self._most).all(axis=1))
 
 

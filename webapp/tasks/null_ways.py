@@ -8,7 +8,7 @@ from finlab.analysis.null_space import NullSpace
 from finlab.arrays import Array
 from webapp.markup.verdict import is_proved
 from webapp.session.targets import full_thrust
-from webapp.tasks.solver import NO_MODES, Modes, NamedMode, NullWays
+from webapp.tasks.solver import Modes, NamedMode, NullWays
 
 MOST = 6
 """Directions that have a slider."""
@@ -19,8 +19,6 @@ OTHER, MEAN = "another way", "average of 1 and 2"
 
 def null_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
     """The answer and, where its forces are shifted [N], the other way and the mean of both commands."""
-    if not np.isfinite(answer.command).any():
-        return NO_MODES
     space = NullSpace(answer)
     count = min(len(space.basis), MOST)
     shift = np.zeros(len(space.basis))

@@ -83,8 +83,8 @@ class Compiled:
         return own[..., :3]
 
     def forces_along(self, force: Array) -> Array:
-        """Forces (n, 2) [N] along each actuator's directions of forces (n, 3) [N] in own axes."""
-        return np.asarray(np.einsum("nka,na->nk", self._directions, force))
+        """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own axes."""
+        return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
     def tilted(self, effectiveness: Array, beside: Array) -> "Compiled":
         """The same actuators with another effectiveness (n, 3, 6) along their own axes, and another wrench
