@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from finlab.layout import Tilt as Tilt
     from finlab.layout import load_layout as load_layout
     from finlab.layout import save_layout as save_layout
+    from finlab.log import Judgement as Judgement
+    from finlab.log import Log as Log
+    from finlab.log import judge as judge
+    from finlab.log import read_log as read_log
 
 __version__ = "0.1.0"
 
@@ -42,6 +46,7 @@ _HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
     "Allocator": "finlab.allocation.allocator",
     "Policy": "finlab.allocation.policy",
     "FinlabError": "finlab.errors",
+    **dict.fromkeys(("Judgement", "Log", "judge", "read_log"), "finlab.log"),
 }
 
 

@@ -27,6 +27,7 @@ LEVELS = (
     ("control", "paper"),
     ("mdn", "sim", "analysis", "fit"),
     ("evaluation", "deploy"),
+    ("log",),
     ("cli",),
 )
 """A room may import rooms of earlier levels and itself, never its neighbours or later ones."""

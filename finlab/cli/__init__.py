@@ -38,6 +38,7 @@ EXAMPLES = {
     "fit actuator": "finlab fit actuator bench.csv -o thruster.csv",
     "fit fin": "finlab fit fin cell.csv -o fin.csv",
     "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
+    "log": "finlab log dive.ulg --robot bluerov2_heavy --plot dive.png",
     "simulate": "finlab simulate A --duration 30 -o swim",
     "export": "finlab export A -o my_robot",
     "app": "finlab app --layout A --port 8080",
@@ -82,7 +83,7 @@ def _parsed(argv: list[str]) -> int:
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import eval_verbs, fit, layout_verbs, robot_verbs, simulate, train_verbs
+    from finlab.cli import eval_verbs, fit, layout_verbs, log_verb, robot_verbs, simulate, train_verbs
 
     root = SubcommandApp()
     root.command(robot_verbs.allocate)
@@ -92,6 +93,7 @@ def _command_line(argv: Sequence[str]) -> SubcommandApp:
     root.command(eval_verbs.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
     root.command(eval_verbs.bench)
     root.command(fit.verbs, name="fit", help="Fit actuators and robots to measurements.")
+    root.command(log_verb.log)
     root.command(simulate.simulate)
     root.command(robot_verbs.export)
     root.command(robot_verbs.app)

@@ -25,8 +25,10 @@ PART = 1 << 20
 """Bytes that are read at once."""
 
 
-def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> bytes:
-    """Returns the content of a regular file of up to `most` bytes.
+def read_file(
+    path: Name, most: int, what: str, error: type[FinlabError] = DataError, *, head: int | None = None
+) -> bytes:
+    """Returns the content of a regular file of up to `most` bytes, or of these its first `head`.
 
     A pipe, a socket and a device are refused without waiting for them. Raises FinlabError of the kind
     `error`: the file is missing, not regular, too large or not readable; the sentence says `what` is
@@ -38,7 +40,7 @@ def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataE
                 raise error.at(str(path), f"is a folder, expected {what}")
             if not stat.S_ISREG(about.st_mode):
                 raise error.at(str(path), f"is not a regular file, expected {what}")
-            content = _read(file, most) if about.st_size <= most else None
+            content = _read(file, most if head is None else head - 1) if about.st_size <= most else None
     except FileNotFoundError:
         raise error.at(str(path), f"no such file, expected {what}") from None
     except IsADirectoryError:

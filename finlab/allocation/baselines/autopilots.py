@@ -72,6 +72,14 @@ class Px4(LeastErrorMethod):
         effectiveness = SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most)[ROWS]
         self.mix, self.setpoint_scale = normalised(np.linalg.pinv(effectiveness, rcond=ROUNDS_OFF))
 
+    @property
+    def setpoint_unit(self) -> Array:
+        """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where nothing
+        answers."""
+        unit = np.empty(6)
+        unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
+        return unit
+
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         part = (self.setpoint_scale * SIGNS * targets[:, ROWS])[:, None, :] * self.mix
         u, form = part.sum(axis=-1), self.settings.desaturation
@@ -142,6 +150,11 @@ class ArduSub(LeastErrorMethod):
         self.factors = frame_factors(effectiveness)
         """Factors (n, 6)."""
         actual = (effectiveness * self.factors).sum(axis=0)
+        full = 0.5 * (self.plant.upper - self.plant.lower)[:, 0].mean()
+        self.setpoint_unit: Array = np.empty(6)
+        """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where nothing answers;
+        full output counts as the mean of both ways of all thrusters."""
+        self.setpoint_unit[COLUMNS] = np.where(actual > 1e-9, full * actual, np.nan)
         # Newton per unit of the wrench; an axis that the factors do not serve is left out.
         self._per = np.divide(self.factors, actual, out=np.zeros_like(self.factors), where=actual > 1e-9)
 

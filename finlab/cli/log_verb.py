@@ -1,0 +1,66 @@
+"""`finlab log`: why a thruster saturated, which axis was lost, what would have held it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from finlab.cli import shared_options
+
+if TYPE_CHECKING:
+    from finlab.layout import Layout
+    from finlab.log import Log
+
+
+def log(
+    file: Annotated[Positional[Path], arg(metavar="FILE")],
+    robot: Annotated[str | None, arg(metavar="LAYOUT")] = None,
+    scale: Annotated[shared_options.Wrench | None, arg(metavar="FX FY FZ TX TY TZ")] = None,
+    demand: Annotated[str | None, arg(metavar="TOPIC")] = None,
+    outputs: Annotated[str | None, arg(metavar="TOPIC")] = None,
+    priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
+    improve: bool = True,
+    save: Annotated[Path | None, arg(metavar="FILE.yaml")] = None,
+    plot: Annotated[Path | None, arg(metavar="FILE", aliases=["-o"])] = None,
+    json: shared_options.JsonFile = None,
+) -> None:
+    """Say from a log of PX4 (.ulg), ArduSub (.bin) or ROS (a bag) why a thruster saturated, which axis was
+    lost, and what would have held it.
+
+    Args:
+        file: log, or folder of a bag.
+        robot: layout file or name of a shipped layout; the robot of the log's own parameters by default.
+        scale: what a setpoint of 1 asks for on each axis [N, N m]; the autopilot's own rule by default.
+        demand: topic of a bag with the wrench, where there are several.
+        outputs: topic of a bag with what actuators were sent, where there are several.
+        priority: for policy priority: a group of axes with commas between, most important first; the axis
+            that lost most by default.
+        improve: search for a better layout and replay on it.
+        save: layout file to write that layout to.
+        plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
+    """
+    from finlab.evaluation.plots import check_picture, write_picture
+    from finlab.files.worker import in_worker
+    from finlab.layout import save_layout
+    from finlab.log import judge
+    from finlab.log.words import judgement_text, picture
+
+    shared_options.check_json_file(json)
+    shared_options.check_json_file(save, "save")
+    check_picture(plot)
+    known = None if robot is None else shared_options.open_robot(robot)[0]
+    found: Log = in_worker(_read, file, known, scale, demand, outputs)
+    judged = judge(found, priority=[group.split(",") for group in priority], improve=improve)
+    if plot is not None:
+        write_picture(lambda _: picture(judged), [], plot)
+    if save is not None and judged.improved is not None:
+        save_layout(judged.improved, save)
+    shared_options.put_json(judged.to_dict() if json else None, json, judgement_text(judged))
+
+
+def _read(file: Path, robot: Layout | None, scale: Any, demand: str | None, outputs: str | None) -> Log:
+    from finlab.log import read_log
+
+    return read_log(file, robot, scale=scale, demand=demand, outputs=outputs)

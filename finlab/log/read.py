@@ -1,0 +1,216 @@
+"""Reads a log and poses it for one robot: demands in newtons, outputs as commands of its actuators."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finlab.actuators.thrust_model import PowerTable
+from finlab.allocation.baselines.autopilots import ArduSub, Px4
+from finlab.allocation.solution import PlainData
+from finlab.arrays import Array
+from finlab.axes import AXES
+from finlab.errors import DataError, LayoutError
+from finlab.files.guarded import read_file
+from finlab.layout import Layout, load_layout
+from finlab.log import ardusub_log, px4_log, ros_bag
+from finlab.log.ardusub_log import FULL_US, REST_US
+from finlab.log.recorded import Event, Form, Recorded
+from finlab.physics.objective import yardstick
+
+MOST_BYTES = 1_000_000_000
+"""Largest log."""
+MOST_SAMPLES = 1_000_000
+"""Most samples of demands: five hours at 50 Hz."""
+GAP_S = 1.0
+"""Longest time that a sample holds; what lies beyond it was not logged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Log(PlainData):
+    """What a robot was asked for and told, as plain data; wrenches in x forward, y left, z up."""
+
+    source: str
+    """Name of the file."""
+    form: Form
+    """Whose log it is: `px4`, `ardusub`, `ros`."""
+    robot: Layout
+    """By whose laws it is judged."""
+    time: Array
+    """Of each sample on the log's clock (N,) [s], rising."""
+    span: Array
+    """How long each held (N,) [s]."""
+    demand: Array
+    """Wrench that was asked for (N, 6) [N, N m]; NaN along an axis that does not count."""
+    command: Array | None
+    """What the actuators were told (N, n, 3), as their laws take it, NaN for one that was stopped; None where
+    the log holds no outputs."""
+    unmet: Array | None
+    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says nothing."""
+    events: tuple[Event, ...]
+    """What the log says of the robot's health, by time."""
+    notes: tuple[str, ...]
+    """Sentences on how it was read."""
+    asks: tuple[str, ...]
+    """Sentences on what it lacks, each with the option that gives it."""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def read_log(
+    path: str | os.PathLike[str],
+    robot: Layout | str | None = None,
+    *,
+    scale: ArrayLike | None = None,
+    demand: str | None = None,
+    outputs: str | None = None,
+) -> Log:
+    """Reads a log of PX4 (`.ulg`), of ArduSub (`.bin`) or a bag of ROS.
+
+    It runs in this process: files of strangers belong in `finlab.files.worker.in_worker`.
+
+    Args:
+        path: of the file, or of a bag's folder.
+        robot: a layout, or what `load_layout` takes; by the log's own parameters when None.
+        scale: what a setpoint of 1 asks for on each axis (6,) [N, N m]; of ROS what wrenches are multiplied
+            by. By the autopilot's own rule and the robot's forces when None.
+        demand: topic of a bag that holds the wrench; the only one there when None.
+        outputs: topic of a bag that holds what actuators were sent; the only one there when None.
+
+    Raises:
+        DataError: the file is damaged, of another kind or too large, or lacks what no option gives.
+        LayoutError: the robot cannot be read, or does not fit the log's motors.
+    """
+    place = Path(path)
+    found = _recorded(place, demand, outputs)
+    layout = load_layout(robot) if isinstance(robot, str) else robot
+    known = layout or found.layout
+    if known is None:
+        raise DataError(f"{place}: {(found.asks or ['holds no robot; name it by --robot LAYOUT.'])[0]}")
+    sides = np.ones(known.n)
+    if layout is not None:
+        found.asks = []
+        if found.layout is not None:
+            sides = _sides(found.layout, layout, found.form)
+    return _posed(place.name, found, known, sides, scale)
+
+
+def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
+    head = b"" if place.is_dir() else read_file(place, MOST_BYTES, "a log", head=64)
+    if head.startswith(px4_log.MAGIC):
+        return px4_log.read_ulog(place)
+    if head.startswith(ardusub_log.MAGIC):
+        return ardusub_log.read_dataflash(place)
+    if place.is_dir() or place.suffix.lower() in ros_bag.ENDS:
+        return ros_bag.read_bag(place, demand, outputs)
+    raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
+
+
+def _sides(own: Layout, robot: Layout, form: Form) -> Array:
+    """1 for each actuator (n,) that pushes as the log's motor in its place does, -1 for one mounted the other
+    way round. Raises LayoutError: they do not fit."""
+    if own.n != robot.n:
+        raise LayoutError(
+            f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have {own.n} motors"
+        )
+    axes = [[getattr(part, "axis", (0.0,) * 3) for part in each.actuators] for each in (own, robot)]
+    along = np.einsum("nk,nk->n", *map(np.array, axes))
+    for part, share in zip(robot.actuators, along, strict=True):
+        if abs(share) < 0.5:
+            raise LayoutError(
+                f"{part.name!r:.60} of layout {robot.name!r:.60} pushes another way than the log's motor in "
+                "its place; list the actuators in the order of the motors"
+            )
+    return np.sign(along)
+
+
+def unit_of(form: Form, robot: Layout) -> Array:
+    """Returns what a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along an
+    axis that the robot does not drive. Raises LayoutError: the robot has other actuators than thrusters."""
+    if form == "ros":
+        return np.ones(6)
+    kind = Px4 if form == "px4" else ArduSub
+    return kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit
+
+
+def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: ArrayLike | None) -> Log:
+    """The log in the robot's newtons, at the times of its outputs, or else of its demands."""
+    unit = unit_of(found.form, robot) if scale is None else _scale(scale)
+    time = found.demand.time if found.outputs is None else found.outputs.time
+    demand = found.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
+    command = None if found.outputs is None else commands_of(found, found.outputs.values, robot, sides)
+    unmet = None if found.unmet is None else found.unmet.at(time) * np.nan_to_num(np.abs(unit))
+    kept = np.isfinite(demand).any(axis=1)
+    notes, asks = [*found.notes], [*found.asks]
+    if command is not None:
+        idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
+        kept &= ~idle
+        if idle.any():
+            notes.append("Times at which no output moved, such as before arming, are left out.")
+    else:
+        asks.append(
+            "It holds no outputs: what the autopilot gave is what its method gives, not what it sent."
+        )
+    if not kept.any():
+        raise DataError(f"{source}: holds no demand while outputs moved; there is nothing to judge")
+    if len(time) > MOST_SAMPLES:
+        raise DataError(f"{source}: holds {len(time):,} samples, expected up to {MOST_SAMPLES:,}; cut it")
+    step = np.diff(time, append=time[-1] + np.median(np.diff(time)) if len(time) > 1 else time[-1])
+    if (beyond := float(np.maximum(step - GAP_S, 0.0)[kept].sum())) > 0.0:
+        notes.append(f"Gaps between samples, {beyond:.0f} s beyond {GAP_S:g} s each, are left out.")
+    undriven = [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]
+    if undriven:
+        notes.append(f"No thruster drives {', '.join(undriven)}; what was asked there is not judged.")
+    return Log(
+        source=source,
+        form=found.form,
+        robot=robot,
+        time=time[kept],
+        span=np.minimum(step, GAP_S)[kept],
+        demand=demand[kept],
+        command=None if command is None else command[kept],
+        unmet=None if unmet is None else unmet[kept],
+        events=tuple(sorted(found.events, key=lambda event: event.time)),
+        notes=tuple(dict.fromkeys(notes)),
+        asks=tuple(asks),
+    )
+
+
+def robot_rest(robot: Layout) -> Array:
+    """Commands (n, 3) of actuators at rest."""
+    return np.clip(0.0, robot.lower, robot.upper)
+
+
+def _scale(scale: ArrayLike) -> Array:
+    values = np.asarray(scale, np.float64)
+    if values.shape != (6,) or not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise DataError(f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}")
+    return values
+
+
+def commands_of(found: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
+    """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
+    n, k = robot.n, outputs.shape[1]
+    if not found.of_shares and k == 3 * n:
+        return outputs.reshape(-1, n, 3)
+    if k < n or (k != n and found.form == "ros"):
+        thrice = "" if found.of_shares else f" or {3 * n}"
+        raise LayoutError(
+            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not {n}{thrice}"
+        )
+    robot.only("a log with one output for each actuator", "thruster")
+    values = outputs[:, :n] * sides
+    command = np.zeros((len(values), n, 3))
+    low, high = robot.lower[:, 0], robot.upper[:, 0]
+    command[..., 0] = np.where(values < 0.0, -values * low, values * high) if found.of_shares else values
+    for i, part in enumerate(robot.actuators):
+        model = getattr(part, "model", None)
+        if found.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
+            pulse, force, _ = model.columns
+            command[:, i, 0] = np.interp(REST_US + FULL_US * values[:, i], pulse, force)
+    command[..., 0] = np.clip(command[..., 0], low, high)
+    command[np.isnan(values)] = np.nan
+    return command

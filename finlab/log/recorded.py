@@ -1,0 +1,78 @@
+"""What a reader finds in a log, before the robot's newtons are known."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import Array
+from finlab.layout import Layout
+
+Form = Literal["px4", "ardusub", "ros"]
+FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Turns a wrench of x forward, y right, z down into x forward, y left, z up."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that the log says of the robot's health."""
+
+    time: float
+    """On the log's clock [s]."""
+    words: str
+    actuator: int | None = None
+    """Place of the actuator that it is about, from 0."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples of one kind; each holds until the next."""
+
+    time: Array
+    """Rising, on the log's clock (N,) [s]."""
+    values: Array
+    """(N, K)."""
+
+    @classmethod
+    def of(cls, time: Array, values: Array) -> "Series":
+        """Sorts samples by time (N,) [s]; of those at one time the last stays."""
+        order = np.argsort(time, kind="stable")
+        kept = order[np.append(np.diff(time[order]) > 0.0, True)] if len(order) else order
+        return cls(np.asarray(time[kept], np.float64), np.asarray(values[kept], np.float64))
+
+    def at(self, time: Array) -> Array:
+        """Values (M, K) that hold at times (M,) [s]; NaN before the first."""
+        place = np.searchsorted(self.time, time, side="right") - 1
+        return np.where(place[:, None] >= 0, self.values[np.maximum(place, 0)], np.nan)
+
+
+@dataclass
+class Recorded:
+    """What a log holds, in its own units."""
+
+    form: Form
+    demand: Series
+    """Wrenches (N, 6), x forward, y left, z up; setpoints without unit of an autopilot, of ROS [N, N m]."""
+    outputs: Series | None = None
+    """Shares (M, n) of full output, NaN where a motor is stopped; or what ROS sent."""
+    of_shares: bool = True
+    """Whether outputs are shares."""
+    unmet: Series | None = None
+    """What the autopilot says that it left of a demand (M, 6), in its unit."""
+    layout: Layout | None = None
+    """The robot by the log's own parameters."""
+    events: list[Event] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """Sentences on how it was read."""
+    asks: list[str] = field(default_factory=list)
+    """Sentences on what it lacks, each with the option that gives it."""
+
+
+def changes(time: Array, bits: NDArray[np.bool_], words: str, again: str) -> list[Event]:
+    """Events where flags (N, n) of n actuators change; the second words where one falls."""
+    before = np.vstack([np.zeros_like(bits[:1]), bits[:-1]])
+    return [
+        Event(float(time[row]), words if bits[row, i] else again, int(i))
+        for row, i in zip(*np.nonzero(bits != before), strict=True)
+    ]

@@ -1,0 +1,95 @@
+"""Bags of ROS 1 and 2, read by rosbags: a wrench that was asked for, and what actuators were sent.
+
+Wrenches are geometry_msgs/Wrench or WrenchStamped [N, N m], x forward, y left, z up, NaN for an axis that is
+free. Outputs are actuator_msgs/Actuators (`normalized`) or a Float64MultiArray: of n numbers forces of
+thrusters [N], of 3 n numbers commands as the actuators' laws take them.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab.errors import DataError
+from finlab.log.recorded import Event, Recorded, Series
+
+WRENCHES = ("geometry_msgs/msg/Wrench", "geometry_msgs/msg/WrenchStamped")
+SHARES = "actuator_msgs/msg/Actuators"
+OUTPUTS = ("std_msgs/msg/Float64MultiArray", "std_msgs/msg/Float32MultiArray", SHARES)
+HEALTH = "diagnostic_msgs/msg/DiagnosticArray"
+WARNING = 1
+"""Level of a diagnostic from which on it is told."""
+ENDS = (".bag", ".mcap", ".db3")
+"""How files of bags end; one of ROS 2 may be a folder of them."""
+
+
+def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
+    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it is damaged, lacks a
+    topic, or has several; ModuleNotFoundError: there is no rosbags."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    rows: dict[str, list[tuple[float, Any]]] = defaultdict(list)
+    events: list[Event] = []
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            kinds = {each.topic: each.msgtype for each in reader.connections}
+            asked = _topic(path, kinds, WRENCHES, demand, "demand")
+            sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
+            wanted = [
+                each for each in reader.connections if each.topic in (asked, sent) or each.msgtype == HEALTH
+            ]
+            for connection, nanoseconds, raw in reader.messages(wanted):
+                message: Any = reader.deserialize(raw, connection.msgtype)
+                time = (nanoseconds - reader.start_time) * 1e-9
+                if connection.topic == asked:
+                    wrench = getattr(message, "wrench", message)
+                    parts = (wrench.force, wrench.torque)
+                    rows["demand"].append((time, [value for v in parts for value in (v.x, v.y, v.z)]))
+                elif connection.topic == sent:
+                    rows["outputs"].append(
+                        (time, getattr(message, "normalized", getattr(message, "data", ())))
+                    )
+                else:
+                    events += [
+                        Event(time, f"{each.name}: {each.message}")
+                        for each in message.status
+                        if each.level >= WARNING
+                    ]
+    except DataError:
+        raise
+    except Exception as problem:  # of many kinds, by a file that is damaged
+        raise DataError(f"{path}: cannot be read as a bag of ROS ({problem!s:.80})") from None
+    found = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
+    found.asks.append("A bag holds no robot; name it by --robot LAYOUT.")
+    if sent is not None and rows["outputs"]:
+        found.outputs, found.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
+    return found
+
+
+def _topic(
+    path: Path, kinds: dict[str, str], wanted: Sequence[str], named: str | None, option: str
+) -> str | None:
+    """The topic that an option names, or the only one of some types; None where there are no outputs."""
+    known = sorted(topic for topic, kind in kinds.items() if kind in wanted)
+    if named is not None and named not in known:
+        raise DataError(
+            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}; known: {', '.join(known) or 'none'}"
+        )
+    if named is None and len(known) > 1:
+        raise DataError(f"{path}: has several topics for {option}: {', '.join(known)}; say --{option} TOPIC")
+    if not known and option == "demand":
+        raise DataError(
+            f"{path}: has no topic of {' or '.join(wanted)}, only {', '.join(sorted(kinds)) or 'none'}"
+        )
+    return named or (known[0] if known else None)
+
+
+def _series(path: Path, topic: str | None, rows: list[tuple[float, Any]]) -> Series:
+    widths = {len(row) for _, row in rows}
+    if len(widths) != 1 or 0 in widths:
+        raise DataError(f"{path}: {topic}: expected messages of one length, got {sorted(widths) or 'none'}")
+    times, values = zip(*rows, strict=True)
+    return Series.of(np.array(times), np.array(values, np.float64))
