@@ -72,6 +72,8 @@ CONTROLS = {
     "(--flow)": f"({SPEED[:-6]})",
     "(flow)": f"({SPEED[:-6]})",
     "(--force LEAST MOST)": "(Force, at Limits of each)",
+    "--robot LAYOUT": "This robot, at Log",
+    "--scale": "finlab log --scale",
     "--voltage": "finlab fit thruster --voltage",
     **{
         f"--{word}": f"{CONVERT} --{word}"

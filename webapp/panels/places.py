@@ -24,6 +24,7 @@ from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
+from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
@@ -34,7 +35,7 @@ from webapp.session.targets import PRESETS
 
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
 """The bar above all; the list at the left; the inspector at the right; the drawer below; over the view."""
-DESIGN, ALLOCATE, SIMULATE, EXPORT = TASKS
+DESIGN, ALLOCATE, SIMULATE, EXPORT, LOG = TASKS
 CANDIDATES, NULL_SPACE = WAYS
 
 
@@ -71,7 +72,11 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
-    Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
+    Place(LEFT, (LOG,), "Log", add_log),
+    Place(RIGHT, (LOG,), "Lost", add_losses),
+    Place(RIGHT, (ALLOCATE, LOG), "Asked and delivered", add_answer),
+    Place(DRAWER, (LOG,), "Log over time", card(log_plots)),
+    Place(DRAWER, (LOG,), "Replays", card(replays_table)),
     Place(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets),
     Place(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
     Place(DRAWER, (ALLOCATE,), NULL_SPACE, add_null_space),

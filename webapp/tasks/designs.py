@@ -25,7 +25,7 @@ from webapp.viser_internals import run_script
 
 KINDS = (
     "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
-    "measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+    "measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, DB3, BAG)"
 )
 SHARED = (
     "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a copy, on a "
