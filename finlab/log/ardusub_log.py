@@ -29,8 +29,8 @@ Columns = dict[str, Any]
 
 
 def read_dataflash(path: Path) -> Recorded:
-    """Reads a log of ArduSub. Raises DataError: it is damaged, or lacks demands; ModuleNotFoundError: there is
-    no pymavlink."""
+    """Reads a log of ArduSub. Raises DataError: it is damaged, or lacks demands; ModuleNotFoundError:
+    there is no pymavlink."""
     tables = _tables(path, ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "MSG", "ERR"))
     if "RATE" not in tables:
         lacks = (

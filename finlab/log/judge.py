@@ -185,15 +185,15 @@ def _spells(log: Log, missing: Array, lost: Flags) -> Iterator[slice]:
 def _spell(
     log: Log, scale: Array, rows: slice, given: Array, missing: Array, lost: Flags, full: Flags, ended: Flags
 ) -> Spell:
-    span, some = log.span[rows], lost[rows].any(axis=1)
+    span, some = log.span[rows], np.asarray(lost[rows].any(axis=1))
     return Spell(
         start=float(log.time[rows.start]),
         end=float(log.time[rows.stop - 1] + log.span[rows.stop - 1]),
-        axes=tuple(axis for axis, one in zip(AXES, lost[rows].any(axis=0), strict=True) if one),
+        axes=tuple(axis for axis, one in zip(AXES, lost[rows].any(axis=0).tolist(), strict=True) if one),
         missing=six(span @ np.abs(missing[rows]), scale),
         asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
         gave=six(span @ given[rows] / span.sum(), scale),
-        limits=limit_words(log.robot, *(flags[rows][some].any(axis=0) for flags in (full, ended))),
+        limits=limit_words(log.robot, *(np.any(flags[rows][some], axis=0) for flags in (full, ended))),
     )
 
 

@@ -116,7 +116,7 @@ class Judgement:
         where = "" if held.robot == "as it is" else " on the improved layout, and nothing on this one"
         more = np.subtract(held.missing, self.missing)
         least = 0.02 * self.missing[i] * self.scale / self.scale[i]
-        price = [f"{amount(more[k], k)} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
+        price = [f"{amount(more[k], int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
         return f"{held.name} would have held it{where}" + (f", for {' and '.join(price)}" if price else "")
 
     def to_dict(self) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def _sides(own: Layout, robot: Layout, form: Form) -> Array:
                 f"{part.name!r:.60} of layout {robot.name!r:.60} pushes another way than the log's motor in "
                 "its place; list the actuators in the order of the motors"
             )
-    return np.sign(along)
+    return np.asarray(np.sign(along))
 
 
 def unit_of(form: Form, robot: Layout) -> Array:
@@ -181,7 +181,7 @@ def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: Arr
 
 def robot_rest(robot: Layout) -> Array:
     """Commands (n, 3) of actuators at rest."""
-    return np.clip(0.0, robot.lower, robot.upper)
+    return np.asarray(np.clip(0.0, robot.lower, robot.upper))
 
 
 def _scale(scale: ArrayLike) -> Array:
@@ -195,7 +195,7 @@ def commands_of(found: Recorded, outputs: Array, robot: Layout, sides: Array) ->
     """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
     n, k = robot.n, outputs.shape[1]
     if not found.of_shares and k == 3 * n:
-        return outputs.reshape(-1, n, 3)
+        return np.asarray(outputs.reshape(-1, n, 3))
     if k < n or (k != n and found.form == "ros"):
         thrice = "" if found.of_shares else f" or {3 * n}"
         raise LayoutError(

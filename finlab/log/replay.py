@@ -67,7 +67,7 @@ def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
         if len(first) <= most:
             break
         spread = max(2.0 * spread, FINEST)
-    held = np.bincount(group, span, len(first))
+    held: Array = np.asarray(np.bincount(group, span, len(first)), np.float64)
     sums = [np.bincount(group, span * column, len(first)) for column in np.nan_to_num(wrench).T]
     mean = np.stack(sums, axis=1) / np.maximum(held, 1e-12)[:, None]
     return Demands(np.where(np.isnan(wrench[first]), np.nan, mean), held, spread)

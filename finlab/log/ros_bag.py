@@ -76,7 +76,7 @@ def _topic(
     known = sorted(topic for topic, kind in kinds.items() if kind in wanted)
     if named is not None and named not in known:
         raise DataError(
-            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}; known: {', '.join(known) or 'none'}"
+            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}, only {', '.join(known) or 'none'}"
         )
     if named is None and len(known) > 1:
         raise DataError(f"{path}: has several topics for {option}: {', '.join(known)}; say --{option} TOPIC")

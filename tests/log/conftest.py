@@ -1,0 +1,138 @@
+"""A dive of an eight-thruster robot whose yaw is out of reach for a while, as autopilots would log it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.exchange import Exchange
+from finlab.exchange.motor_factors import FRAMES
+from finlab.exchange.parameters import read_parameters, write_px4
+from finlab.layout import Layout, load_layout
+from tests.log.dataflash_writer import write_dataflash
+from tests.log.ulog_writer import write_ulog
+
+FULL = 40.0
+"""Force of each thruster at full output, either way [N]."""
+FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+ROOT = np.sqrt(0.5)
+LEVER, ROLL, PITCH = 0.24 * ROOT, 0.22, 0.12
+"""Arms of yaw, roll and pitch [m]."""
+# PX4 divides columns of the pseudo-inverse: thrust by the mean norm of its entries, which is 1 / 2F of
+# horizontal thrusters and 1 / 4F of others, roll and pitch by sqrt(2) times the larger entry, yaw by its entry.
+PX4_UNIT = 4 * FULL * np.array([*(2 / 3,) * 3, PITCH * ROOT, PITCH * ROOT, LEVER])
+SUB_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, ROLL, PITCH, LEVER])
+"""Wrench of a setpoint of 1 on each axis by the rules of both autopilots, worked out for this robot."""
+
+
+@dataclass(frozen=True)
+class Dive:
+    """What was asked for, what outputs gave, and where that was written."""
+
+    robot: Layout
+    path: Path
+    time: np.ndarray
+    demand: np.ndarray
+    given: np.ndarray
+
+    @property
+    def missing(self) -> np.ndarray:
+        """Impulse (6,) that was missing."""
+        step = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
+        return step @ np.abs(self.demand - self.given)
+
+
+def even_robot() -> Layout:
+    """The BlueROV2 Heavy with thrusters that push alike both ways, its centre amid its horizontal ones."""
+    robot = load_layout("bluerov2_heavy")
+    places = [(*np.sign(part.position[:2]), part) for part in robot.actuators]
+    parts = (
+        replace(
+            part, force=(-FULL, FULL), position=(0.14 * x, 0.1 * y, 0.0) if i < 4 else (0.12 * x, 0.22 * y, 0)
+        )
+        for i, (x, y, part) in enumerate(places)
+    )
+    return replace(robot, name="even", actuators=tuple(parts), body=None)
+
+
+def columns(robot: Layout) -> np.ndarray:
+    """Wrench (n, 6) of each thruster per newton: its force and its lever times that."""
+    return np.array([[*part.axis, *np.cross(part.position, part.axis)] for part in robot.actuators])
+
+
+def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) [s] and demands (n, 6) [N, N m]: easy ones, and for a sixth of the time more of surge and
+    yaw than goes together."""
+    time = 4.0 + dt * np.arange(n)
+    demand = np.zeros((n, 6))
+    demand[:, 0], demand[:, 2] = 20.0 + 5.0 * np.sin(time / 7), 10.0 * np.cos(time / 3)
+    demand[:, 5] = 2.0 * np.sin(time)
+    hard = slice(n // 2, n // 2 + n // 6)
+    demand[hard] = [surge, 0.0, 0.0, 0.0, 0.0, yaw]
+    return time, demand
+
+
+def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: bool = True) -> Dive:
+    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers."""
+    robot = even_robot()
+    time, demand = asked(n, dt, 90.0, 18.0)
+    force = Allocator(robot, "px4").allocate_batch(demand).command[..., 0]
+    given = force @ columns(robot)
+    found = read_parameters(write_px4(robot, Exchange(), ""), "")
+    whole = ("CA_ROTOR_COUNT", "CA_R_REV", "CA_AIRFRAME")
+    parameters = {key: int(value) if key in whole else value for key, value in found.items()}
+    setpoint = demand / PX4_UNIT * FRD
+    topics = {
+        "vehicle_thrust_setpoint": (time, {"xyz": setpoint[:, :3]}),
+        "vehicle_torque_setpoint": (time, {"xyz": setpoint[:, 3:]}),
+    }
+    if outputs:
+        control = np.full((n, 12), np.nan)
+        control[:, :8] = force / FULL
+        topics["actuator_motors"] = (time + 0.001, {"control": control})
+    left = (demand - given) / PX4_UNIT * FRD
+    status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
+    topics["control_allocator_status"] = (time + 0.001, status)
+    return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
+
+
+def sub_dive(path: Path, n: int = 3000, dt: float = 0.02) -> Dive:
+    """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are the sum of
+    factors, cut at full."""
+    robot = even_robot()
+    time, _ = asked(n, dt, 0.0, 0.0)
+    hard = slice(n // 2, n // 2 + n // 6)
+    stick = np.zeros((n, 6))  # roll, pitch, yaw, throttle, forward, lateral
+    stick[:, 2], stick[:, 3], stick[:, 4] = 0.1 * np.sin(time), 0.2 * np.cos(time / 3), 0.3
+    stick[hard] = [0.0, 0.0, 0.6, 0.0, 0.8, 0.0]
+    output = np.clip(stick @ FRAMES["VECTORED_6DOF"].T, -1.0, 1.0)
+    signs = np.array([1, -1, 1, 1, -1, 1, 1, 1.0])
+    pulse = np.round(1500.0 + 400.0 * output * signs)
+    force = FULL * (pulse - 1500.0) / 400.0 * signs
+    given = force @ columns(robot)
+    demand = stick[:, [4, 5, 3, 0, 1, 2]] * [1.0, -1.0, 1.0, 1.0, -1.0, -1.0] * SUB_UNIT
+    us = np.round(time * 1e6)
+    rate = {"TimeUS": us, "ROut": stick[:, 0], "POut": stick[:, 1], "YOut": stick[:, 2]}
+    rate["AOut"] = 0.5 + 0.5 * stick[:, 3]
+    sticks = {f"C{i}": np.round(1500 + 400 * stick[:, i - 1]) for i in (5, 6)}
+    messages = {
+        "RATE": ("Qffff", rate),
+        "RCIN": ("QHH", {"TimeUS": us, **sticks}),
+        "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **{f"C{i}": pulse[:, i - 1] for i in range(1, 9)}}),
+        "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
+    }
+    parameters = {"FRAME_CONFIG": 2.0, **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)}}
+    parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
+    return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)
+
+
+@pytest.fixture(scope="session")
+def px4(tmp_path_factory: pytest.TempPathFactory) -> Dive:
+    return px4_dive(tmp_path_factory.mktemp("px4") / "dive.ulg")
+
+
+@pytest.fixture(scope="session")
+def sub(tmp_path_factory: pytest.TempPathFactory) -> Dive:
+    return sub_dive(tmp_path_factory.mktemp("sub") / "dive.bin")

@@ -1,0 +1,133 @@
+"""Logs whose losses are known are judged: how much, when, which axis, why, and what would have held it."""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.log.replay import demands_of, replay
+from finlab.physics.objective import yardstick
+from tests.log.conftest import SUB_UNIT, Dive, px4_dive, sub_dive
+
+YAW = 5
+
+
+@pytest.fixture(params=["px4", "sub"])
+def dive(request: pytest.FixtureRequest) -> Dive:
+    made: Dive = request.getfixturevalue(request.param)
+    return made
+
+
+def check(dive: Dive, judged: finlab.Judgement) -> None:
+    """Yaw was lost as put in, over the hard sixth, and priority of yaw would have held it."""
+    hard = slice(len(dive.time) // 2, len(dive.time) // 2 + len(dive.time) // 6)
+    begin, end = dive.time[hard][[0, -1]]
+    put_in = 0.02 * np.abs(dive.demand - dive.given)[hard].sum(0)
+    np.testing.assert_allclose(judged.missing, put_in, rtol=0.01, atol=0.01 * put_in[YAW])
+    assert judged.axis == "Tz" and judged.n_spells == 1
+    assert (judged.spells[0].start, judged.spells[0].end) == pytest.approx((begin, end), abs=0.05)
+    assert judged.lost_s[YAW] == pytest.approx(end - begin, abs=0.05)
+    assert judged.spells[0].gave[YAW] == pytest.approx(dive.given[hard, YAW].mean(), rel=0.01)
+    assert (
+        len(judged.spells[0].limits) == 2
+        and "front_" in judged.sentence
+        and "at full thrust" in judged.sentence
+    )
+    held = judged.held_by
+    assert held is not None and (held.method, held.robot) == ("dual", "as it is")
+    assert held.policy.startswith("priority Tz") and "dual priority Tz" in judged.sentence
+    assert held.missing[YAW] < 0.01 * put_in[YAW] and "of surge" in judged.sentence
+
+
+def test_a_lost_yaw_is_measured_and_the_policy_named_that_holds_it(dive: Dive) -> None:
+    log = finlab.read_log(dive.path, dive.robot)
+    np.testing.assert_allclose(log.demand, dive.demand, atol=1e-3)
+    judged = finlab.judge(log, improve=False)
+    check(dive, judged)
+    lost = {(each.lost, each.name) for each in judged.replays}
+    assert {(name, "px4") for name in (None, *dive.robot.names)} <= lost and len(lost) == 5 * 9
+    assert json.loads(json.dumps(judged.to_dict(), allow_nan=False))["axis"] == "Tz"
+
+
+def test_the_replay_of_px4_is_what_its_log_shows(px4: Dive) -> None:
+    judged = finlab.judge(finlab.read_log(px4.path, px4.robot), improve=False)
+    own = next(each for each in judged.replays if each.method == "px4" and each.lost is None)
+    np.testing.assert_allclose(own.missing, px4.missing, rtol=1e-3, atol=1e-3)
+    assert judged.watts == pytest.approx(own.watts, rel=1e-3)
+
+
+def test_the_geometry_comes_from_the_log(px4: Dive, sub: Dive) -> None:
+    log = finlab.read_log(px4.path)
+    check(replace(px4, robot=log.robot), replace_names(finlab.judge(log, improve=False)))
+    assert not log.asks
+    assert any("--robot" in each for each in finlab.read_log(sub.path).asks)
+    assert "Leak Detected" in [event.words for event in finlab.read_log(sub.path).events]
+
+
+def replace_names(judged: finlab.Judgement) -> finlab.Judgement:
+    """Parameters have no names of thrusters."""
+    parts = (replace(part, name=f"front_{i}") for i, part in enumerate(judged.robot.actuators))
+    spells = (replace(each, limits=("front_0 at full thrust",) * len(each.limits)) for each in judged.spells)
+    robot = replace(judged.robot, actuators=tuple(parts))
+    return replace(judged, robot=robot, spells=tuple(spells))
+
+
+def test_without_outputs_the_autopilots_own_word_counts(tmp_path: Path) -> None:
+    dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs=False)
+    log = finlab.read_log(dive.path, dive.robot)
+    judged = finlab.judge(log, improve=False)
+    np.testing.assert_allclose(judged.missing, dive.missing, rtol=0.01, atol=0.01)
+    assert judged.watts is None and any("no outputs" in each for each in judged.asks)
+
+
+def test_the_scale_is_the_users_where_it_is_given(sub: Dive) -> None:
+    log = finlab.read_log(sub.path, sub.robot, scale=2.0 * SUB_UNIT)
+    np.testing.assert_allclose(log.demand, 2.0 * sub.demand, atol=1e-3)
+    assert any("--scale" in note for note in finlab.judge(log, improve=False).notes)
+
+
+def test_a_robot_turned_round_is_the_same_robot(px4: Dive) -> None:
+    turned = tuple(replace(p, axis=tuple(-x for x in p.axis)) for p in px4.robot.actuators)
+    log = finlab.read_log(px4.path, replace(px4.robot, actuators=turned))
+    check(px4, finlab.judge(log, improve=False))
+
+
+def test_a_better_layout_is_proposed_and_replayed(px4: Dive) -> None:
+    judged = finlab.judge(finlab.read_log(px4.path, px4.robot))
+    assert judged.improved is not None and judged.improved.names == px4.robot.names
+    size = {where: [] for where in ("as it is", "improved")}
+    for each in judged.replays:
+        if each.name == "dual closest" and each.lost is None:
+            size[each.robot].append(np.sum(each.missing / judged.scale))
+    assert size["improved"] < size["as it is"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_demands_taken_together_keep_their_impulse(seed: int, px4: Dive) -> None:
+    rng, scale = np.random.default_rng(seed), yardstick(px4.robot)
+    wrench = px4.demand + 0.02 * scale * rng.normal(size=px4.demand.shape)
+    wrench[rng.random(len(wrench)) < 0.2, 1] = np.nan
+    span = rng.uniform(0.01, 0.03, len(wrench))
+    few = demands_of(wrench, span, scale, 200)
+    assert len(few.wrench) <= 200 and few.span.sum() == pytest.approx(span.sum())
+    np.testing.assert_allclose(few.span @ np.nan_to_num(few.wrench), span @ np.nan_to_num(wrench))
+    few_asked, all_asked = (
+        next(replay(px4.robot, *rows, [finlab.Policy()])).missing
+        for rows in ((few.wrench, few.span), (wrench, span))
+    )
+    np.testing.assert_allclose(few_asked, all_asked, rtol=0.03, atol=0.01 * np.sum(all_asked))
+    same = demands_of(np.repeat(wrench[:50], 9, axis=0), np.ones(450), scale, 60)
+    assert same.spread == 0.0 and len(same.wrench) == 50 and (same.span == 9.0).all()
+
+
+@pytest.mark.parametrize("write", [sub_dive, pytest.param(px4_dive, marks=pytest.mark.exhaustive)])
+def test_twenty_minutes_at_fifty_hertz_are_judged_in_ten_seconds(write: object, tmp_path: Path) -> None:
+    dive: Dive = write(tmp_path / "dive", n=60_000)  # type: ignore[operator]
+    begin = time.process_time()
+    judged = finlab.judge(finlab.read_log(dive.path, dive.robot))
+    assert time.process_time() - begin < 10.0
+    check(dive, judged)

@@ -1,0 +1,125 @@
+"""Logs that lack something, are damaged, or are bags of ROS; and the command."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags import rosbag2
+from rosbags.typesys import Stores, get_typestore
+
+import finlab
+from finlab.cli import main
+from finlab.errors import FinlabError
+from tests.log.conftest import Dive
+from tests.log.test_judge import check
+
+TYPES = get_typestore(Stores.ROS2_HUMBLE)
+
+
+def write_bag(path: Path, dive: Dive, topics: tuple[str, ...] = ("/wrench",)) -> Path:
+    """A bag of wrenches, on several topics, and of forces of thrusters."""
+    t = {name.rsplit("/", 1)[1]: made for name, made in TYPES.types.items()}
+    columns = np.array([[*p.axis, *np.cross(p.position, p.axis)] for p in dive.robot.actuators])
+    forces = dive.given @ np.linalg.pinv(columns)
+    with rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        known: dict[str, Any] = {}
+
+        def put(topic: str, at: float, message: Any) -> None:
+            kind = message.__msgtype__
+            if topic not in known:
+                known[topic] = writer.add_connection(topic, kind, typestore=TYPES)
+            writer.write(known[topic], round(at * 1e9), TYPES.serialize_cdr(message, kind))
+
+        for at, wrench, force in zip(dive.time - dive.time[0], dive.demand, forces, strict=True):
+            for topic in topics:
+                put(topic, at, t["Wrench"](force=t["Vector3"](*wrench[:3]), torque=t["Vector3"](*wrench[3:])))
+            told = t["Float64MultiArray"](layout=t["MultiArrayLayout"](dim=[], data_offset=0), data=force)
+            put("/forces", at + 1e-4, told)
+    return path
+
+
+def test_a_bag_of_wrenches_and_forces_is_judged(px4: Dive, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", px4)
+    judged = finlab.judge(finlab.read_log(bag, px4.robot), improve=False)
+    shifted = Dive(px4.robot, bag, px4.time - px4.time[0], px4.demand, px4.given)
+    check_without_limits(shifted, judged)
+    alone = next(bag.glob("*.mcap"))
+    assert finlab.read_log(alone, px4.robot) == replaced_source(finlab.read_log(bag, px4.robot), alone.name)
+    with pytest.raises(FinlabError, match="--robot"):
+        finlab.read_log(bag)
+
+
+def check_without_limits(dive: Dive, judged: finlab.Judgement) -> None:
+    check(dive, judged)
+
+
+def replaced_source(log: finlab.Log, source: str) -> finlab.Log:
+    from dataclasses import replace
+
+    return replace(log, source=source)
+
+
+def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
+    short = Dive(px4.robot, px4.path, px4.time[:50], px4.demand[:50], px4.given[:50])
+    bag = write_bag(tmp_path / "bag", short, ("/a", "/b"))
+    with pytest.raises(FinlabError, match="--demand TOPIC"):
+        finlab.read_log(bag, px4.robot)
+    assert len(finlab.read_log(bag, px4.robot, demand="/b")) > 40
+    with pytest.raises(FinlabError, match="no topic '/c'"):
+        finlab.read_log(bag, px4.robot, demand="/c")
+
+
+@pytest.mark.parametrize("kind", ["px4", "sub"])
+def test_damaged_logs_end_in_a_sentence(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    dive: Dive = request.getfixturevalue(kind)
+    content, rng = dive.path.read_bytes()[:60_000], np.random.default_rng(0)
+    for seed in range(40):
+        damaged = bytearray(content[: rng.integers(8, len(content))])
+        for place in rng.integers(8, len(damaged), 1 + seed):
+            damaged[place] = rng.integers(256)
+        path = tmp_path / "log"
+        path.write_bytes(damaged)
+        try:
+            finlab.judge(finlab.read_log(path, dive.robot), improve=False)
+        except FinlabError as error:
+            assert len(str(error)) < 1000
+
+
+def test_what_is_no_log_is_said(tmp_path: Path) -> None:
+    for name, content in (("a.bin", b"hello"), ("a.mcap", b"hello"), ("a.ulg", b"ULog\x01\x125" + b"\0" * 9)):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(FinlabError, match=name):
+            finlab.read_log(tmp_path / name)
+
+
+def test_a_robot_that_does_not_fit_is_refused(px4: Dive, sub: Dive) -> None:
+    with pytest.raises(FinlabError, match="8 motors"):
+        finlab.read_log(px4.path, "bluerov2")
+    with pytest.raises(FinlabError, match="order of the motors"):
+        parts = px4.robot.actuators
+        finlab.read_log(sub.path, finlab.Layout("other", parts[::-1]))
+
+
+def test_the_command_tells_draws_and_writes(
+    px4: Dive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {
+        key: tmp_path / name for key, name in (("plot", "a.svg"), ("json", "a.json"), ("save", "better.yaml"))
+    }
+    options = [word for key, path in files.items() for word in (f"--{key}", str(path))]
+    assert main(["log", str(px4.path), "--priority", "Tz", *options]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("Yaw (Tz) was lost for 10") and "without rotor8" in said
+    assert json.loads(files["json"].read_text())["sentence"][:40] == said[:40]
+    assert "<svg" in files["plot"].read_text() and finlab.load_layout(files["save"]).n == 8
+
+
+def test_a_missing_reader_is_named(
+    px4: Dive, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    assert main(["log", str(px4.path)]) == 2
+    assert "finlab-marine[logs]" in capsys.readouterr().err
