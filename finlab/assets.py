@@ -16,9 +16,6 @@ EXTRAS = {
     "trimesh": "app",
     "casadi": "ipopt",
     "distributed": "cluster",
-    "pyulog": "logs",
-    "pymavlink": "logs",
-    "rosbags": "logs",
 }
 """Packages that some parts need beside the base install, and the extra that brings each."""
 

@@ -105,9 +105,9 @@ def _connected(address: str) -> "Client":
 
 
 def _version() -> str:
-    from finlab import __version__
 
-    return __version__
+    version: str = sys.modules["finlab"].__version__
+    return version
 
 
 def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs: int) -> Iterator[Made]:

@@ -96,6 +96,8 @@ def _size(argument: Any) -> int:
     if isinstance(argument, (bytes, list, tuple)):
         return len(argument) if isinstance(argument, bytes) else sum(map(_size, argument))
     with suppress(OSError, TypeError, ValueError):
+        if os.path.isdir(argument):
+            return sum(map(os.path.getsize, Path(argument).iterdir()))
         return os.path.getsize(argument)
     return 0
 

@@ -29,8 +29,7 @@ Columns = dict[str, Any]
 
 
 def read_dataflash(path: Path) -> Recorded:
-    """Reads a log of ArduSub. Raises DataError: it is damaged, or lacks demands; ModuleNotFoundError:
-    there is no pymavlink."""
+    """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
     tables = _tables(path, ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "MSG", "ERR"))
     if "RATE" not in tables:
         lacks = (
@@ -80,29 +79,24 @@ def _tables(path: Path, wanted: tuple[str, ...]) -> dict[str, Columns]:
             """Times are those of the autopilot; no message has to be read for them."""
 
     tables = {}
-    try:
-        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), Index(str(path)) as log:
-            content = np.frombuffer(bytes(log.data_map), np.uint8)
-            for name in wanted:
-                form = log.formats.get(log.name_to_id.get(name))
-                if form is None:
-                    continue
-                codes = [FORMAT_TO_STRUCT[letter] for letter in form.format]
-                kinds = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
-                kind = np.dtype([*zip(form.columns, kinds, strict=True)])
-                starts = np.asarray(log.offsets[form.type], np.intp) + 3
-                starts = starts[starts + kind.itemsize <= len(content)]
-                rows = content[starts[:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
-                if len(rows):
-                    units = {
-                        each: unit or 1.0 for each, (_, unit, _) in zip(form.columns, codes, strict=True)
-                    }
-                    tables[name] = {
-                        each: rows[each] if rows[each].dtype.kind == "S" else rows[each] * units[each]
-                        for each in form.columns
-                    }
-    except Exception as problem:  # of many kinds, by a file that is damaged
-        raise DataError(f"{path}: cannot be read as a log of ArduPilot ({problem!s:.80})") from None
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), Index(str(path)) as log:
+        content = np.frombuffer(bytes(log.data_map), np.uint8)
+        for name in wanted:
+            form = log.formats.get(log.name_to_id.get(name))
+            if form is None:
+                continue
+            codes = [FORMAT_TO_STRUCT[letter] for letter in form.format]
+            kinds = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
+            kind = np.dtype([*zip(form.columns, kinds, strict=True)])
+            starts = np.asarray(log.offsets[form.type], np.intp) + 3
+            starts = starts[starts + kind.itemsize <= len(content)]
+            rows = content[starts[:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
+            if len(rows):
+                units = {each: unit or 1.0 for each, (_, unit, _) in zip(form.columns, codes, strict=True)}
+                tables[name] = {
+                    each: rows[each] if rows[each].dtype.kind == "S" else rows[each] * units[each]
+                    for each in form.columns
+                }
     return tables
 
 

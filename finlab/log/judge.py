@@ -189,7 +189,7 @@ def _spell(
     return Spell(
         start=float(log.time[rows.start]),
         end=float(log.time[rows.stop - 1] + log.span[rows.stop - 1]),
-        axes=tuple(axis for axis, one in zip(AXES, lost[rows].any(axis=0).tolist(), strict=True) if one),
+        axes=tuple(axis for axis, one in zip(AXES, np.any(lost[rows], axis=0), strict=True) if one),
         missing=six(span @ np.abs(missing[rows]), scale),
         asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
         gave=six(span @ given[rows] / span.sum(), scale),

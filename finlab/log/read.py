@@ -11,8 +11,9 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation.baselines.autopilots import ArduSub, Px4
 from finlab.allocation.solution import PlainData
 from finlab.arrays import Array
+from finlab.assets import install
 from finlab.axes import AXES
-from finlab.errors import DataError, LayoutError
+from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
 from finlab.log import ardusub_log, px4_log, ros_bag
@@ -22,6 +23,8 @@ from finlab.physics.objective import yardstick
 
 MOST_BYTES = 1_000_000_000
 """Largest log."""
+MOST_FORCE = 1e9
+"""Largest demand that is no fault of the file [N, N m]."""
 MOST_SAMPLES = 1_000_000
 """Most samples of demands: five hours at 50 Hz."""
 GAP_S = 1.0
@@ -48,7 +51,8 @@ class Log(PlainData):
     """What the actuators were told (N, n, 3), as their laws take it, NaN for one that was stopped; None where
     the log holds no outputs."""
     unmet: Array | None
-    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says nothing."""
+    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says nothing, or the
+    log holds outputs."""
     events: tuple[Event, ...]
     """What the log says of the robot's health, by time."""
     notes: tuple[str, ...]
@@ -81,11 +85,22 @@ def read_log(
         outputs: topic of a bag that holds what actuators were sent; the only one there when None.
 
     Raises:
-        DataError: the file is damaged, of another kind or too large, or lacks what no option gives.
+        DataError: the file is damaged, of another kind or too large, or lacks what no option gives; or the
+            package that reads it is not installed.
         LayoutError: the robot cannot be read, or does not fit the log's motors.
     """
     place = Path(path)
-    found = _recorded(place, demand, outputs)
+    try:
+        found = _recorded(place, demand, outputs)
+    except ModuleNotFoundError as error:
+        raise DataError(f"{place}: {error.name} is not installed; run: {install('logs')}") from None
+    except FinlabError:
+        raise
+    except Exception as problem:  # of many kinds, by a file that is damaged
+        why = f"{type(problem).__name__}: {problem!s:.80}"
+        raise DataError(
+            f"{place}: cannot be read as a log ({why}); it is damaged or of an unknown version"
+        ) from None
     layout = load_layout(robot) if isinstance(robot, str) else robot
     known = layout or found.layout
     if known is None:
@@ -104,6 +119,8 @@ def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
         return px4_log.read_ulog(place)
     if head.startswith(ardusub_log.MAGIC):
         return ardusub_log.read_dataflash(place)
+    if place.is_dir() and sum(each.stat().st_size for each in place.iterdir()) > MOST_BYTES:
+        raise DataError(f"{place}: is larger than {MOST_BYTES:,} bytes; cut it")
     if place.is_dir() or place.suffix.lower() in ros_bag.ENDS:
         return ros_bag.read_bag(place, demand, outputs)
     raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
@@ -137,13 +154,15 @@ def unit_of(form: Form, robot: Layout) -> Array:
 
 
 def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: ArrayLike | None) -> Log:
-    """The log in the robot's newtons, at the times of its outputs, or else of its demands."""
+    """The log in the robot's newtons, at the times of its outputs, or else of what says what was left."""
     unit = unit_of(found.form, robot) if scale is None else _scale(scale)
-    time = found.demand.time if found.outputs is None else found.outputs.time
+    time = (found.outputs or found.unmet or found.demand).time
     demand = found.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
     command = None if found.outputs is None else commands_of(found, found.outputs.values, robot, sides)
-    unmet = None if found.unmet is None else found.unmet.at(time) * np.nan_to_num(np.abs(unit))
-    kept = np.isfinite(demand).any(axis=1)
+    unmet = None
+    if command is None and found.unmet is not None:
+        unmet = np.nan_to_num(found.unmet.values * np.abs(unit), posinf=0.0, neginf=0.0)
+    kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MOST_FORCE).any(axis=1)
     notes, asks = [*found.notes], [*found.asks]
     if command is not None:
         idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
@@ -154,11 +173,11 @@ def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: Arr
         asks.append(
             "It holds no outputs: what the autopilot gave is what its method gives, not what it sent."
         )
-    if not kept.any():
-        raise DataError(f"{source}: holds no demand while outputs moved; there is nothing to judge")
+    if kept.sum() < 2:
+        raise DataError(f"{source}: holds no demands while outputs moved; there is nothing to judge")
     if len(time) > MOST_SAMPLES:
         raise DataError(f"{source}: holds {len(time):,} samples, expected up to {MOST_SAMPLES:,}; cut it")
-    step = np.diff(time, append=time[-1] + np.median(np.diff(time)) if len(time) > 1 else time[-1])
+    step = np.diff(time, append=time[-1] + np.median(np.diff(time)))
     if (beyond := float(np.maximum(step - GAP_S, 0.0)[kept].sum())) > 0.0:
         notes.append(f"Gaps between samples, {beyond:.0f} s beyond {GAP_S:g} s each, are left out.")
     undriven = [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]

@@ -26,42 +26,35 @@ ENDS = (".bag", ".mcap", ".db3")
 
 
 def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
-    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it is damaged, lacks a
-    topic, or has several; ModuleNotFoundError: there is no rosbags."""
+    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it lacks a topic, or
+    has several; any error: it is damaged."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
     rows: dict[str, list[tuple[float, Any]]] = defaultdict(list)
     events: list[Event] = []
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            kinds = {each.topic: each.msgtype for each in reader.connections}
-            asked = _topic(path, kinds, WRENCHES, demand, "demand")
-            sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
-            wanted = [
-                each for each in reader.connections if each.topic in (asked, sent) or each.msgtype == HEALTH
-            ]
-            for connection, nanoseconds, raw in reader.messages(wanted):
-                message: Any = reader.deserialize(raw, connection.msgtype)
-                time = (nanoseconds - reader.start_time) * 1e-9
-                if connection.topic == asked:
-                    wrench = getattr(message, "wrench", message)
-                    parts = (wrench.force, wrench.torque)
-                    rows["demand"].append((time, [value for v in parts for value in (v.x, v.y, v.z)]))
-                elif connection.topic == sent:
-                    rows["outputs"].append(
-                        (time, getattr(message, "normalized", getattr(message, "data", ())))
-                    )
-                else:
-                    events += [
-                        Event(time, f"{each.name}: {each.message}")
-                        for each in message.status
-                        if each.level >= WARNING
-                    ]
-    except DataError:
-        raise
-    except Exception as problem:  # of many kinds, by a file that is damaged
-        raise DataError(f"{path}: cannot be read as a bag of ROS ({problem!s:.80})") from None
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        kinds = {each.topic: each.msgtype for each in reader.connections}
+        asked = _topic(path, kinds, WRENCHES, demand, "demand")
+        sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
+        wanted = [
+            each for each in reader.connections if each.topic in (asked, sent) or each.msgtype == HEALTH
+        ]
+        for connection, nanoseconds, raw in reader.messages(wanted):
+            message: Any = reader.deserialize(raw, connection.msgtype)
+            time = (nanoseconds - reader.start_time) * 1e-9
+            if connection.topic == asked:
+                wrench = getattr(message, "wrench", message)
+                parts = (wrench.force, wrench.torque)
+                rows["demand"].append((time, [value for v in parts for value in (v.x, v.y, v.z)]))
+            elif connection.topic == sent:
+                rows["outputs"].append((time, getattr(message, "normalized", getattr(message, "data", ()))))
+            else:
+                events += [
+                    Event(time, f"{each.name}: {each.message}")
+                    for each in message.status
+                    if each.level >= WARNING
+                ]
     found = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
     found.asks.append("A bag holds no robot; name it by --robot LAYOUT.")
     if sent is not None and rows["outputs"]:

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,21 +46,11 @@ def test_a_bag_of_wrenches_and_forces_is_judged(px4: Dive, tmp_path: Path) -> No
     bag = write_bag(tmp_path / "bag", px4)
     judged = finlab.judge(finlab.read_log(bag, px4.robot), improve=False)
     shifted = Dive(px4.robot, bag, px4.time - px4.time[0], px4.demand, px4.given)
-    check_without_limits(shifted, judged)
+    check(shifted, judged)
     alone = next(bag.glob("*.mcap"))
-    assert finlab.read_log(alone, px4.robot) == replaced_source(finlab.read_log(bag, px4.robot), alone.name)
+    assert finlab.read_log(alone, px4.robot) == replace(finlab.read_log(bag, px4.robot), source=alone.name)
     with pytest.raises(FinlabError, match="--robot"):
         finlab.read_log(bag)
-
-
-def check_without_limits(dive: Dive, judged: finlab.Judgement) -> None:
-    check(dive, judged)
-
-
-def replaced_source(log: finlab.Log, source: str) -> finlab.Log:
-    from dataclasses import replace
-
-    return replace(log, source=source)
 
 
 def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
