@@ -26,7 +26,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
     newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
     state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
     tasks: dict[str, Newest[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
-    tasks |= {"better": jobs.improver, "fitted": jobs.fitting}
+    tasks |= {"better": jobs.improver, "fitted": jobs.fitting, "judged": jobs.log}
     known: Facts = {}
     both = jobs.both.findings
     for name, task in tasks.items():
@@ -42,6 +42,8 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,
+        "drawer": session.drawer,
+        "opened": session.opened,
         "undo": session.history.undo_name,
         "redo": session.history.redo_name,
         "stop": session.guide.stop,
@@ -57,6 +59,9 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "improving": jobs.improver.busy,
         "growing": jobs.improver.reach,
         "fitting": jobs.fitting.progress,
+        "judging": jobs.log.progress,
+        "by_page": jobs.log.by_page,
+        "log_moment": jobs.log.moment,
         "swims": swimming.active,
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.shown,

@@ -12,6 +12,7 @@
   const WORK_MS = 1000; // for so long after a key or a press beside the view actuators stand still there
   const TIMED_EVERY = 15, MOST_COST_MS = 200; // frames, and what one may count as: the first takes longer
   const SPACING = 1.4; // between frames that take long, in times of one
+  const PICTURE = 2; // pixels of a saved picture per pixel of the page
   const APART = 1.9; // between the phases of fins, which look alive so
 
   let parts = [], speed = 1, frozen = true, phases = [], turns = [];
@@ -136,8 +137,26 @@
     }), slow() ? Math.max(pause, worked + WORK_MS - performance.now()) : pause);
   }
 
+  // The view as a picture, twice as fine as on the screen, without what lies over it.
+  function picture(name) {
+    const { gl, scene, camera } = root(), fine = gl.getPixelRatio();
+    gl.setPixelRatio(PICTURE);
+    drawn = [];
+    due = performance.now();
+    drawnAt = -Infinity;
+    gl.render(scene, camera);
+    gl.domElement.toBlob((blob) => {
+      const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: name });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    });
+    gl.setPixelRatio(fine);
+    ask();
+  }
+
   window.finlabFrames = {
     count: 0, // frames that were drawn
+    picture,
     follow(start) { stood = start; },
     flap(commands, rate, still) {
       patch();

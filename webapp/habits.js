@@ -62,6 +62,15 @@
     else if (box.tagName === 'INPUT' && ['Enter', 'ArrowUp', 'ArrowDown'].includes(key)) commit();
   });
 
+  // What is typed into a list takes the place of what is chosen there, and Enter takes the first that is left.
+  const isList = (target) => target.matches?.('.mantine-Select-input');
+  listen('click', ({ target }) => { if (isList(target)) target.select(); });
+  listen('focusin', ({ target }) => { if (isList(target)) target.select(); });
+  listen('keydown', ({ key, target }) => {
+    const left = key === 'Enter' && isList(target) && document.getElementById(target.getAttribute('aria-controls'));
+    if (left && !left.querySelector('[data-combobox-selected]')) left.querySelector('[role=option]')?.click();
+  });
+
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
     const others = event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.('[role=slider]');

@@ -12,11 +12,13 @@ from typing import Any, TypeVar
 
 import viser
 
+from finlab.actuators.kinds import KINDS
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
 from webapp.board import Board, facts_of
 from webapp.handles import Asking, Presses, on_user_change
+from webapp.markup.words import in_app
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.background import Context, EventLoop, Workers
@@ -26,6 +28,7 @@ from webapp.tasks.solver import Solver
 from webapp.theme import BLUE, VERMILLION
 from webapp.viser_internals import hold_uploads, run_script, uuid_of
 
+BEGIN = "What is its first actuator? Add others in the list; it can be deleted once there is another."
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
 
@@ -58,6 +61,10 @@ class Page:
         self.designs = Designs(context)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(self.presses)
+        self.new = partial(
+            self.ask, "New design", BEGIN, {k.capitalize(): partial(self.designs.new, k) for k in KINDS}
+        )
+        """Asks what a new design begins with."""
         hold_uploads(client.gui, LARGEST_BUNDLE, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()
@@ -179,7 +186,7 @@ class Page:
         if self._note is not None:
             self._note.remove()
         color = BLUE if calm else VERMILLION
-        self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=color)
+        self._note = self.client.add_notification(title, in_app(body), auto_close_seconds=8.0, color=color)
 
     # From the session to the page.
 

@@ -42,6 +42,7 @@ def test_a_robot_from_nothing_to_another_browser(
     session = page.session
     page.tab("Design")
     page.press("New")
+    page.page.locator(".fl-ask button", has_text="Fin").click()
     page.until(lambda: session.state.layout.name == "New robot" and session.selected == "left")
     page.page.locator(".fin-list [data-press=robot]").click()
     page.page.get_by_text("Not said: mass").wait_for()
@@ -219,5 +220,12 @@ def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any)
     page.press("End")
     page.page.wait_for_function(drops.format("false"))
     page.press("New")
-    page.until(lambda: session.desk.task == "Design")
+    page.page.locator(".fl-ask button", has_text="Rudder").click()
+    page.until(lambda: session.desk.task == "Design" and session.state.layout.by_flow == ("left",))
+    page.type("Speed through the water [m/s]", "1.5")
+    page.until(lambda: session.state.speed == 1.5 and "give nothing" not in page.text(".score"))
+    page.row("Layout").first.click()
+    page.page.keyboard.type("octo")  # in place of what is chosen there
+    page.page.keyboard.press("Enter")
+    page.until(lambda: session.state.layout.name == "octo")
     assert page.problems == []

@@ -3,10 +3,13 @@
 from collections.abc import Iterator
 from importlib.resources import files
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
+import PIL.Image
 import pytest
 
+from finlab.layout import load_layout
 from webapp.session.looking import DRAWERS, TASKS
 
 SIZES = ((1400, 860), (900, 700))
@@ -93,6 +96,38 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
             if size == (900, 700):  # a small view has its words beside it
                 assert overlaps(page.page.evaluate(WORDS)) == [], name
     assert page.problems == []
+
+
+def test_a_phone_watches(resized: Any) -> None:
+    page = resized
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.session.open_layout(load_layout("turtle_hybrid"))
+    page.session.set_target(0, 60.0)
+    page.view.do(lambda: None)
+    for task in TASKS:
+        page.tab(task)
+        settle(page)
+        boxes = {name: box for name, box in page.page.evaluate(REGIONS).items() if box["height"] > 0.0}
+        assert overlaps(boxes) == [] and boxes["canvas"]["height"] > 200, task
+        assert page.page.evaluate("document.documentElement.scrollWidth") == 390, "nothing is beside the page"
+        for box in (*boxes.values(), page.page.locator(".fl-status").bounding_box()):
+            assert box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["y"] + box["height"] <= 844
+    page.tab("Allocate")
+    page.until(lambda: "Out of reach" in page.text(".fl-status .pill"))
+    page.type("Fx [N]", "1.2")
+    page.until(lambda: page.text(".fl-status .pill") == "Exact")
+    page.page.get_by_role("button", name="Fold the drawer").click()
+    page.until(lambda: page.page.evaluate(REGIONS)["canvas"]["height"] > 500)
+    page.page.get_by_role("button", name="Open the drawer").click()
+
+
+def test_the_view_is_saved_as_it_is_seen(page: Any, tmp_path: Path) -> None:
+    page.page.locator(".fl-camera button", has_text="3D").click()
+    with PIL.Image.open(page.download("Picture", tmp_path / "view.png")) as picture:
+        seen = picture.convert("RGB")
+    assert seen.width == 2 * round(page.page.evaluate(REGIONS)["canvas"]["width"])
+    colors = {color for _, color in seen.getcolors(seen.width * seen.height)}
+    assert len(colors) > 500, "water, hull and fins, not an empty canvas"
 
 
 def test_the_drawer_is_folded(page: Any) -> None:

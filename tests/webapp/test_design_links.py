@@ -103,7 +103,7 @@ def designs_of(session: Session, browser: Browser) -> Designs:
 
 def test_a_new_design_is_whole_and_can_be_taken_back() -> None:
     session = Session(load_layout("ucat"))
-    session.new_layout()
+    session.new_layout("fin")
     layout = session.state.layout
     assert layout.n_fins == 1 and layout.body is not None and session.selected == "left"
     session.mirror()

@@ -32,6 +32,7 @@ SOLVED: dict[str, Callable[[Session], object]] = {
     "refinement": lambda session: session.show_step(1, 9),
     "temperature": lambda session: session.set_setting("temperature", 2.0),
     "watts-or-effort": lambda session: session.keep_least("watts"),
+    "null-space": lambda session: (session.shift(0, 3.0), session.show_mode(2)),
     "lost-fin": lambda session: session.toggle_failure("front_left"),
     "no-yaw": _turn_a_shaft,
     "out-of-reach": lambda session: session.set_setting("policy", "direction"),

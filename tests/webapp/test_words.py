@@ -1,13 +1,16 @@
 """What the app says about an answer, and what it writes into files."""
 
+import ast
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import finlab
 from finlab.allocation import Allocation, Allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
@@ -28,7 +31,7 @@ from webapp.markup.verdict import (
     verdict_of,
     verdict_sentence,
 )
-from webapp.markup.words import authority_sentence, trim_sentence
+from webapp.markup.words import SPEED, authority_sentence, in_app, trim_sentence
 from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, NEWTONS, SHORTEST, fitting
@@ -212,6 +215,25 @@ def test_cards_say_what_a_layout_can_do() -> None:
     assert re.search(r"worst loss \[N\]</td><td>–</td><td>[\d.]+</td><td></td>", beside)
     card = check_card(quick_check(blind), True, ("<b>",))
     assert "yaw" in card and "&lt;b&gt;" in card
+
+
+def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
+    rooms, option = ("analysis", "allocation", "exchange", "fit", "layout"), re.compile(r"--[a-z]+")
+    texts = [
+        node.value
+        for room in rooms
+        for path in (Path(finlab.__file__).parent / room).rglob("*.py")
+        if path.name != "convert.py"  # which writes files of others
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and option.search(node.value)
+    ]
+    assert any("--flow" in text for text in texts) and any("--frame" in text for text in texts)
+    for text in texts:
+        for named in option.finditer(in_app(text)):
+            assert re.search(r"finlab [a-z ]+$", in_app(text)[: named.start()]), text
+    card = score_card(load_layout("torpedo"))
+    shown = score_table(load_layout("torpedo"), card, None)
+    assert "--flow" not in shown and SPEED.removesuffix(" [m/s]") in shown
 
 
 def test_every_stop_of_the_tour_stands() -> None:

@@ -1,7 +1,7 @@
 """Plots as SVG: axes with round ticks, curves, and what their colours mean."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,3 +129,31 @@ def exact_axis(word: str, values: Array) -> Axis:
     """An axis from the first of some values to the last."""
     axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
     return axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
+
+
+NARROW, LOW, INDENT = 250, 128, 40
+"""Of a plot that stands beside others, and where its vertical axis stands [px]."""
+
+
+def over_time(
+    across: Axis,
+    seconds: Array,
+    up: Axis,
+    lines: Sequence[Array],
+    colors: Sequence[Rgb],
+    words: Sequence[str] = (),
+    moment: float | None = None,
+) -> str:
+    """Curves over the same times, of as many colours, the first of which have words; with an upright line at
+    a moment."""
+    drawing = Plot(across, up._replace(word=""), LOW, INDENT, NARROW)
+    parts = [html("<text x='2' y='14'>{}</text>", up.word)]
+    parts += [drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)]
+    parts += [
+        drawing.key(34 + 68 * k, color, word)
+        for k, (word, color) in enumerate(zip(words, colors, strict=False))
+    ]
+    if moment is not None:
+        at = drawing.place(moment, 0.0)[0]
+        parts.append(html("<path d='M{:.1f} {}V{}' stroke='currentColor'/>", at, TOP, drawing.floor))
+    return drawing.drawn(parts)

@@ -11,7 +11,7 @@ from finlab.analysis.score_card import QuickCheck
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
-from webapp.markup.words import html, listed, row, three_digits
+from webapp.markup.words import html, in_app, listed, row, three_digits
 from webapp.scene.actuator_shapes import SPAN
 from webapp.session.state import AXIS_UNITS
 
@@ -25,7 +25,7 @@ FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
 def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> str:
     """The score card, beside what could be done `before` where that differs."""
     parts = [_summary(card, before), _axes(card, before), _losses(layout, card)]
-    parts += [html("<div class='said dim'>{}</div>", note) for note in card.notes]
+    parts += [html("<div class='said dim'>{}</div>", in_app(note)) for note in card.notes]
     return html("<div class='fl score'>{}</div>", parts)
 
 

@@ -65,6 +65,22 @@ def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     return html("<style>{}</style>{}", rules, marker(name))
 
 
+SPEED = "Speed through the water [m/s]"
+"""Label of the control that tells how the robot moves."""
+CONVERT = "finlab layout convert"
+CONTROLS = {
+    "(--flow)": f"({SPEED[:-6]})",
+    "(flow)": f"({SPEED[:-6]})",
+    "(--force LEAST MOST)": "(Force, at Limits of each)",
+    "--robot LAYOUT": "This robot, at Log",
+    "--scale": "finlab log --scale",
+    "--voltage": "finlab fit thruster --voltage",
+    **{
+        f"--{word}": f"{CONVERT} --{word}"
+        for word in ("origin", "frame", "fins", "thrusters", "rows", "model")
+    },
+}
+"""Words of the command line that reach the page, and what is said there."""
 SMALL = 3e-4
 """Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
 OWN = "the answer"
@@ -125,9 +141,19 @@ def source_words(sources: Sequence[str]) -> str:
         numbers = [*numbers[:MOST_LISTED], f"{len(numbers) - MOST_LISTED} more"]
     if numbers:
         return f"component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
+    if not sources:
+        return ""
     first = sources[0]
     words = {"all fins": "found with all fins", "refined": "a refined sample"}
     return words.get(first, f"found {first}" if first.startswith("without ") else f"from {first}")
+
+
+def in_app(text: str) -> str:
+    """A sentence of the library in the words of the page: its own controls in place of options of commands,
+    and the command of an option that it has no control for."""
+    for option, control in CONTROLS.items():
+        text = text.replace(option, control)
+    return text
 
 
 def missing_part(allocation: Allocation) -> Array:

@@ -86,24 +86,27 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
         heads,
         POINTS,
         robot,
-        [_row(state, index, name in selection, len(kinds) > 1) for index, name in enumerate(names)],
+        [_rows(state, index, name in selection, len(kinds) > 1) for index, name in enumerate(names)],
     )
 
 
-def _row(state: State, index: int, chosen: bool, mixed: bool) -> str:
-    part = state.layout.actuators[index]
+def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
+    """A row; in a `mixed` list the first of several of a kind has that above it."""
+    parts = state.layout.actuators
+    part, before = parts[index], parts[index - 1] if index else None
+    head = mixed and (before is None or before.type != part.type)
     places = [_minus(f"{value:.3f}") for value in part.position]
     twin = partner(state.links, part.name)
     return html(
-        "<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",
+        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",
+        html("<tr><th colspan='5'>{}</th></tr>", part.type) if head else "",
         "chosen" if chosen else "",
         part.name,
         press("fin", str(index)),
         swatch(index, part.name in state.failed),
         part.name,
         part.name,
-        ["" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin)]
-        + [html("<div class='dim'>{}</div>", part.type) if mixed else ""],
+        "" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
         [html("<td class='place'>{}</td>", shown) for shown in (*places, points_words(part))],
     )
 

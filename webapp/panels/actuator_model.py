@@ -16,7 +16,7 @@ from finlab.errors import DataError, FinlabError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.physics import make_law, plant_of
 from webapp.markup.plot import Plot, exact_axis, positive
-from webapp.markup.words import degrees, html
+from webapp.markup.words import degrees, html, in_app
 from webapp.page import Page
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 from webapp.theme import BLUE, GREEN, ORANGE
@@ -108,7 +108,7 @@ def _written(fitted: Fitted | None, fitting: str | None, fitted_error: str | Non
     if fitting is not None:
         return html("<div class='fl dim'>{} …</div>", fitting)
     if fitted_error is not None:
-        return html("<div class='fl'><div class='said missing'>{}</div></div>", fitted_error)
+        return html("<div class='fl'><div class='said missing'>{}</div></div>", in_app(fitted_error))
     if fitted is None:
         return ""
     from webapp.markup.outcomes import fit_card  # scipy comes with it

@@ -57,6 +57,7 @@ def camera() -> str:
     """Sides to look from, and framing."""
     looks = [button(name, "look", name, html("title='{}'", key)) for key, name in enumerate(CAMERAS, 1)]
     looks.append(button("Frame", "frame", "", Markup("title='what is selected fills the view (F)'")))
+    looks.append(button("Picture", "picture", "", Markup("title='save the view as it is (PNG)'")))
     return html("<div class='fl fl-camera'>{}</div>", looks)
 
 
@@ -114,7 +115,9 @@ def add_file(page: Page) -> None:
     """The design as a file: a new one, one that is opened, and this one saved or shared."""
     designs = page.designs
     add_html(page.gui, marker("fl-file"))
-    page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
+    page.add_button(
+        "New", page.new, icon=viser.Icon.FILE_PLUS, hint="One hull, and an actuator of your choice."
+    )
     page.opening.add(DESIGNS, designs.open)
     hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
     opens = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
@@ -129,6 +132,7 @@ def add_file(page: Page) -> None:
 def add_history(page: Page) -> None:
     """Undo and redo, by name."""
     session, icon = page.session, viser.Icon
+    add_html(page.gui, marker("fl-history"))
     back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
     page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
     forth = page.add_button("Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z")

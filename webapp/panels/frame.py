@@ -12,13 +12,14 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
+from finlab.physics import plant_of
 from webapp.handles import add_html, button, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
-from webapp.session.looking import DRAWERS, Desk
+from webapp.session.looking import DRAWERS, WAYS, Desk
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
@@ -53,11 +54,11 @@ class Section:
             with gui.add_folder(None, visible=False) as self._folder:
                 place.make(page)
 
-    def arrange(self, desk: Desk, about: tuple[str, ...]) -> bool:
+    def arrange(self, task: str, drawer: str | None, about: tuple[str, ...]) -> bool:
         """Whether it belongs to what is being done."""
         place = self.place
-        opened = place.region != places.DRAWER or (place.title == desk.opened[desk.task] and not desk.folded)
-        self.group.there = there = desk.task in place.tasks and place.about in about and opened
+        opened = place.region != places.DRAWER or place.title == drawer
+        self.group.there = there = task in place.tasks and place.about in about and opened
         if there:
             self._met = True
             self._say("")
@@ -103,29 +104,33 @@ class Frame:
         run_file(gui, "frames.js")
 
     def _arrange(
-        self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None, layout: Layout
+        self,
+        desk: Desk,
+        drawer: str | None,
+        selected: str | None,
+        stop: Stop | None,
+        swimmer: Swimmer | None,
+        layout: Layout,
     ) -> None:
         """Write which regions and sections are there; the drawer is low until there are plots in it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
-        there = [section for section in self.sections if section.arrange(desk, about)]
+        about += ("flow",) * plant_of(layout).feels_flow
+        there = [section for section in self.sections if section.arrange(desk.task, drawer, about)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
         gone += [FOLDER.format(region) for region in (places.LEFT, places.RIGHT) if region not in regions]
-        drawer = bool(DRAWERS[desk.task])
-        if not drawer:
+        has_drawer = bool(DRAWERS[desk.task])
+        if not has_drawer:
             gone.append(FOLDER.format(places.DRAWER))
         counts = {
             "left": places.LEFT in regions,
             "right": places.RIGHT in regions,
-            "drawer": drawer,
-            "open": drawer and not desk.folded,
+            "drawer": has_drawer,
+            "open": drawer is not None,
             "guide": stop is not None,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        proposes = layout.is_of_fins or desk.opened.get(places.ALLOCATE) != places.CANDIDATES
-        height = "" if proposes or desk.task != places.ALLOCATE else LOW
-        if desk.task == places.SIMULATE:
-            height = LOW if swimmer is None else TALL
+        height = "" if desk.task != places.SIMULATE else LOW if swimmer is None else TALL
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
             self._shown,
@@ -149,17 +154,18 @@ class Frame:
             "end": lambda *_: session.guide.end(),
             "look": lambda view, _: robot.look_from(view),
             "frame": lambda *_: robot.frame(),
+            "picture": lambda *_: self._page.scenery.save(),
             "typed": lambda *_: session.history.end_merge(),
         }
         for kind, act in acts.items():
             self._page.presses.on(kind, act)
 
 
-def _strip(desk: Desk) -> str:
+def _strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
-    opened, folded = desk.opened[desk.task], desk.folded
-    seen = None if folded else opened
-    pressed = ((name, html("aria-pressed='{}'", str(name == seen).lower())) for name in DRAWERS[desk.task])
+    folded = drawer is None
+    names = [name for name in DRAWERS[desk.task] if name != WAYS[0] or layout.is_of_fins]
+    pressed = ((name, html("aria-pressed='{}'", str(name == drawer).lower())) for name in names)
     tabs = [button(name, "drawer", name, attribute) for name, attribute in pressed]
     word = "Open the drawer" if folded else "Fold the drawer"
     attributes = html("class='fold' aria-label='{}' title='{}'", word, word)

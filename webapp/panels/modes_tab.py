@@ -1,5 +1,6 @@
 """Several answers to one wrench: its modes and where they come from, and those of other methods."""
 
+import math
 from functools import partial
 
 import numpy as np
@@ -7,7 +8,6 @@ import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.layout import Layout
 from finlab.mdn.method import WHOLE
 from finlab.physics.objective import REACHED
 from webapp.handles import add_html, placed, press
@@ -20,7 +20,6 @@ from webapp.tasks.jobs import Run
 from webapp.tasks.solver import Modes
 from webapp.theme import MODE_COLORS, css
 
-UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
 BEYOND = "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
 NOTHING = "No wrench is asked for, so there is nothing to share among the fins."
 LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
@@ -65,7 +64,25 @@ def add_candidates(page: Page) -> None:
     )
     board.show(networks, visible=lambda method: method == "paper")
     page.add_html(mode_table)
+    add_saving(page)
     page.add_html(_origin_words)
+
+
+def add_saving(page: Page) -> None:
+    """The ways as a file."""
+
+    def save() -> None:
+        best, modes = page.jobs.answering.seen().best, page.jobs.answering.modes
+        if best is not None and modes.shown and not page.jobs.answering.searching:
+            page.designs.ways(best, modes)
+
+    button = page.add_button(
+        "Save as CSV",
+        save,
+        icon=viser.Icon.DOWNLOAD,
+        hint="All candidates: error, watts, and the command and force of each actuator.",
+    )
+    page.board.show(button, disabled=lambda modes, searching: searching or not modes.shown)
 
 
 def _temperature(state: State) -> float:
@@ -94,12 +111,10 @@ def step_words(modes: Modes, step: int | None) -> str:
     return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))
 
 
-def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach: bool) -> str:
+def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
     """Where the answer and its modes come from, or why there is but one."""
-    said = UNKNOWN
-    if method == "paper":
-        said = LEARNED
-    elif layout.is_of_fins:
+    said = LEARNED
+    if method != "paper":
         aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
         said = PROPOSED + aside
         if best is not None and not in_reach:
@@ -113,29 +128,31 @@ def mode_table(modes: Modes, mode: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the fins."""
     if not modes.shown:
         return ""
-    rows = []
+    of_fins, rows = any(not math.isnan(way.effort) for way, _, _ in modes.shown), []
     for k, (way, name, badge) in enumerate(modes.shown):
         kind = "chosen" if k == mode else ""
         mark = html("<span class='badge {}'>{}</span>", badge, badge)
         origin = html("<div>{} <span class='dim'>{}</span></div>", mark, source_words(way.sources))
         rows.append(
             html(
-                "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td>{}"
-                "</td><td>{}</td><td>{}</td><td>{:.0f} %</td></tr>",
+                "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td class='{}'>{}"
+                "</td><td>{}</td>{}<td>{:.0f} %</td></tr>",
                 kind,
                 press("mode", str(k)),
                 _swatch(k),
                 name,
                 origin,
+                "missing" if way.err_norm > REACHED else "",
                 error_digits(way.err_norm),
                 three_digits(way.power),
-                three_digits(way.effort),
+                html("<td>{}</td>", three_digits(way.effort)) if of_fins else "",
                 100 * way.saturation,
             )
         )
-    header = Markup(
-        "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>power&nbsp;[W]</th><th>effort</th>"
-        "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
+    header = html(
+        "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>power&nbsp;[W]</th>{}"
+        "<th title='largest share of its range that an actuator uses'>used</th></tr>",
+        Markup("<th>effort</th>" * of_fins),
     )
     left = modes.count - len(modes.shown)
     remark = f"{left} more are known; they come after these."

@@ -24,17 +24,19 @@ from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
+from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
 from webapp.panels.modes_tab import add_candidates, add_comparison
+from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
-from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_target
-from webapp.session.looking import TASKS
+from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_speed, add_target
+from webapp.session.looking import TASKS, WAYS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
 
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
 """The bar above all; the list at the left; the inspector at the right; the drawer below; over the view."""
-DESIGN, ALLOCATE, SIMULATE, EXPORT = TASKS
-CANDIDATES = "Candidates"
+DESIGN, ALLOCATE, SIMULATE, EXPORT, LOG = TASKS
+CANDIDATES, NULL_SPACE = WAYS
 
 
 class Place(NamedTuple):
@@ -48,7 +50,7 @@ class Place(NamedTuple):
     folded: bool = False
     about: str = ""
     """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide` where a tour
-    or a lesson must be under way; nothing where it is there always."""
+    or a lesson must be under way; `flow` where an actuator feels it; nothing where it is there always."""
 
 
 PLACES = (
@@ -60,6 +62,7 @@ PLACES = (
     Place(LEFT, TASKS, "Guide", card(guide_card), about="guide"),
     Place(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
+    Place(RIGHT, (DESIGN, ALLOCATE), "Water", add_speed, about="flow"),
     Place(RIGHT, (DESIGN,), "Actuator", add_actuator, about="actuators"),
     Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
@@ -69,9 +72,14 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
-    Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
+    Place(LEFT, (LOG,), "Log", add_log),
+    Place(RIGHT, (LOG,), "Lost", add_losses),
+    Place(RIGHT, (ALLOCATE, LOG), "Asked and delivered", add_answer),
+    Place(DRAWER, (LOG,), "Log over time", card(log_plots)),
+    Place(DRAWER, (LOG,), "Replays", card(replays_table)),
     Place(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets),
     Place(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
+    Place(DRAWER, (ALLOCATE,), NULL_SPACE, add_null_space),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
     Place(LEFT, (SIMULATE,), "Scenario", add_scenario),
     Place(RIGHT, (SIMULATE,), "Run", add_run),
@@ -105,7 +113,7 @@ def add_keys(page: Page) -> None:
         ("Mirror the selected fin", session.mirror, "M"),
         ("Delete the selected fin", session.delete, "delete"),
         ("Add a fin", partial(session.add, "fin"), "I"),
-        ("New design", page.designs.new),
+        ("New design", page.new),
         ("Save the design", page.designs.save, "S", CTRL),
         ("Share the design by a link", page.designs.share),
         ("Unlink the selected fin from its mirror image", session.unlink),
@@ -116,6 +124,7 @@ def add_keys(page: Page) -> None:
         ("Swim: pause or go on", lambda: swimming.set_running(not swimming.running), "B"),
         ("Swim: back to the design", page.scenery.end_swim),
         ("Frame what is selected", robot.frame, "F"),
+        ("Save the view as a picture", page.scenery.save),
         *(
             (f"Camera: {view}", partial(robot.look_from, view), key)
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
+from finlab.physics.objective import REACHED
 from webapp.handles import put
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, html, parts_word, three_digits
@@ -52,6 +53,7 @@ def _written(
     in_reach: bool,
     step: int | None,
     modes: Modes,
+    mode: int,
     task: str,
 ) -> str:
     if swimmer is not None and moment is not None:
@@ -59,8 +61,12 @@ def _written(
     size = arrow_size(state.layout)
     drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
+    way = modes.shown[mode] if shown is not best and mode < len(modes.shown) else None
+    if way is not None and way.mode.err_norm > REACHED:
+        refined = way.name.capitalize()
     words = legend(*scale, size, drawn) + JETS * (state.layout.interaction is not None)
-    return corner(state, words, shown, busy, error, shown is best, in_reach, refined)
+    badge = "" if way is None else way.badge
+    return corner(state, words, shown, busy, error, shown is best, in_reach, refined, badge)
 
 
 @lru_cache(maxsize=32)
@@ -128,9 +134,11 @@ def corner(
     least: bool = True,
     in_reach: bool = False,
     refined: str = "",
+    badge: str = "",
 ) -> str:
     """Legend and status line in the lower left corner of the page; `least` where the answer itself is shown,
-    not another way to do the same; `refined` is the step of its refinement, nothing at its end."""
+    not another way to do the same, whose `badge` says where that comes from; `refined` is the step of its
+    refinement, nothing at its end."""
     fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
@@ -139,11 +147,11 @@ def corner(
         parts.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
         parts.append(html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING))
     else:
-        parts += _figures(allocation, least, in_reach, refined)
+        parts += _figures(allocation, least, in_reach, refined, badge)
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) -> list[str]:
+def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str) -> list[str]:
     color, verdict = COLORS[verdict_of(allocation, in_reach)], verdict_sentence(allocation, in_reach)
     if refined:
         color, verdict = DEAD, refined
@@ -161,7 +169,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) 
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
-    who = html("<span class='dim'>{}</span> {} ms", method, time) if least else "network"
+    who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
     error = "<span class='dim'>error</span> <b class='err'>{}</b>"
     return [
         html(

@@ -14,7 +14,7 @@ from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, put
 from webapp.markup.outcomes import swim_card
-from webapp.markup.plot import Axis, Plot, cost_axis, exact_axis, positive
+from webapp.markup.plot import cost_axis, exact_axis, over_time, positive
 from webapp.markup.words import html, marker, righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
@@ -108,8 +108,6 @@ EVERY_S = 0.2
 """Least time between two drawings [s]."""
 SMALL = 0.01
 """What a vertical axis shows at least, in its unit."""
-WIDTH, HEIGHT, LEFT = 250, 128, 40
-"""Of a plot, and where its vertical axis stands [px]."""
 TICKS = 3
 MOST = 2000
 """About how many forces are drawn; a longer record, or one of more actuators, is thinned out."""
@@ -161,15 +159,7 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
     end = max(last, min(duration_s, 2.0 ** math.ceil(math.log2(max(last, FIRST_S)))))
     across = exact_axis("time [s]", np.array([0.0, end]))
 
-    def plot(up: Axis, lines: Sequence[Array], colors: Sequence[Rgb], words: Sequence[str] = ()) -> str:
-        drawing = Plot(across, up._replace(word=""), HEIGHT, LEFT, WIDTH)
-        parts = [html("<text x='2' y='14'>{}</text>", up.word)]
-        parts += [drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)]
-        parts += [
-            drawing.key(34 + 68 * k, color, word)
-            for k, (word, color) in enumerate(zip(words, colors, strict=False))
-        ]
-        return drawing.drawn(parts)
+    plot = partial(over_time, across, seconds)
 
     def sizes(word: str, lines: Sequence[Array], colors: Sequence[Rgb] = (DELIVERED,)) -> str:
         return plot(positive(word, np.append(SMALL, lines), TICKS), lines, colors)

@@ -10,11 +10,10 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
-from finlab.physics import plant_of
 from webapp.handles import add_html, placed, press, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.verdict import answer_sentence, rest_sentence
-from webapp.markup.words import error_digits, html, listed, marker, row, three_digits
+from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
@@ -79,14 +78,17 @@ def add_target(page: Page) -> None:
 
     board.act(mark)
     page.add_html(_sentence)
-    about = "How fast the robot moves ahead through the water, on which rudders depend."
-    speed = gui.add_slider("Speed through the water [m/s]", 0.0, MAX_SPEED, 0.05, 0.0, hint=about)
-    page.bind_number(speed, session.set_speed, lambda state: state.speed, digits=2)
-    board.show(speed, visible=lambda layout: plant_of(layout).feels_flow)
-    page.add_html(_at_rest)
     policies = "Come closest, keep the direction, or serve axes by priority, heave first."
     box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
+
+
+def add_speed(page: Page) -> None:
+    """How fast the robot moves, and what gives nothing at rest."""
+    about = "How fast the robot moves ahead through the water, on which rudders depend."
+    speed = page.gui.add_slider(SPEED, 0.0, MAX_SPEED, 0.05, 0.0, hint=about)
+    page.bind_number(speed, page.session.set_speed, lambda state: state.speed, digits=2)
+    page.add_html(_at_rest)
 
 
 def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:

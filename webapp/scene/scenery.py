@@ -1,5 +1,6 @@
 """The view of one page: the robot that is designed, or the one that swims in its water."""
 
+import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,6 +16,7 @@ from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
+from webapp.session.files import file_stem
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
@@ -84,6 +86,11 @@ class Scenery:
         if self._swimming.active:
             self._swimming.tick(elapsed)
             self.swim.animate(elapsed)
+
+    def save(self) -> None:
+        """Let the page save the view as a picture."""
+        name = file_stem(self._session.state.layout.name)
+        run_script(self._client.gui, f"finlabFrames.picture({json.dumps(name + '.png')});")
 
     def end_swim(self) -> None:
         """Go back from the robot that swims to the one that is designed."""

@@ -12,8 +12,8 @@ from finlab.axes import axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
-from webapp.session.looking import DRAWERS, TASKS, Desk, Display, SearchRequest
-from webapp.session.state import LEAST, MAX_SPEED, History, State, Steps, chosen, number
+from webapp.session.looking import DRAWERS, TASKS, WAYS, Desk, Display, SearchRequest
+from webapp.session.state import LEAST, MAX_SPEED, MAX_TARGET, History, State, Steps, chosen, number
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST, PRESETS
 
@@ -41,6 +41,8 @@ class Core:
         """Which of the answer's modes is shown; 0 is the best one."""
         self.step: int | None = None
         """How many steps of refinement the network's proposals have had that are shown; None for all."""
+        self.shifts: tuple[float, ...] = ()
+        """How far along the first directions of the answer's null space the forces are [N]."""
         self.loops = False
         """Whether the refinement begins anew at its end."""
         self.revision = 0
@@ -66,7 +68,7 @@ class Core:
         """After any change of the state: a choice of mode is void, an actuator that is gone is not selected;
         one that is called otherwise now stays so."""
         self.revision += 1
-        self.mode, self.step = 0, None
+        self.mode, self.step, self.shifts = 0, None, ()
         old, names = before.layout.names, self.state.layout.names
         called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
         now = (name if name in names else called.get(name) for name in self.chosen)
@@ -189,7 +191,13 @@ class Core:
     @property
     def drawer(self) -> str | None:
         """What of the drawer is seen; None where it is folded, or the task has none."""
-        return None if self.desk.folded else self.desk.opened[self.desk.task] or None
+        return None if self.desk.folded else self.opened or None
+
+    @property
+    def opened(self) -> str:
+        """What lies uppermost in the drawer of the open task, folded or not; nothing where it has none."""
+        opened = self.desk.opened[self.desk.task]
+        return opened if opened != WAYS[0] or self.state.layout.is_of_fins else WAYS[1]
 
     def show_task(self, name: str) -> None:
         """Open a task."""
@@ -201,6 +209,8 @@ class Core:
         task = next((task for task, names in DRAWERS.items() if name in names), self.desk.task)
         chosen(name, "drawer", DRAWERS[task])
         others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
+        if name in WAYS and name != self.desk.opened[task]:  # the others are no ways of this one
+            self.mode = 0
         self.desk = Desk(task, (*others, (task, name)))
         self.step = None
 
@@ -211,6 +221,13 @@ class Core:
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""
         self.mode = max(0, int(index))
+
+    def shift(self, direction: int, value: Any) -> None:
+        """Go along a direction of the null space [N]; the robot does what comes of it."""
+        shifts = list(self.shifts) + [0.0] * (direction + 1 - len(self.shifts))
+        shifts[direction] = number(value, "way [N]", -MAX_TARGET, MAX_TARGET)
+        self.shifts = tuple(shifts) if any(shifts) else ()
+        self.mode = min(len(self.shifts), 1)
 
     def show_step(self, step: int, steps: int) -> None:
         """Show the network's proposals after some steps of their refinement, of as many as there are."""

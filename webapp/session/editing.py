@@ -47,9 +47,9 @@ class Session(Core):
         self._commit(step or f"Open {layout.name}", anew)
         self.saved = layout
 
-    def new_layout(self) -> None:
-        """A robot to begin with: one hull and one fin."""
-        self.open_layout(layout_edits.blank(), "New design")
+    def new_layout(self, kind: str) -> None:
+        """A robot to begin with: one hull and one actuator of a type."""
+        self.open_layout(layout_edits.blank(kind), "New design")
         self.chosen = self.state.layout.names
 
     def accept_layout(self, layout: Layout) -> None:

@@ -36,7 +36,7 @@ MAX_LINK = 16_000
 """Most characters of a design in a link; chats and mail programs cut longer ones."""
 PLAIN, ARCHIVE = "y", "a"
 """First character: a layout's YAML, compressed, or a ZIP archive with the files that it names."""
-BUNDLE, GRAPH = "_bundle.zip", ".graph.json"
+BUNDLE, GRAPH, CANDIDATES = "_bundle.zip", ".graph.json", "_candidates.csv"
 """Ends of the names of files, after the layout's."""
 NO_DESIGN = "the link holds no whole design; copy all of it, or ask for the file"
 

@@ -123,11 +123,12 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
     raise AssertionError("no place is free")
 
 
-def blank() -> Layout:
-    """A robot to begin with: a round hull, and a fin on its left that pushes ahead, back, up and down."""
-    hull = Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))
-    fin = Fin("left", (0.0, 0.17, 0.0), math.pi / 2)
-    return Layout("New robot", (fin,), body=Body(hull=hull))
+def blank(kind: str) -> Layout:
+    """A robot to begin with: a round hull, and one actuator of a type on its left."""
+    part = replace(KINDS[chosen(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0))
+    if isinstance(part, Fin):
+        part = replace(part, mounting_angle=math.pi / 2)
+    return Layout("New robot", (part,), body=Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))))
 
 
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:

@@ -56,6 +56,7 @@ DONE: dict[str, Callable[[Core, Allocation], bool]] = {
     "refinement": lambda session, _: session.step is not None and session.step > 0,
     "temperature": lambda session, _: (session.state.temperature or 0.0) > 1.9,
     "watts-or-effort": lambda session, answer: least_of(session.state.method) == "watts" and answer.reachable,
+    "null-space": lambda session, _: bool(session.shifts) and session.mode == 2,
     "lost-fin": lambda session, answer: bool(session.state.failed) and answer.reachable,
     "no-yaw": lambda session, answer: (
         session.state.layout.fins != shipped()["no_yaw"].fins and answer.reachable
@@ -101,9 +102,10 @@ class Guide:
             self._left = {key: getattr(session, key) for key in KEPT}
         self._enter(History(stop.state))  # what can be undone is what is done here
         self.stop, self.solved = stop, False
-        session.saved, session.chosen, session.mode = stop.state.layout, (), stop.mode
+        session.saved, session.chosen = stop.state.layout, ()
         session.desk = Desk()
         session.show_drawer(stop.drawer)
+        session.mode = stop.mode
         session.display = replace(session.display, drawn="none")
 
     def _enter(self, history: History) -> None:

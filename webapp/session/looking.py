@@ -12,13 +12,16 @@ from finlab.forces.attainable import Kind
 from finlab.layout import Layout
 from webapp.session.state import chosen, number
 
-TASKS = ("Design", "Allocate", "Simulate", "Export")
+TASKS = ("Design", "Allocate", "Simulate", "Export", "Log")
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
-    "Allocate": ("Candidates", "Comparison"),
+    "Allocate": ("Candidates", "Null space", "Comparison"),
     "Simulate": ("Swim over time",),
     "Export": (),
+    "Log": ("Log over time", "Replays"),
 }
+WAYS = DRAWERS["Allocate"][:2]
+"""What shows several ways to do the same; the first is of robots of fins alone."""
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 

@@ -10,7 +10,9 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.session import Session
+from webapp.session.looking import WAYS
 from webapp.tasks.background import Context, Newest
+from webapp.tasks.null_ways import null_modes
 from webapp.tasks.solver import NO_MODES, Modes, Reply
 
 SEARCH_REST_S = 0.2
@@ -77,10 +79,11 @@ class Answering:
         session, search, reply = self._session, self._search, self._answer.findings
         busy, modes, mode = self.busy, search.findings or NO_MODES, session.mode
         searching = busy or search.busy
+        known = search.answered is not None and search.answered[0] is reply
         best = shown = None if reply is None else reply.answer
         steps = 0 if searching else modes.steps
         step = session.step if steps else None
-        if best is not None and not searching:
+        if best is not None and not busy and known and (modes.null is not None or not searching):
             proposal = modes.proposal_of(mode) if step is not None and step < steps else None
             if step is not None and proposal is not None:
                 shown = self._variant(best, modes.ways[step].command[proposal])
@@ -88,7 +91,7 @@ class Answering:
                 shown = self._variant(best, modes.shown[mode].mode.command)
         return Seen(
             *(best, shown, reply is not None and reply.in_reach, busy, None if busy else self._answer.error),
-            *(modes, searching, busy or search.answered is None or search.answered[0] is not reply),
+            *(modes, searching, busy or not known),
             *(min(mode, max(len(modes.shown) - 1, 0)), step),
         )
 
@@ -107,19 +110,23 @@ class Answering:
 
     def _look(self, at_once: bool) -> None:
         """Prove the newest answer, and search for its modes once these can be seen."""
-        reply, session = self._answer.findings, self._session
-        if reply is not None and self._search.question != (reply, True):
-            seen = session.drawer == "Candidates" or session.mode > 0
-            self._search.ask((reply, seen), at_once)
+        reply, session, before = self._answer.findings, self._session, self._search.question
+        kept = "" if before is None else before[1]
+        kind = drawer if (drawer := session.drawer) in WAYS else kept * (session.mode > 0)
+        known = before is not None and before[0] is reply and not kind  # it is proved, and not looked at
+        if reply is not None and not known:
+            self._search.ask((reply, kind, session.shifts if kind == WAYS[1] else ()), at_once)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
         for task in (self._answer, self._search):
             task.forget()
 
-    def _modes(self, question: tuple[Reply, bool]) -> Modes:
+    def _modes(self, question: tuple[Reply, str, tuple[float, ...]]) -> Modes:
         """On the worker's thread."""
-        return self._solver.modes(*question)
+        reply, kind, shifts = question
+        modes = self._solver.modes(reply, seen=kind == WAYS[0])
+        return null_modes(reply.answer, shifts) if kind == WAYS[1] else modes
 
     def _take(self) -> None:
         error = self._answer.error
@@ -182,7 +189,7 @@ class Refining:
 
     def _go_on(self) -> None:
         session, steps, self._timer = self._session, self._answering.modes.steps, None
-        looked_at = session.desk.opened[session.desk.task] == "Candidates"
+        looked_at = session.opened == WAYS[0]
         if self._answering.searching or not steps or not looked_at:
             session.step = None
         else:

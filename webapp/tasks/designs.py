@@ -5,6 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
 
+from finlab.allocation.allocation import Allocation
 from finlab.deploy.bundle import graph_text, make_bundle
 from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
@@ -17,12 +18,14 @@ from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
 from webapp.tasks.background import Context
+from webapp.tasks.solver import Modes
 from webapp.tasks.swimming import Swimming
+from webapp.tasks.ways_file import ways_csv
 from webapp.viser_internals import run_script
 
 KINDS = (
     "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
-    "measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+    "measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, DB3, BAG)"
 )
 SHARED = (
     "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a copy, on a "
@@ -38,9 +41,9 @@ class Designs:
     def __init__(self, context: Context) -> None:
         self._context, self._session = context, context.session
 
-    def new(self) -> None:
-        """A robot with one hull and one fin."""
-        self._session.new_layout()
+    def new(self, kind: str) -> None:
+        """A robot with one hull and one actuator of a type."""
+        self._session.new_layout(kind)
         self._session.show_task("Design")
 
     def open(self, name: str, content: bytes) -> None:
@@ -110,6 +113,11 @@ class Designs:
         """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
         layout = self._session.state.layout
         self._export(file_stem(layout.name) + files.GRAPH, lambda: graph_text(layout).encode())
+
+    def ways(self, answer: Allocation, modes: Modes) -> None:
+        """Send the candidates of an answer as CSV."""
+        name = file_stem(answer.layout.name) + files.CANDIDATES
+        self._export(name, partial(ways_csv, answer, modes))
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""

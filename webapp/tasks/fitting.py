@@ -58,7 +58,7 @@ class Fitting(Newest[Upload, Fitted]):
         or its kind has no table."""
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
-        short = re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
+        short = short_name(name)
         if len(content) > MAX_BYTES:
             raise DataError(
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter "
@@ -129,6 +129,11 @@ class Fitting(Newest[Upload, Fitted]):
         if upload is not self.question:
             raise FinlabError("cancelled")
         self.report(upload, words)
+
+
+def short_name(name: str) -> str:
+    """The name of an upload as that of a file here."""
+    return re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
 
 
 def _model(part: Actuator) -> object:

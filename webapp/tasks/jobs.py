@@ -15,6 +15,7 @@ from webapp.tasks.answering import Answering, Refining
 from webapp.tasks.background import Context, Newest
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
+from webapp.tasks.log_reading import LogReading
 from webapp.tasks.swimming import Swimming
 
 TRIES = 3
@@ -157,6 +158,7 @@ class Jobs:
         self.analyst = Newest(loop, workers.cards, find, context.changed, CARD_REST_S)
         self.improver = Improver(context, lambda: context.session.display.drawn)
         self.fitting = Fitting(context)
+        self.log = LogReading(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context)
 
@@ -194,6 +196,13 @@ class Jobs:
         """The page has gone."""
         self.swimming.stop()
         self.refining.stop()
-        tasks: tuple[Any, ...] = self.comparison, self.improver, self.fitting, self.answering, self.analyst
+        tasks: tuple[Any, ...] = (
+            self.comparison,
+            self.improver,
+            self.fitting,
+            self.log,
+            self.answering,
+            self.analyst,
+        )
         for task in (*tasks, self.ranging, self.both):
             task.forget()

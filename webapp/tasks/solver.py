@@ -38,6 +38,19 @@ class NamedMode(NamedTuple):
     """Whose it is: `network`, `optimum` where it is proved to be least, or another method's name."""
 
 
+class NullWays(NamedTuple):
+    """The null space of an answer, as the page lists it."""
+
+    names: tuple[str, ...]
+    """What each direction is called: the numbers of the actuators that push otherwise along it."""
+    about: tuple[str, ...]
+    """The same with their shares."""
+    ranges: tuple[tuple[float, float], ...]
+    """How far one may go along each, the others as they are [N]."""
+    more: int
+    """Directions that are not listed."""
+
+
 @dataclass(frozen=True, eq=False)
 class Modes:
     """The modes of an answer, as the page lists them."""
@@ -47,6 +60,8 @@ class Modes:
     count: int
     ways: tuple[Candidates, ...] = ()
     """What a network proposed, then the same K after each step of their refinement where that is told."""
+    null: "NullWays | None" = None
+    """The null space that these ways lie in, where that is looked at."""
     ends: tuple[int, ...] = ()
     """For each proposal the shown mode at which it ends, -1 where that is none of them."""
 
@@ -73,7 +88,7 @@ def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple
     ends = np.full(len(last), -1)
     for k, named in reversed(list(enumerate(shown))):
         ends[same_signature(named.mode.signature, signatures)] = k
-    return Modes(shown, len(modes), ways, tuple(ends.tolist()))
+    return Modes(shown, len(modes), ways, ends=tuple(ends.tolist()))
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:

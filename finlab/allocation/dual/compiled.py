@@ -1,6 +1,7 @@
 """A layout compiled for the dual: the answers of its actuators, and the commands for the forces found."""
 
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,19 @@ class Compiled:
         ]
         other._prepare()
         return other
+
+    @cached_property
+    def _directions(self) -> Array:
+        """Directions (n, 2, 3) of each actuator's forces in its own axes."""
+        own = np.zeros((self.count, 2, 6))
+        for places, group in groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))):
+            for place, response in zip(places, group.responses, strict=True):
+                own[place] = response.rows
+        return own[..., :3]
+
+    def forces_along(self, force: Array) -> Array:
+        """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own axes."""
+        return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
     def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
         """See `Group.radial_worth`: where all actuators are alike, one answers for all."""

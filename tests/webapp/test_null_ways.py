@@ -1,0 +1,78 @@
+"""Ways along the null space: rows, sliders and the robot say the same, and a table of them can be saved."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.layout import Layout, load_layout
+from tests.webapp.stand_in import AtOnce, page_of
+from tests.webapp.test_modes import Direct
+from webapp.panels.modes_tab import mode_table
+from webapp.session import Session
+from webapp.session.looking import WAYS
+from webapp.session.state import State
+from webapp.tasks.answering import Answering
+from webapp.tasks.null_ways import MOST, null_modes
+from webapp.tasks.solver import Solver
+from webapp.tasks.ways_file import ways_csv
+
+HYBRID, BLUEROV = load_layout("turtle_hybrid"), load_layout("bluerov2_heavy")
+ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
+
+
+@pytest.mark.parametrize("layout", [HYBRID, BLUEROV, load_layout("ucat")], ids=lambda layout: layout.name)
+def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: Layout) -> None:
+    answer = Solver().solve(State(layout, target=ASKED))
+    (alone,) = null_modes(answer, ()).shown
+    assert alone.badge == "optimum" and np.array_equal(alone.mode.command, answer.command)
+    modes = null_modes(answer, (0.0, 4.0))
+    optimum, other, mean = modes.shown
+    assert other.mode.err_norm < 1e-6 and other.mode.power > 1.01 * optimum.mode.power
+    assert (mean.mode.err_norm > 1e-3) is (layout is not BLUEROV), "commands of thrusters are their forces"
+    assert ("class='missing'" in mode_table(modes, 1)) is (layout is not BLUEROV)
+    assert ("<th>effort" in mode_table(modes, 1)) is layout.is_of_fins
+    assert modes.null is not None
+    low, high = modes.null.ranges[1]
+    assert low < 0.0 < 4.0 < high and len(modes.null.names) == len(modes.null.ranges) <= MOST
+
+
+def test_a_robot_without_another_way_says_so() -> None:
+    layout = load_layout("ucat").without(["back_left", "back_right"])
+    modes = null_modes(Allocator(layout).allocate([0.5, 0, 0, 0, 0, 0]), (1.0,))
+    assert modes.null is not None and modes.null.names == () and len(modes.shown) == 1
+
+
+def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
+    session, loop = Session(HYBRID), AtOnce()
+    answering = Answering(page_of(Direct(), session, solver=Solver(), loop=loop), lambda: None)
+    assert session.drawer == WAYS[1], "the network proposes for fins alone"
+    answering.ask()
+    loop.ring()
+    best = answering.seen().shown
+    session.shift(0, 5.0)
+    answering.ask()
+    seen = answering.seen()
+    assert seen.shown is not seen.best is best and seen.shown is not None and best is not None
+    assert seen.shown.reachable and seen.shown.power > best.power
+    session.show_mode(2)
+    assert not answering.seen().shown.reachable  # type: ignore[union-attr]
+    session.shift(0, 0.0)
+    assert session.shifts == () and session.mode == 0
+    session.shift(1, 2.0)
+    session.set_target(0, 2.0)
+    assert session.shifts == () and session.mode == 0, "of another wrench nothing is known"
+
+
+def test_the_table_of_candidates_has_commands_that_give_its_figures() -> None:
+    answer = Solver().solve(State(HYBRID, target=ASKED))
+    rows = list(csv.DictReader(io.StringIO(ways_csv(answer, null_modes(answer, (5.0,))).decode())))
+    assert [row["origin"] for row in rows] == ["optimum", "null space", "average"]
+    for row in rows:
+        force = [[float(row[f"{name}.F{axis}_n"]) for axis in "xyz"] for name in HYBRID.names]
+        if row["origin"] != "average":
+            np.testing.assert_allclose(np.sum(force, axis=0), ASKED[:3], atol=1e-6)
+        assert float(row["power_w"]) >= answer.power * (1 - 1e-9) and row["effort"] == ""
+    assert float(rows[0]["lift_left.force_n"]) == pytest.approx(answer.command[4, 0])

@@ -1,0 +1,72 @@
+"""The null space of an answer: a slider for each direction of it, what comes of them, and the mean of two."""
+
+import math
+from functools import partial
+
+import viser
+
+from finlab.physics.objective import REACHED
+from webapp.handles import add_html, put
+from webapp.markup.words import html, marker
+from webapp.page import Page
+from webapp.panels.modes_tab import add_saving, mode_table
+from webapp.tasks.null_ways import MOST
+from webapp.tasks.solver import Modes
+from webapp.viser_internals import put_marks
+
+ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
+ALONE = "Each wrench has one set of forces here: the null space is empty."
+WRONG = "Both commands give the wrench, and their average does not: a model with one answer would learn that."
+RIGHT = "The average gives the wrench, too: these commands are in proportion to forces."
+
+
+def add_null_space(page: Page) -> None:
+    """Sliders, and a table of the ways."""
+    page.add_html(_about)
+    add_html(page.gui, marker("fl-reach"))
+    sliders = [_add_slider(page, k) for k in range(MOST)]
+    add_html(page.gui, marker("fl-reach-end"))
+
+    def place(modes: Modes, shifts: tuple[float, ...]) -> None:
+        known = modes.null
+        for k, slider in enumerate(sliders):
+            there = known is not None and k < len(known.names)
+            put(slider, visible=there)
+            if known is None or not there:
+                continue
+            low, high = known.ranges[k]
+            step = 10.0 ** math.floor(math.log10(max(high - low, 1e-3)) - 2.5)
+            low, high = (math.ceil(low / step) * step, math.floor(high / step) * step)
+            value = shifts[k] if k < len(shifts) else 0.0
+            ends = {"max": max(high, value, step), "min": min(low, value, -step)}
+            put(slider, label=f"{known.names[k]} [N]", hint=f"Shares: {known.about[k]}.", step=step, **ends)
+            put(slider, value=round(value, 6))
+            put_marks(slider, ((0.0, ""),))
+
+    page.board.act(place, *sliders)
+    add_html(page.gui, marker("fl-column"))
+    page.add_html(mode_table)
+    page.add_html(_mean_words)
+    add_saving(page)
+
+
+def _add_slider(page: Page, direction: int) -> viser.GuiSliderHandle[float]:
+    slider = page.gui.add_slider(f"{direction + 1} [N]", -1.0, 1.0, 0.01, 0.0, visible=False)
+    slider.precision = 3
+    page.on_change(slider, partial(page.session.shift, direction))
+    return slider
+
+
+def _about(modes: Modes) -> str:
+    known = modes.null
+    if known is None:
+        return ""
+    said = f"{ABOUT} {known.more} more directions are not shown." if known.more else ABOUT
+    return html("<div class='fl dim'>{}</div>", said if known.names else ALONE)
+
+
+def _mean_words(modes: Modes) -> str:
+    if modes.null is None or len(modes.shown) < 3:
+        return ""
+    wrong = modes.shown[2].mode.err_norm > REACHED
+    return html("<div class='fl {}'>{}</div>", "missing" if wrong else "dim", WRONG if wrong else RIGHT)

@@ -1,0 +1,93 @@
+"""A log of an autopilot or of ROS that one page judges, and its moments on the robot."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from finlab.assets import install
+from finlab.errors import FinlabError
+from finlab.files.worker import in_worker
+from finlab.layout import Layout
+from webapp.tasks.background import Context, Newest
+from webapp.tasks.fitting import short_name
+
+if TYPE_CHECKING:  # who opens no log needs none of it
+    from finlab.log import Judgement
+
+SUFFIXES = ".ulg,.bin,.mcap,.db3,.bag"
+
+
+@dataclass(frozen=True, eq=False)
+class LogFile:
+    """A log that the browser sent."""
+
+    name: str
+    content: bytes
+    robot: Layout | None
+    """By whose laws it is judged; None for what its own parameters say."""
+
+
+class LogReading(Newest[LogFile, "Judgement"]):
+    """One log at a time for one page."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context.loop, context.workers.fits, self._judge, self._told)
+        self._context, self._session = context, context.session
+        self.by_page = False
+        """Whether the page's robot counts, not that of the log's parameters."""
+        self.moment: float | None = None
+        """Which moment of the log is on the robot [s]."""
+
+    def choose_robot(self, by_page: object) -> None:
+        """Judge by the page's robot, or by the one that the log tells; a log that is there is judged anew."""
+        self.by_page = bool(by_page)
+        if self.question is not None:
+            self.open(self.question.name, self.question.content)
+
+    def open(self, name: str, content: bytes) -> None:
+        """Judge a log in place of the one before."""
+        self.forget()
+        self.moment = None
+        self._session.show_task("Log")
+        self.progress = "reading the log"
+        self.ask(LogFile(short_name(name), content, self._session.state.layout if self.by_page else None))
+
+    def jump(self, time: float) -> None:
+        """Put the robot of the log, and the wrench that it asked for at a time [s], on the page."""
+        judged = self.findings
+        if judged is None:
+            raise FinlabError("open a log first")
+        place = int(np.abs(judged.timeline.time - time).argmin())
+        self.moment = float(judged.timeline.time[place])
+        self.use(judged.robot, f"Robot of {judged.source}")
+        self._session.ask_for([repr(value) for value in judged.timeline.demand[place].tolist()])
+
+    def use(self, layout: Layout, step: str) -> None:
+        """Open a robot of the log, unless it is there."""
+        if self._session.state.layout != layout:
+            self._session.open_layout(layout, step)
+
+    def _told(self) -> None:
+        if self.error is not None:
+            self._context.notify("Not judged", self.error)
+        self._context.changed()
+
+    def _judge(self, file: LogFile) -> "Judgement":
+        """On the worker's thread."""
+        try:
+            from finlab.log import judge, read_log
+
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / file.name
+                path.write_bytes(file.content)
+                try:
+                    log = in_worker(read_log, path, file.robot)
+                except FinlabError as error:
+                    raise type(error)(str(error).replace(f"{folder}/", "")) from None
+        except ModuleNotFoundError as error:
+            raise FinlabError(f"{file.name} needs {error.name}; {install('logs')}") from None
+        self.report(file, "asking other methods and policies the same")
+        return judge(log)
