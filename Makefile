@@ -80,7 +80,7 @@ schemas: setup
 	$(BIN)/python tools/schemas.py
 
 docs: setup
-	$(THREADS) $(BIN)/mkdocs build --strict --quiet
+	$(THREADS) $(BIN)/python -m mkdocs build --strict --quiet
 
 format: setup
 	$(BIN)/ruff check --fix .
