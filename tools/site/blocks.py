@@ -1,7 +1,7 @@
 """The code blocks of pages: found, run beside each other in folders of their own, and shown with their output.
 
 A block ```python or ```sh is run, after those before it on its page. One whose title begins with "Not run"
-is not, and its title says so to the reader. Another title names a file that the block is written to.
+is not, and its title says so to the reader. Another title names a file: a block of any language is written to it, and not run.
 """
 
 import base64

@@ -1,8 +1,8 @@
 """Run the blocks of a page, or the cells of an example, in one process and one folder, as a reader would.
 
 From JSON on standard input, [{"language", "title", "text"}], to JSON on standard output: what each block
-showed, {"text", "html", "pictures"}, pictures as PNG in base64. A block with a file name as title is written
-to that file. A block that fails ends everything with its traceback.
+showed, {"text", "html", "pictures"}, pictures as PNG in base64. A block with a title is written to the file of
+that name instead. A block that fails ends everything with its traceback.
 """
 
 import ast
@@ -16,13 +16,12 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-RUN = ("python", "sh")
-
 
 def main(source: str) -> None:
     """Run the blocks on standard input, which stand in the file `source`."""
     real = os.dup(1)
     os.dup2(2, 1)  # what is printed past Python, too, must not mix with the JSON
+    sys.path[0] = ""
     names: dict[str, Any] = {"__name__": "__main__", "__file__": source}
     sys.argv = [source]
     shown = [show(block, names) for block in json.load(sys.stdin)]
@@ -35,6 +34,7 @@ def show(block: dict[str, str], names: dict[str, Any]) -> dict[str, Any]:
     if title:
         Path(title).parent.mkdir(parents=True, exist_ok=True)
         Path(title).write_text(text, encoding="utf-8")
+        return {"text": "", "html": None, "pictures": []}
     if language == "python":
         out = io.StringIO()
         with redirect_stdout(out):
@@ -42,20 +42,18 @@ def show(block: dict[str, str], names: dict[str, Any]) -> dict[str, Any]:
         html = value._repr_html_() if hasattr(value, "_repr_html_") else None
         said = "" if value is None or html else f"{value}\n"
         return {"text": out.getvalue() + said, "html": html, "pictures": pictures()}
-    if language == "sh":
-        done = subprocess.run(["bash", "-euo", "pipefail", "-c", text], stdout=-1, stderr=-2, text=True)
-        if done.returncode:
-            sys.exit(f"{text}\n{done.stdout}\nthis block ended with code {done.returncode}")
-        return {"text": done.stdout, "html": None, "pictures": []}
-    return {"text": "", "html": None, "pictures": []}
+    done = subprocess.run(["bash", "-euo", "pipefail", "-c", text], stdout=-1, stderr=-2, text=True)
+    if done.returncode:
+        sys.exit(f"{text}\n{done.stdout}\nthis block ended with code {done.returncode}")
+    return {"text": done.stdout, "html": None, "pictures": []}
 
 
 def run(text: str, names: dict[str, Any]) -> Any:
     """Run Python code; the value of its last expression, as in a notebook, None without one."""
-    tree = ast.parse(text)
+    tree, place = ast.parse(text), f"<{names['__file__']}>"
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
-    exec(compile(tree, names["__file__"], "exec"), names)
-    return eval(compile(ast.Expression(last.value), names["__file__"], "eval"), names) if last else None
+    exec(compile(tree, place, "exec"), names)
+    return eval(compile(ast.Expression(last.value), place, "eval"), names) if last else None
 
 
 def pictures() -> list[str]:
