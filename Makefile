@@ -80,7 +80,7 @@ schemas: setup
 	$(BIN)/python tools/schemas.py
 
 docs: setup
-	$(THREADS) $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(THREADS) $(BIN)/python -m mkdocs build --strict --quiet
 
 format: setup
 	$(BIN)/ruff check --fix .

@@ -34,13 +34,9 @@ def first_line(thing: Any) -> str:
 
 
 def public(module: Any) -> dict[str, Any]:
-    """What a package offers, by name: that of the library which it imports for others."""
-    members = ((name, each) for name, each in module.members.items() if not name.startswith("_"))
-    return {
-        name: each
-        for name, each in sorted(members)
-        if each.is_alias and each.target_path.startswith("finlab.") and each.is_exported is not False
-    }
+    """What a package offers, by name: what it imports as its own name, or lists in `__all__`."""
+    names = re.findall(r"import (\w+) as \1$", module.filepath.read_text(), re.MULTILINE)
+    return {name: module.members[name] for name in sorted({*names, *map(str, module.exports or ())})}
 
 
 def python_pages() -> Pages:
@@ -119,11 +115,20 @@ def _keys(part: str, about: dict[str, Any]) -> str:
 
 def _meanings(part: str) -> Any:
     """From a key to what the class of that name says of it; a key has its unit behind the name."""
-    said = {}
-    for thing in (each.final_target for module in ("layout", "interaction.jets") for each in package()[module].members.values() if not each.is_module):
-        if thing.name == part:
-            said = {name: first_line(each) for name, each in thing.all_members.items() if each.is_attribute}
+    said = classes(package()).get(part, {})
     return lambda key: next((said[name] for name in sorted(said, key=len, reverse=True) if key.startswith(name)), "")
+
+
+@cache
+def classes(module: Any) -> dict[str, dict[str, str]]:
+    """What the classes of a module, and of those within it, say of their attributes."""
+    found = {}
+    for each in module.members.values():
+        if not each.is_alias and each.is_class:
+            found[each.name] = {name: first_line(own) for name, own in each.attributes.items()}
+        elif not each.is_alias and each.is_module:
+            found |= classes(each)
+    return found
 
 
 def _value(of: dict[str, Any]) -> str:
