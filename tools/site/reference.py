@@ -35,8 +35,10 @@ def first_line(thing: Any) -> str:
 
 def public(module: Any) -> dict[str, Any]:
     """What a package offers, by name: what it imports as its own name, or lists in `__all__`."""
-    names = re.findall(r"import (\w+) as \1$", module.filepath.read_text(), re.MULTILINE)
-    return {name: module.members[name] for name in sorted({*names, *map(str, module.exports or ())})}
+    found = {name: module.members[name] for name in map(str, module.exports or ())}
+    for home, name in re.findall(r"^ *from finlab\.([\w.]+) import (\w+) as \2$", module.filepath.read_text(), re.MULTILINE):
+        found[name] = package()[f"{home}.{name}"]  # a module may have the name of what stands in it
+    return {name: each.final_target if each.is_alias else each for name, each in sorted(found.items())}
 
 
 def python_pages() -> Pages:
@@ -52,9 +54,9 @@ def python_pages() -> Pages:
         index += f"| [`{path}`]({path}.md) | {first_line(module)} |\n"
         text = f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
         for name, thing in names.items():
-            page = home.setdefault(thing.final_target.path, f"{path}.{name}")
-            text += f"| [`{name}`]({page}.md) | {first_line(thing.final_target)} |\n"
-            pages[f"reference/python/{page}.md"] = f"# {page}\n\n::: {thing.final_target.path}\n"
+            page = home.setdefault(thing.path, f"{path}.{name}")
+            text += f"| [`{name}`]({page}.md) | {first_line(thing)} |\n"
+            pages[f"reference/python/{page}.md"] = f"# {page}\n\n::: {thing.path}\n"
         pages[f"reference/python/{path}.md"] = text
     return {"reference/python/index.md": index, **pages}
 
