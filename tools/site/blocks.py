@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -41,10 +42,15 @@ def is_run(block: dict[str, str]) -> bool:
 
 
 def cells_of(text: str) -> tuple[str, Blocks]:
-    """The docstring of an example, and its cells: those between lines `# %%`, or all of it."""
-    about = text.split('"""')[1] if text.startswith('"""') else ""
-    cells = re.split(r"^# %%.*\n", text, flags=re.MULTILINE)
-    return about, [{"language": "python", "title": "", "text": cell} for cell in cells if cell.strip()]
+    """The title of an example, and its cells: a notebook in percent format, or one cell with a docstring."""
+    first, *rest = re.split(r"^# %%(.*)\n", text, flags=re.MULTILINE)
+    cells = [{"language": "python", "title": "", "text": first}] if first.strip() else []
+    for mark, cell in zip(rest[::2], rest[1::2], strict=True):
+        words = "markdown" in mark
+        cell = re.sub("^# ?", "", cell, flags=re.MULTILINE) if words else cell
+        cells.append({"language": "markdown" if words else "python", "title": "", "text": cell.strip() + "\n"})
+    about = re.search(r'^(?:# |""")(.*)', cells[0]["text"])
+    return (about.group(1).rstrip(".") if about else ""), cells
 
 
 def run_all(sources: dict[str, Blocks]) -> dict[str, Shown]:
@@ -66,6 +72,9 @@ def _run(source: str, blocks: Blocks, code: str) -> Shown:
     own = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "100"}
     own |= {"MPLBACKEND": "agg", "NO_COLOR": "1", "PYTHONWARNINGS": "ignore"}
     with TemporaryDirectory() as folder:
+        if source.startswith("examples/"):
+            for data in (ROOT / "examples").glob("*.csv"):
+                shutil.copy(data, folder)
         command = [sys.executable, str(RUNNER), str(ROOT / source)]
         done = subprocess.run(
             command, cwd=folder, env=os.environ | own, input=asked, capture_output=True, text=True
@@ -99,5 +108,6 @@ def output(shown: dict[str, Any]) -> str:
 
 
 def picture(shown: Shown) -> bytes | None:
-    """The first picture of an example."""
-    return next((base64.b64decode(data) for each in shown for data in each["pictures"]), None)
+    """The last picture of an example."""
+    found = [data for each in shown for data in (*re.findall(r"base64,([\w+/=]+)", each["html"] or ""), *each["pictures"])]
+    return base64.b64decode(found[-1]) if found else None

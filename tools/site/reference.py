@@ -110,7 +110,7 @@ def _keys(part: str, about: dict[str, Any]) -> str:
     row, must = "| `{}`{} | {} | {} |\n", about.get("required", [])
     meaning = _meanings(part)
     return "".join(
-        row.format(key, " (must)" * (key in must), _value(of), of.get("description") or meaning(key))
+        row.format(key, " (required)" * (key in must), _value(of), of.get("description") or meaning(key))
         for key, of in about.get("properties", {}).items()
     )
 

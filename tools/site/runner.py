@@ -40,8 +40,10 @@ def show(block: dict[str, str], names: dict[str, Any]) -> dict[str, Any]:
         with redirect_stdout(out):
             value = run(text, names)
         html = value._repr_html_() if hasattr(value, "_repr_html_") else None
-        said = "" if value is None or html else f"{value}\n"
-        return {"text": out.getvalue() + said, "html": html, "pictures": pictures()}
+        said = "" if value is None or html or hasattr(value, "savefig") else f"{value}\n"
+        return {"text": out.getvalue() + said, "html": html, "pictures": pictures(value)}
+    if language == "markdown":
+        return {"text": "", "html": None, "pictures": []}
     done = subprocess.run(["bash", "-euo", "pipefail", "-c", text], stdout=-1, stderr=-2, text=True)
     if done.returncode:
         sys.exit(f"{text}\n{done.stdout}\nthis block ended with code {done.returncode}")
@@ -56,13 +58,14 @@ def run(text: str, names: dict[str, Any]) -> Any:
     return eval(compile(ast.Expression(last.value), place, "eval"), names) if last else None
 
 
-def pictures() -> list[str]:
-    """The figures of matplotlib that are open, which are closed then."""
+def pictures(value: Any) -> list[str]:
+    """A value that is a figure of matplotlib, and the figures that are open, which are closed then."""
     plots = sys.modules.get("matplotlib.pyplot")
+    figures = [plots.figure(number) for number in plots.get_fignums()] if plots else []
     made = []
-    for number in plots.get_fignums() if plots else ():
+    for figure in dict.fromkeys([*figures, *([value] if hasattr(value, "savefig") else [])]):
         file = io.BytesIO()
-        plots.figure(number).savefig(file, format="png", dpi=110, bbox_inches="tight")
+        figure.savefig(file, format="png", dpi=110, bbox_inches="tight")
         made.append(base64.b64encode(file.getvalue()).decode())
     if plots:
         plots.close("all")
