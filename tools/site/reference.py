@@ -50,14 +50,13 @@ def python_pages() -> Pages:
         names = public(module)
         if not names:
             continue
-        path = module.path
+        path, own = module.path, f"reference/python/{module.path}.md"
+        pages[own] = f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
         index += f"| [`{path}`]({path}.md) | {first_line(module)} |\n"
-        text = f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
         for name, thing in names.items():
             page = home.setdefault(thing.path, f"{path}.{name}")
-            text += f"| [`{name}`]({page}.md) | {first_line(thing)} |\n"
+            pages[own] += f"| [`{name}`]({page}.md) | {first_line(thing)} |\n"
             pages[f"reference/python/{page}.md"] = f"# {page}\n\n::: {thing.path}\n"
-        pages[f"reference/python/{path}.md"] = text
     return {"reference/python/index.md": index, **pages}
 
 
