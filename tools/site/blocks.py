@@ -1,7 +1,8 @@
-"""The code blocks of pages: found, run beside each other in folders of their own, and shown with their output.
+"""The code blocks of pages: found, run in folders of their own, and shown with their output.
 
 A block ```python or ```sh is run, after those before it on its page. One whose title begins with "Not run"
-is not, and its title says so to the reader. Another title names a file: a block of any language is written to it, and not run.
+is not, and its title says so to the reader. Another title names a file: a block of any language is written to
+it, and not run.
 """
 
 import base64
@@ -30,7 +31,10 @@ Shown = list[dict[str, Any]]
 
 def blocks_of(text: str) -> Blocks:
     """The blocks of a page in order, but those that are not run and name no file."""
-    found = [dict(zip(("language", "title", "text"), match.groups(""), strict=True)) for match in FENCE.finditer(text)]
+    found = [
+        dict(zip(("language", "title", "text"), match.groups(""), strict=True))
+        for match in FENCE.finditer(text)
+    ]
     return [each for each in found if is_run(each)]
 
 
@@ -38,7 +42,9 @@ def is_run(block: dict[str, str]) -> bool:
     """Whether a block is run, or written to a file."""
     if not block["language"]:
         raise PluginError(f"a block has no language (python, sh, yaml, text, ...):\n{block['text']}")
-    return not block["title"].startswith("Not run") and (block["language"] in ("python", "sh") or bool(block["title"]))
+    return not block["title"].startswith("Not run") and (
+        block["language"] in ("python", "sh") or bool(block["title"])
+    )
 
 
 def cells_of(text: str) -> tuple[str, Blocks]:
@@ -48,13 +54,15 @@ def cells_of(text: str) -> tuple[str, Blocks]:
     for mark, cell in zip(rest[::2], rest[1::2], strict=True):
         words = "markdown" in mark
         cell = re.sub("^# ?", "", cell, flags=re.MULTILINE) if words else cell
-        cells.append({"language": "markdown" if words else "python", "title": "", "text": cell.strip() + "\n"})
+        cells.append(
+            {"language": "markdown" if words else "python", "title": "", "text": cell.strip() + "\n"}
+        )
     about = re.search(r'^(?:# |""")(.*)', cells[0]["text"])
     return (about.group(1).rstrip(".") if about else ""), cells
 
 
 def run_all(sources: dict[str, Blocks]) -> dict[str, Shown]:
-    """What the blocks of each source show. What was run before with the same code is kept in `build/shown`."""
+    """What the blocks of each source show. Blocks that ran with this code before are in `build/shown`."""
     code = hashlib.sha256(RUNNER.read_bytes())
     for path in sorted([*(ROOT / "finlab").rglob("*.[pch]*"), *(ROOT / "layouts").iterdir()]):
         if path.suffix in (".py", ".c", ".h", ".yaml", ".csv"):
@@ -103,11 +111,18 @@ def output(shown: dict[str, Any]) -> str:
     lines = [*lines[: LONGEST - 10], "...", *lines[-9:]] if len(lines) > LONGEST else lines
     parts = ["```{ .text .output }\n" + "\n".join(lines) + "\n```"] if lines else []
     parts += [f'<div class="output">{shown["html"]}</div>'] if shown["html"] else []
-    parts += [f'<img class="output" alt="what it draws" src="data:image/png;base64,{data}">' for data in shown["pictures"]]
+    parts += [
+        f'<img class="output" alt="what it draws" src="data:image/png;base64,{data}">'
+        for data in shown["pictures"]
+    ]
     return "".join(f"\n{part}\n" for part in parts)
 
 
 def picture(shown: Shown) -> bytes | None:
     """The last picture of an example."""
-    found = [data for each in shown for data in (*re.findall(r"base64,([\w+/=]+)", each["html"] or ""), *each["pictures"])]
+    found = [
+        data
+        for each in shown
+        for data in (*re.findall(r"base64,([\w+/=]+)", each["html"] or ""), *each["pictures"])
+    ]
     return base64.b64decode(found[-1]) if found else None

@@ -25,7 +25,10 @@ _shown: dict[str, blocks.Shown] = {}
 
 def on_files(files: Files, config: Any) -> Files:
     """Run all blocks and examples, and add the pages that are made of code."""
-    examples = {f"examples/{path.name}": path.read_text() for path in sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))}
+    examples = {
+        f"examples/{path.name}": path.read_text()
+        for path in sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))
+    }
     pages = {file.src_uri: blocks.blocks_of(file.content_string) for file in files.documentation_pages()}
     cells = {name: blocks.cells_of(text)[1] for name, text in examples.items()}
     _shown.update(blocks.run_all(cells | {f"docs/{name}": page for name, page in pages.items()}))
@@ -45,7 +48,8 @@ def on_files(files: Files, config: Any) -> Files:
 def gallery(examples: dict[str, str]) -> dict[str, str | bytes]:
     """A page for each example, with what it shows, and one of all."""
     made: dict[str, str | bytes] = {}
-    index = "# Gallery\n\nThe files of `examples`, run when this site was built.\n\n<div class=\"grid cards gallery\" markdown>\n\n"
+    index = "# Gallery\n\nThe files of `examples`, run when this site was built.\n\n"
+    index += '<div class="grid cards gallery" markdown>\n\n'
     for name, text in examples.items():
         stem, (title, cells), shown = Path(name).stem, blocks.cells_of(text), _shown[name]
         page = "" if cells[0]["language"] == "markdown" else f"# {title}\n"
@@ -106,5 +110,7 @@ def on_post_build(config: Any) -> None:
     if (weight := sum((site / name).stat().st_size for name in loaded)) > 1_000_000:
         raise PluginError(f"the first page loads {weight} bytes, more than a megabyte: {sorted(loaded)}")
     for page in site.rglob("*.html"):
-        if found := re.search(r'<(?:script|link|img)[^>]*(?:src|href)="(?:https?:)?//[^"]*"', page.read_text()):
+        if found := re.search(
+            r'<(?:script|link|img)[^>]*(?:src|href)="(?:https?:)?//[^"]*"', page.read_text()
+        ):
             raise PluginError(f"{page}: loads from elsewhere: {found.group()}")

@@ -16,6 +16,7 @@ from finlab.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 Pages = dict[str, str]
+HEAD = "| key | value | |\n|---|---|---|\n"
 
 
 @cache
@@ -36,7 +37,9 @@ def first_line(thing: Any) -> str:
 def public(module: Any) -> dict[str, Any]:
     """What a package offers, by name: what it imports as its own name, or lists in `__all__`."""
     found = {name: module.members[name] for name in map(str, module.exports or ())}
-    for home, name in re.findall(r"^ *from finlab\.([\w.]+) import (\w+) as \2$", module.filepath.read_text(), re.MULTILINE):
+    for home, name in re.findall(
+        r"^ *from finlab\.([\w.]+) import (\w+) as \2$", module.filepath.read_text(), re.MULTILINE
+    ):
         found[name] = package()[f"{home}.{name}"]  # a module may have the name of what stands in it
     return {name: each.final_target if each.is_alias else each for name, each in sorted(found.items())}
 
@@ -51,7 +54,9 @@ def python_pages() -> Pages:
         if not names:
             continue
         path, own = module.path, f"reference/python/{module.path}.md"
-        pages[own] = f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
+        pages[own] = (
+            f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
+        )
         index += f"| [`{path}`]({path}.md) | {first_line(module)} |\n"
         for name, thing in names.items():
             page = home.setdefault(thing.path, f"{path}.{name}")
@@ -97,9 +102,9 @@ def format_pages() -> Pages:
     pages = {}
     for name in ("layout", "graph"):
         schema = json.loads((ROOT / f"finlab/layout/{name}.schema.json").read_text())
-        text = f"# The {name} file\n\nMade of its JSON Schema, which an editor can check a file with: `finlab/layout/{name}.schema.json`.\n"
+        text = f"# The {name} file\n\nMade of its JSON Schema, `finlab/layout/{name}.schema.json`.\n"
         pages[f"reference/formats/{name}-file.md"] = text + "".join(
-            f"\n## {part}\n\n{about.get('description', '')}\n\n| key | value | |\n|---|---|---|\n{_keys(part, about)}"
+            f"\n## {part}\n\n{about.get('description', '')}\n\n{HEAD}{_keys(part, about)}"
             for part, about in schema["$defs"].items()
         )
     return pages
@@ -117,7 +122,9 @@ def _keys(part: str, about: dict[str, Any]) -> str:
 def _meanings(part: str) -> Any:
     """From a key to what the class of that name says of it; a key has its unit behind the name."""
     said = classes(package()).get(part, {})
-    return lambda key: next((said[name] for name in sorted(said, key=len, reverse=True) if key.startswith(name)), "")
+    return lambda key: next(
+        (said[name] for name in sorted(said, key=len, reverse=True) if key.startswith(name)), ""
+    )
 
 
 @cache
@@ -153,10 +160,12 @@ def _value(of: dict[str, Any]) -> str:
 
 def robots_page() -> Pages:
     """The robots that come along, with their files."""
-    text = "# Robots that come along\n\n`finlab.load_layout(NAME)`, or NAME where a command asks for a layout.\n"
+    text = (
+        "# Robots that come along\n\n`finlab.load_layout(NAME)`, or NAME where a command asks for a layout.\n"
+    )
     for path in sorted((ROOT / "layouts").glob("*.yaml")):
         source = path.read_text(encoding="utf-8")
         about = str(yaml.safe_load(source).get("description") or "").strip()
-        text += f"\n## {path.stem}\n\n{about}\n\n??? note \"layouts/{path.name}\"\n\n    ```yaml\n"
+        text += f'\n## {path.stem}\n\n{about}\n\n??? note "layouts/{path.name}"\n\n    ```yaml\n'
         text += "".join(f"    {line}\n" for line in source.splitlines()) + "    ```\n"
     return {"reference/robots.md": text}

@@ -1,8 +1,8 @@
 """Run the blocks of a page, or the cells of an example, in one process and one folder, as a reader would.
 
 From JSON on standard input, [{"language", "title", "text"}], to JSON on standard output: what each block
-showed, {"text", "html", "pictures"}, pictures as PNG in base64. A block with a title is written to the file of
-that name instead. A block that fails ends everything with its traceback.
+showed, {"text", "html", "pictures"}, pictures as PNG in base64. A block with a title is written to the file
+of that name instead. A block that fails ends everything with its traceback.
 """
 
 import ast
