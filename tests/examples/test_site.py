@@ -22,7 +22,8 @@ def site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 
 def test_blocks_share_names_and_files_and_show_what_they_print(site: Any) -> None:
     page = '```text title="a.txt"\nhello\n```\n```python\nx = open("a.txt").read()\n```\n'
-    page += '```sh\nwc -l a.txt\n```\n'```sh title="Not run here"\nexit 1\n```\n```python\nx.strip()\n```\n'
+    page += "```sh\nwc -l a.txt\n```\n"
+    page += '```sh title="Not run here"\nexit 1\n```\n```python\nx.strip()\n```\n'
     found = site.blocks_of(page)
     shown = site._run("docs/page.md", found, "")
     assert [each["text"].strip() for each in shown] == ["", "", "1 a.txt", "hello"]
