@@ -9,7 +9,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels sdist wheel-check clean
+.PHONY: docs schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -23,6 +23,7 @@ help:
 	@echo "make check        ruff, ruff format and mypy"
 	@echo "make schemas      write the JSON Schema of layout files"
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
+	@echo "make docs         the site in build/site: runs every block and example, and checks every link"
 	@echo "make format       let ruff correct what it can"
 	@echo "make checkpoint   train the network that is shipped (hours)"
 	@echo "make wheels       build the wheels of Linux, macOS and Windows; make sdist the sources"
@@ -77,6 +78,9 @@ figures: setup
 
 schemas: setup
 	$(BIN)/python tools/schemas.py
+
+docs: setup
+	NO_MKDOCS_2_WARNING=1 $(THREADS) $(BIN)/python -m mkdocs build --strict --quiet
 
 format: setup
 	$(BIN)/ruff check --fix .

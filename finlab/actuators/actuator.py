@@ -3,7 +3,7 @@
 A kind is a frozen dataclass, a subclass of `Actuator`, whose fields are what a layout file says of one. It
 declares facts (class variables), its law and its answer to a price among them, and overrides what is not as
 usual. One line in `finlab.actuators.kinds` makes it known to all of finlab;
-`docs/actuators.md` makes one in thirty lines.
+`docs/howto/kind.md` makes one in thirty lines.
 
 Own frames are right-handed, their rows in the body frame. A command is a row of three numbers, of which a
 kind may use fewer; what it does not have is 0.

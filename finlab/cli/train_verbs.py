@@ -114,7 +114,7 @@ def interaction(
 
     Args:
         data: NPZ file of `finlab data interaction`, or a folder with a layout file and a CSV file of the same
-            name for each robot (docs/interaction.md).
+            name for each robot (docs/tutorials/tank.md).
         output: folder for the network, log, curves and state.
         seed: of the first weights and the order of the data.
         steps: optimizer steps.

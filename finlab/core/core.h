@@ -3,7 +3,7 @@
 
    A target wrench w is met at least power by prices l: each actuator answers the price B'l of its own
    directions with the force that is worth most there, and Newton's method finds the prices at which the
-   answers add up to w. docs/method.md has the mathematics. */
+   answers add up to w. docs/theory/method.md has the mathematics. */
 #ifndef FINLAB_CORE_H
 #define FINLAB_CORE_H
 

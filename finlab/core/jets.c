@@ -1,4 +1,4 @@
-/* What jets take from forces by a formula of eight constants, and what speed takes; docs/interaction.md has both. */
+/* What jets take from forces by a formula of eight constants, and what speed takes; docs/theory/interaction.md has both. */
 #include "inner.h"
 
 /* Numbers of a robot: a `water`, then an `outlet` for each of its n actuators. */

@@ -1,4 +1,4 @@
-"""The kind of actuator that docs/actuators.md makes: all of finlab takes it, and only that page knows it."""
+"""The kind of actuator that docs/howto/kind.md makes: all of finlab takes it, and only that page knows it."""
 
 import importlib
 import json
@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with the page's block as the module `water_jet`, which is imported and known."""
     folder = tmp_path_factory.mktemp("kind")
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/actuators.md").read_text(), re.DOTALL)
+    blocks = re.findall(r"```python.*?\n(.*?)```", (ROOT / "docs/howto/kind.md").read_text(), re.DOTALL)
     (folder / "water_jet.py").write_text(next(block for block in blocks if "class WaterJet" in block))
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))

@@ -91,7 +91,7 @@ def numbers(path: Path) -> dict[str, object]:
 
 
 def test_the_page_has_every_number_with_a_reason() -> None:
-    rows = ROW.findall((ROOT / "docs" / "method.md").read_text())
+    rows = ROW.findall((ROOT / "docs" / "theory" / "method.md").read_text())
     told = {(where, name): ast.literal_eval(value) for name, value, where, _ in rows}
     known = {
         (str(path.relative_to(ROOT)), name): value for path in FILES for name, value in numbers(path).items()

@@ -1,4 +1,4 @@
-"""The formula of jets as docs/interaction.md has it, one pair after the other: an oracle for the core's."""
+"""The formula of jets of docs/theory/interaction.md, one pair after the other: an oracle for the core."""
 
 import numpy as np
 

@@ -106,7 +106,20 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
     assert about["Name"] == NAME == PROJECT["name"]
     required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert {normal(Requirement(line).name) for line in required} == CORE
-    extras = {"train", "plot", "app", "ipopt", "bench", "xacro", "cluster", "logs", "all", "test", "dev"}
+    extras = {
+        "train",
+        "plot",
+        "app",
+        "ipopt",
+        "bench",
+        "xacro",
+        "cluster",
+        "logs",
+        "docs",
+        "all",
+        "test",
+        "dev",
+    }
     assert extras == set(about.get_all("Provides-Extra", []))
     assert set(EXTRAS.values()) <= extras
 
