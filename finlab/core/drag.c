@@ -5,7 +5,7 @@
    Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper. */
 #include "inner.h"
 
-#define TRUST (R(3) / ROUNDS)        /* of its range that a foil turns in a step: all together may cross it thrice */
+#define TRUST (R(3.0) / ROUNDS)      /* of its range that a foil turns in a step: all together may cross it thrice */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
 

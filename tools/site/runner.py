@@ -14,6 +14,7 @@ import subprocess
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 
@@ -22,9 +23,8 @@ def main(source: str) -> None:
     real = os.dup(1)
     os.dup2(2, 1)  # what is printed past Python, too, must not mix with the JSON
     sys.path[0] = ""
-    names: dict[str, Any] = {"__name__": "__main__", "__file__": source}
-    sys.argv = [source]
-    shown = [show(block, names) for block in json.load(sys.stdin)]
+    sys.argv, sys.modules["__main__"] = [source], ModuleType("__main__")
+    shown = [show(block, vars(sys.modules["__main__"])) for block in json.load(sys.stdin)]
     os.write(real, json.dumps(shown).encode())
 
 
@@ -52,7 +52,7 @@ def show(block: dict[str, str], names: dict[str, Any]) -> dict[str, Any]:
 
 def run(text: str, names: dict[str, Any]) -> Any:
     """Run Python code; the value of its last expression, as in a notebook, None without one."""
-    tree, place = ast.parse(text), f"<{names['__file__']}>"
+    tree, place = ast.parse(text), f"<{sys.argv[0]}>"
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     exec(compile(tree, place, "exec"), names)
     return eval(compile(ast.Expression(last.value), place, "eval"), names) if last else None
