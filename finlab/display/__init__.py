@@ -1,1 +1,1 @@
-"""How values show themselves: as text, as HTML in notebooks, and as pictures by matplotlib (extra `plot`)."""
+"""Values as text, as HTML in notebooks and pictures by matplotlib (extra `plot`)."""

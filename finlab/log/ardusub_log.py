@@ -50,21 +50,21 @@ def read_dataflash(path: Path) -> Recorded:
     if throttle is None and "CTUN" in tables:
         throttle = Series.of(tables["CTUN"]["TimeUS"] * 1e-6, tables["CTUN"]["ThO"][:, None]).at(time)[:, 0]
     heave = np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
-    found = Recorded("ardusub", Series(time, np.empty((len(time), 6))))
-    forward, lateral = (_of_pilot(found, tables, parameters, time, *each) for each in _STICKS)
+    record = Recorded("ardusub", Series(time, np.empty((len(time), 6))))
+    forward, lateral = (_of_pilot(record, tables, parameters, time, *each) for each in _STICKS)
     setpoints = [forward, -lateral, heave, rate["ROut"], -rate["POut"], -rate["YOut"]]
-    found.demand = Series.of(time, np.stack(setpoints, axis=1))
-    _outputs(found, tables, parameters)
-    _geometry(found, parameters, path)
+    record.demand = Series.of(time, np.stack(setpoints, axis=1))
+    _outputs(record, tables, parameters)
+    _geometry(record, parameters, path)
     if "MSG" in tables:
         said = zip(tables["MSG"]["TimeUS"], map(_text, tables["MSG"]["Message"]), strict=True)
-        found.events += [Event(float(at) * 1e-6, words) for at, words in said if WORTH.search(words)]
+        record.events += [Event(float(at) * 1e-6, words) for at, words in said if WORTH.search(words)]
     if "ERR" in tables:
         rows = zip(*(tables["ERR"][key] for key in ("TimeUS", "Subsys", "ECode")), strict=True)
-        found.events += [
+        record.events += [
             Event(float(at) * 1e-6, f"error {code} of ArduPilot's subsystem {of}") for at, of, code in rows
         ]
-    return found
+    return record
 
 
 _STICKS = (("FORWARD", 5), ("LATERAL", 6))
@@ -105,7 +105,7 @@ def _text(value: bytes) -> str:
 
 
 def _of_pilot(
-    found: Recorded,
+    record: Recorded,
     tables: dict[str, Columns],
     parameters: dict[str, float],
     time: Array,
@@ -116,11 +116,11 @@ def _of_pilot(
     channel = int(parameters.get(f"RCMAP_{stick}", usual))
     pulses = tables.get("RCIN", {}).get(f"C{channel}")
     if pulses is None:
-        found.asks.append(
+        record.asks.append(
             f"It holds no {stick.lower()} demand: 0 is taken; log RCIN, channel {channel} (LOG_BITMASK)."
         )
         return np.zeros(len(time))
-    found.notes.append("Demands forward and lateral are the pilot's (RCIN); modes that steer them log none.")
+    record.notes.append("Demands forward and lateral are the pilot's (RCIN); modes that steer them log none.")
     least, rest, most = (
         parameters.get(f"RC{channel}_{key}", value)
         for key, value in (("MIN", 1100), ("TRIM", 1500), ("MAX", 1900))
@@ -132,14 +132,14 @@ def _of_pilot(
     return np.nan_to_num(series.at(time)[:, 0])
 
 
-def _outputs(found: Recorded, tables: dict[str, Columns], parameters: dict[str, float]) -> None:
+def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str, float]) -> None:
     """Shares of full output of the motors, as their frame says which way they push."""
     if "RCOU" not in tables:
         return
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}
     if not any(FIRST_MOTOR <= each < FIRST_MOTOR + MOTORS for each in functions):
         functions = {FIRST_MOTOR + i: i + 1 for i in range(MOTORS)}
-        found.notes.append(
+        record.notes.append(
             "It says of no output that it is a motor's (SERVOn_FUNCTION): channel n is motor n."
         )
     shares = []
@@ -150,19 +150,19 @@ def _outputs(found: Recorded, tables: dict[str, Columns], parameters: dict[str, 
         sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
         shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
     if shares:
-        found.outputs = Series.of(tables["RCOU"]["TimeUS"] * 1e-6, np.stack(shares, axis=1))
+        record.outputs = Series.of(tables["RCOU"]["TimeUS"] * 1e-6, np.stack(shares, axis=1))
 
 
-def _geometry(found: Recorded, parameters: dict[str, float], path: Path) -> None:
+def _geometry(record: Recorded, parameters: dict[str, float], path: Path) -> None:
     """The robot by its frame, whose arms and newtons nothing says."""
     exchange = Exchange()
     lines = [f"{name} {value:g}" for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))]
     try:
-        found.layout = read_parameters_of_ardusub("\n".join(lines), path.stem[:64] or "ardusub", exchange)
+        record.layout = read_parameters_of_ardusub("\n".join(lines), path.stem[:64] or "ardusub", exchange)
     except LayoutError as error:
-        found.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+        record.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
         return
-    found.taken += exchange.notes
-    found.lacking.append(
+    record.taken += exchange.notes
+    record.lacking.append(
         "A frame of ArduSub has no arms and no newtons: guesses are taken; name the robot by --robot LAYOUT."
     )

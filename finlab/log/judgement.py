@@ -1,4 +1,4 @@
-"""What is said of a log, as plain data."""
+"""The judgement of a log, as plain data."""
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any

@@ -11,7 +11,7 @@ from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import FinlabError
-from finlab.layout import Layout, Thruster
+from finlab.layout import Layout
 from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log
 from finlab.log.replay import Replay, demands_of, replay, six
@@ -50,9 +50,9 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         DataError: a table of forces cannot be read.
     """
     scale, span, notes = yardstick(log.robot), log.span, [*log.notes]
-    given, full, ended, watts = _given(log)
+    delivered, full, ended, watts = _given(log)
     demand, counts = np.nan_to_num(log.demand), np.isfinite(log.demand)
-    away = np.where(counts, demand - given, 0.0)
+    away = np.where(counts, demand - delivered, 0.0)
     at = full | ended
     missing = np.where(_bound(log, at)[:, None], away, 0.0)
     lost = np.abs(missing) > LOST * scale
@@ -83,14 +83,14 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         watts=watts,
         axis=axis,
         spells=tuple(
-            _spell(log, scale, rows, given, missing, lost, full, ended)
+            _spell(log, scale, rows, delivered, missing, lost, full, ended)
             for rows in sorted(told[:MOST_SPELLS], key=lambda rows: rows.start)
         ),
         n_spells=len(spells),
         replays=tuple(replays),
         held_by=None if axis is None else _held(replays, AXES.index(axis), impulse, scale),
         improved=improved,
-        timeline=_timeline(log, given, missing, at),
+        timeline=_timeline(log, delivered, missing, at),
         events=tuple((event.time, _words(log, event.actuator, event.words)) for event in log.events),
         notes=tuple(notes),
         asks=log.asks,
@@ -107,13 +107,13 @@ def _given(log: Log) -> tuple[Array, Flags, Flags, float | None]:
     if (command := log.command) is None:
         method = "dual" if log.form == "ros" else log.form
         command = Allocator(robot, method).allocate_batch(log.demand).command
-    plant, given, watts = plant_of(robot), np.empty((n, 6)), 0.0
+    plant, delivered, watts = plant_of(robot), np.empty((n, 6)), 0.0
     for k in range(0, n, CHUNK):
         rows = slice(k, k + CHUNK)
-        given[rows] = plant.wrench(command[rows])
+        delivered[rows] = plant.wrench(command[rows])
         watts += float(log.span[rows] @ judged_power(plant, command[rows]))
     mean = None if log.command is None else watts / float(log.span.sum())
-    return given, *at_limits(robot, command), mean
+    return delivered, *at_limits(robot, command), mean
 
 
 def _bound(log: Log, at: Flags) -> Flags:
@@ -123,9 +123,7 @@ def _bound(log: Log, at: Flags) -> Flags:
         return np.asarray(log.unmet.any(axis=1))
     if log.command is None:
         return np.asarray(at.any(axis=1))
-    ends = np.array(
-        [0.0 in part.force if isinstance(part, Thruster) else False for part in log.robot.actuators]
-    )
+    ends = (log.robot.lower[:, 0] == 0.0) | (log.robot.upper[:, 0] == 0.0)
     rests = (log.command[..., 0] == 0.0) & ends
     stopped = np.isnan(log.command).any(axis=-1)
     return np.asarray((at | rests | stopped).any(axis=1))
@@ -183,7 +181,14 @@ def _spells(log: Log, missing: Array, lost: Flags) -> Iterator[slice]:
 
 
 def _spell(
-    log: Log, scale: Array, rows: slice, given: Array, missing: Array, lost: Flags, full: Flags, ended: Flags
+    log: Log,
+    scale: Array,
+    rows: slice,
+    delivered: Array,
+    missing: Array,
+    lost: Flags,
+    full: Flags,
+    ended: Flags,
 ) -> Spell:
     span, some = log.span[rows], np.asarray(lost[rows].any(axis=1))
     return Spell(
@@ -192,16 +197,16 @@ def _spell(
         axes=tuple(axis for axis, one in zip(AXES, np.any(lost[rows], axis=0), strict=True) if one),
         missing=six(span @ np.abs(missing[rows]), scale),
         asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
-        gave=six(span @ given[rows] / span.sum(), scale),
+        gave=six(span @ delivered[rows] / span.sum(), scale),
         limits=limit_words(log.robot, *(np.any(flags[rows][some], axis=0) for flags in (full, ended))),
     )
 
 
-def _timeline(log: Log, given: Array, missing: Array, at: Flags) -> Timeline:
+def _timeline(log: Log, delivered: Array, missing: Array, at: Flags) -> Timeline:
     """Means over pieces of the log."""
     starts = np.unique(np.linspace(0, len(log), BINS, endpoint=False).astype(np.intp))
     held = np.add.reduceat(log.span, starts)[:, None]
-    columns = (np.nan_to_num(log.demand), given, missing, at.astype(np.float64))
+    columns = (np.nan_to_num(log.demand), delivered, missing, at.astype(np.float64))
     means = [np.add.reduceat(log.span[:, None] * each, starts) / held for each in columns]
     return Timeline(log.time[starts], *means)
 

@@ -50,34 +50,34 @@ def read_ulog(path: Path) -> Recorded:
 
     thrust, torque = (series(name, "xyz[0]", "xyz[1]", "xyz[2]") for name in TOPICS[:2])
     both = np.hstack([thrust.at(torque.time), torque.values]) * FLU
-    found = Recorded("px4", Series.of(torque.time, both))
+    record = Recorded("px4", Series.of(torque.time, both))
     if "actuator_motors" in topics:
         names = [f"control[{i}]" for i in range(MOTORS)]
-        found.outputs = series("actuator_motors", *(n for n in names if n in topics["actuator_motors"]))
+        record.outputs = series("actuator_motors", *(n for n in names if n in topics["actuator_motors"]))
     elif "actuator_outputs" in topics:
-        found.outputs = _by_pulses(series, parameters)
+        record.outputs = _by_pulses(series, parameters)
     if "control_allocator_status" in topics:
         names = [f"unallocated_{kind}[{i}]" for kind in ("thrust", "torque") for i in range(3)]
         unmet = series("control_allocator_status", *names)
-        found.unmet = Series(unmet.time, unmet.values * FLU)
+        record.unmet = Series(unmet.time, unmet.values * FLU)
     if log.file_corruption:
-        found.notes.append("The file is damaged; what could be read was read.")
+        record.notes.append("The file is damaged; what could be read was read.")
     if lost := sum(drop.duration for drop in log.dropouts):
-        found.notes.append(f"PX4 says that {lost / 1000:.1f} s are missing from the log.")
-    found.events += [
+        record.notes.append(f"PX4 says that {lost / 1000:.1f} s are missing from the log.")
+    record.events += [
         Event((each.timestamp - begin) * 1e-6, each.message)
         for each in log.logged_messages
         if each.log_level <= WARNING
     ]
     if "failure_detector_status" in topics:
         mask = series("failure_detector_status", "motor_failure_mask")
-        found.events += changes(mask.time, _bits(mask), "failed, says PX4", "works again, says PX4")
+        record.events += changes(mask.time, _bits(mask), "failed, says PX4", "works again, says PX4")
     if "esc_status" in topics:
         online = series("esc_status", "esc_online_flags", "esc_count")
         known = np.arange(MOTORS) < online.values[:, 1:]
-        found.events += changes(online.time, known & ~_bits(online), "has an ESC offline", "is online again")
-    _geometry(found, parameters, path)
-    return found
+        record.events += changes(online.time, known & ~_bits(online), "has an ESC offline", "is online again")
+    _geometry(record, parameters, path)
+    return record
 
 
 def _columns(data: dict[str, Any], fields: tuple[str, ...]) -> Array:
@@ -112,19 +112,19 @@ def _by_pulses(series: Any, parameters: dict[str, Any]) -> Series | None:
 _ENDS = (("MIN", 1000.0), ("MAX", 2000.0))
 
 
-def _geometry(found: Recorded, parameters: dict[str, Any], path: Path) -> None:
+def _geometry(record: Recorded, parameters: dict[str, Any], path: Path) -> None:
     """The robot by CA_ROTOR*."""
     lines = [f"{name} {value}" for name, value in parameters.items() if name.startswith("CA_")]
     exchange = Exchange()
     try:
-        found.layout = read_px4("\n".join(lines), path.stem[:64] or "px4", exchange)
+        record.layout = read_px4("\n".join(lines), path.stem[:64] or "px4", exchange)
     except LayoutError as error:
-        found.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+        record.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
         return
-    found.taken += exchange.notes
-    sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(found.layout.n)]
+    record.taken += exchange.notes
+    sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(record.layout.n)]
     if set(sizes) == {TOY}:
-        found.lacking.append(
+        record.lacking.append(
             f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "
             "robot by --robot LAYOUT."
         )

@@ -91,7 +91,7 @@ def read_log(
     """
     place = Path(path)
     try:
-        found = _recorded(place, demand, outputs)
+        record = _recorded(place, demand, outputs)
     except ModuleNotFoundError as error:
         raise DataError(f"{place}: {error.name} is not installed; run: {install('logs')}") from None
     except FinlabError:
@@ -102,15 +102,15 @@ def read_log(
             f"{place}: cannot be read as a log ({why}); it is damaged or of an unknown version"
         ) from None
     layout = load_layout(robot) if isinstance(robot, str) else robot
-    known = layout or found.layout
+    known = layout or record.layout
     if known is None:
-        raise DataError(f"{place}: {found.lacking[0]}")
+        raise DataError(f"{place}: {record.lacking[0]}")
     sides = np.ones(known.n)
     if layout is None:
-        found.notes, found.asks = found.notes + found.taken, found.lacking + found.asks
-    elif found.layout is not None:
-        sides = _sides(found.layout, layout)
-    return _posed(place.name, found, known, sides, scale)
+        record.notes, record.asks = record.notes + record.taken, record.lacking + record.asks
+    elif record.layout is not None:
+        sides = _sides(record.layout, layout)
+    return _posed(place.name, record, known, sides, scale)
 
 
 def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
@@ -153,17 +153,17 @@ def unit_of(form: Form, robot: Layout) -> Array:
     return kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit
 
 
-def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: ArrayLike | None) -> Log:
+def _posed(source: str, record: Recorded, robot: Layout, sides: Array, scale: ArrayLike | None) -> Log:
     """The log in the robot's newtons, at the times of its outputs, or else of what says what was left."""
-    unit = unit_of(found.form, robot) if scale is None else _scale(scale)
-    time = (found.outputs or found.unmet or found.demand).time
-    demand = found.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
-    command = None if found.outputs is None else commands_of(found, found.outputs.values, robot, sides)
+    unit = unit_of(record.form, robot) if scale is None else _scale(scale)
+    time = (record.outputs or record.unmet or record.demand).time
+    demand = record.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
+    command = None if record.outputs is None else commands_of(record, record.outputs.values, robot, sides)
     unmet = None
-    if command is None and found.unmet is not None:
-        unmet = np.nan_to_num(found.unmet.values * np.abs(unit), posinf=0.0, neginf=0.0)
+    if command is None and record.unmet is not None:
+        unmet = np.nan_to_num(record.unmet.values * np.abs(unit), posinf=0.0, neginf=0.0)
     kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MOST_FORCE).any(axis=1)
-    notes, asks = [*found.notes], [*found.asks]
+    notes, asks = [*record.notes], [*record.asks]
     if command is not None:
         idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
         kept &= ~idle
@@ -185,14 +185,14 @@ def _posed(source: str, found: Recorded, robot: Layout, sides: Array, scale: Arr
         notes.append(f"No thruster drives {', '.join(undriven)}; what was asked there is not judged.")
     return Log(
         source=source,
-        form=found.form,
+        form=record.form,
         robot=robot,
         time=time[kept],
         span=np.minimum(step, GAP_S)[kept],
         demand=demand[kept],
         command=None if command is None else command[kept],
         unmet=None if unmet is None else unmet[kept],
-        events=tuple(sorted(found.events, key=lambda event: event.time)),
+        events=tuple(sorted(record.events, key=lambda event: event.time)),
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
@@ -210,13 +210,13 @@ def _scale(scale: ArrayLike) -> Array:
     return values
 
 
-def commands_of(found: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
+def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
     """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
     n, k = robot.n, outputs.shape[1]
-    if not found.of_shares and k == 3 * n:
+    if not record.of_shares and k == 3 * n:
         return np.asarray(outputs.reshape(-1, n, 3))
-    if k < n or (k != n and found.form == "ros"):
-        thrice = "" if found.of_shares else f" or {3 * n}"
+    if k < n or (k != n and record.form == "ros"):
+        thrice = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
             f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not {n}{thrice}"
         )
@@ -224,10 +224,10 @@ def commands_of(found: Recorded, outputs: Array, robot: Layout, sides: Array) ->
     values = outputs[:, :n] * sides
     command = np.zeros((len(values), n, 3))
     low, high = robot.lower[:, 0], robot.upper[:, 0]
-    command[..., 0] = np.where(values < 0.0, -values * low, values * high) if found.of_shares else values
+    command[..., 0] = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
     for i, part in enumerate(robot.actuators):
         model = getattr(part, "model", None)
-        if found.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
+        if record.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
             pulse, force, _ = model.columns
             command[:, i, 0] = np.interp(REST_US + FULL_US * values[:, i], pulse, force)
     command[..., 0] = np.clip(command[..., 0], low, high)

@@ -86,14 +86,14 @@ def replay(
     """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both autopilots'
     methods where they take the robot; of a robot that is not `improved` with each actuator lost, too."""
     scale = yardstick(robot)
-    whole = demands_of(wrench, span, scale, MOST)
-    rough = demands_of(whole.wrench, whole.span, scale, MOST_LOST)
+    intact = demands_of(wrench, span, scale, MOST)
+    rough = demands_of(intact.wrench, intact.span, scale, MOST_LOST)
     asked = [("dual", policy) for policy in policies]
     asked += [(name, CLOSEST) for name in ("px4", "ardusub") if method_class(name).fits(robot)]
     made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in asked)}
     gone = [] if improved or robot.n == 1 else robot.names
     for lost in (None, *gone):
-        demands = whole if lost is None else rough
+        demands = intact if lost is None else rough
         for name, policy in asked:
             answer = made[name].allocate_batch(
                 demands.wrench, lost=() if lost is None else (lost,), policy=policy

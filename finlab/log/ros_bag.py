@@ -55,11 +55,11 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
                     for each in message.status
                     if each.level >= WARNING
                 ]
-    found = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
-    found.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
+    record = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
+    record.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
     if sent is not None and rows["outputs"]:
-        found.outputs, found.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
-    return found
+        record.outputs, record.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
+    return record
 
 
 def _topic(
