@@ -107,7 +107,8 @@ def parse_layout(
 def check_version(data: Any, form: str, *versions: int) -> None:
     """Refuses files of another format or version, in which unknown keys are not the news."""
     if not isinstance(data, Mapping):
-        raise LayoutError(f"expected keys and values, got {shown(data)}")
+        other = "finlab layout convert reads those of other programs"
+        raise LayoutError(f"expected a file of keys and values, got {shown(data)}; {other}")
     if data.get("format", form) != form:
         raise LayoutError(f"expected {form}, got {shown(data['format'])}", "format")
     version = data.get("version", versions[0])

@@ -152,8 +152,8 @@ HOSTILE = {
     "syntax": ("fins: [1, 2\nname: x\n", "is not valid YAML: line 2"),
     "control": ("name: \x07\n", "is not valid YAML"),
     "two_documents": ("a: 1\n---\nb: 2\n", "is not valid YAML"),
-    "empty": ("", "expected keys and values"),
-    "scalar": ("just words", "expected keys and values"),
+    "empty": ("", "expected a file of keys and values"),
+    "scalar": ("just words", "finlab layout convert reads"),
     "date": ("2026-13-45", ""),
 }
 
