@@ -175,24 +175,6 @@ real farthest_along(const real *block, const fl_work *work, const real *from, co
   return size;
 }
 
-/* Of `count` robots of n actuators in planes, which a block counts and no more, how far (count,) a ray (count, 6)
-   from a point (count, 6) goes in what they push: a bound that is as `close`, the normal (count, 6) of its plane, and
-   the forces (count, n, 2) there. Their sets are given (count, n, 16): place of a polygon's corners, or 0 and radius,
-   middle, half of a sector; then the wrench per newton along both directions. */
-void fl_reach(const real *block, fl_work *work, const real *own, const real *from, const real *ray, int count,
-              real close, real *size, real *normal, real *force) {
-  for (int k = 0; k < count; k++, from += 6, ray += 6, normal += 6, force += 2 * COUNT(block)) {
-    for (int i = 0; i < COUNT(block); i++, own += 16) {
-      work->set[i] = (fl_set){.high = own[1], .middle = own[2], .half = own[3]};
-      work->corners[i] = (int)own[0];
-      set_up(block, i, work->set + i);
-      memcpy(work->column[i], own + 4, sizeof work->column[i]);
-    }
-    size[k] = farthest_along(block, work, from, ray, -R(1e30), R(1e30), close, &work->mixture, normal);
-    mixed_force(block, &work->mixture, (real(*)[2])force);
-  }
-}
-
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++)
     for (int q = 0; q < 2; q++) {

@@ -28,8 +28,8 @@ SAMPLES = 24
 """Questions of a self-test."""
 ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
-FOR_JETS = "jets.c", "turns.c"
-"""Files of the core that only robots with `interaction` need."""
+NOT_ABOARD = "jets.c", "turns.c", "reach.c"
+"""Files of the core for robots with `interaction`, and for what a layout can do."""
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
@@ -44,7 +44,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
     method = Dual(layout, DualSettings(), yardstick(layout), None)
     block = method.compiled.robot.block
     thin = thinned(block)
-    files = [path for path in Path(core.__path__[0]).glob("*.[ch]") if path.name not in FOR_JETS]
+    files = [path for path in Path(core.__path__[0]).glob("*.[ch]") if path.name not in NOT_ABOARD]
     sources = {path.name: path.read_text("utf-8") for path in files}
     sources["core.h"] = _sized(sources["core.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
+from finlab.core.calls import EACH, HEAD
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.layout import load_layout
@@ -130,7 +131,9 @@ def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
     thin = thinned(robot.block)
     assert max(sum(len(table) for _, table in row.values()) for row in tables_of(thin)) * 4 <= 4096
     assert len(thinned(thin)) <= len(thin)
-    limits = [block[59:][: 67 * int(block[3])].reshape(-1, 67)[:, 48:54] for block in (robot.block, thin)]
+    limits = [
+        block[HEAD:][: EACH * int(block[3])].reshape(-1, EACH)[:, 48:54] for block in (robot.block, thin)
+    ]
     np.testing.assert_allclose(limits[1], limits[0], rtol=2e-7)
 
 
