@@ -106,6 +106,7 @@ class Dual(Method):
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
         found = self.forces(targets, policy, self.begin(prices), previous)
+        self._reach_peaks(found, targets)
         command, aim = self.exact(found, previous), targets if found.within.all() else found.aim
         notes = {_ENDED} if found.ended else set()
         if policy.kind == "direction":
@@ -116,6 +117,18 @@ class Dual(Method):
         return Solution(
             command, None if self.unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
         )
+
+    def _reach_peaks(self, found: Found, targets: Array) -> None:
+        """Meets targets (N, 6) that take the last share of a force, which tables leave out: steps by the laws
+        lead there from what is nearest."""
+        near = np.flatnonzero(~found.within & (self._missing(found.aim, targets) <= 10.0 * CLOSE))
+        if not len(near):
+            return
+        ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
+        met = ends.error <= NEARLY
+        rows = near[met]
+        found.command[rows], found.aim[rows] = ends.command[met], targets[rows]
+        found.value[rows], found.within[rows] = 0.0, True
 
     def begin(self, prices: Array | None) -> Array | None:
         """Prices (6,) [W/N, W/(N m)] in the robot's basis (6,)."""
