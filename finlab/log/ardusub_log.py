@@ -34,7 +34,7 @@ Columns = dict[str, Any]
 def read_dataflash(path: Path) -> Recorded:
     """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
     tables = _tables(path, ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "MSG", "ERR"))
-    said = map(_text, tables["MSG"]["Message"] if "MSG" in tables else ())
+    said = [*map(_text, tables["MSG"]["Message"])] if "MSG" in tables else []
     if other := next((name for words in said if (name := VEHICLE.match(words))), None):
         raise DataError(f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known")
     if "RATE" not in tables:
@@ -63,8 +63,8 @@ def read_dataflash(path: Path) -> Recorded:
     _outputs(record, tables, parameters)
     _geometry(record, parameters, path)
     if "MSG" in tables:
-        said = zip(tables["MSG"]["TimeUS"], map(_text, tables["MSG"]["Message"]), strict=True)
-        record.events += [Event(float(at) * 1e-6, words) for at, words in said if WORTH.search(words)]
+        told = zip(tables["MSG"]["TimeUS"], said, strict=True)
+        record.events += [Event(float(at) * 1e-6, words) for at, words in told if WORTH.search(words)]
     if "ERR" in tables:
         rows = zip(*(tables["ERR"][key] for key in ("TimeUS", "Subsys", "ECode")), strict=True)
         record.events += [

@@ -157,7 +157,8 @@ def _dead(log: Log, away: Array, at: Flags) -> Flags:
     columns = np.where(counts, plant_of(log.robot).effectiveness[:, 0] / yardstick(log.robot), 0.0)
     force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
     share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
-    return rest & (share > DEAD) & bool(np.square(off - force @ columns).sum() < DEAD * size)
+    told = np.square(off - force @ columns).sum() < DEAD * size
+    return np.asarray(rest & (share > DEAD) & told)
 
 
 def _held(

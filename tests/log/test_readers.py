@@ -83,7 +83,7 @@ def test_damaged_logs_end_in_a_sentence(kind: str, request: pytest.FixtureReques
 def test_a_log_of_ardusub_that_ends_in_zeros_is_read_in_silence(
     sub: Dive, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "dive.bin").write_bytes(sub.path.read_bytes() + bytes(500))
+    (tmp_path / "dive.bin").write_bytes(sub.path.read_bytes() + bytes(2000))
     assert finlab.read_log(tmp_path / "dive.bin", sub.robot) == finlab.read_log(sub.path, sub.robot)
     assert capfd.readouterr() == ("", "")
 
