@@ -60,8 +60,12 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         if lacking := [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]:
             which = ", ".join(lacking) if len(lacking) < count else "all"
             exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
-    rotors = {key: int(own[1]) for key in values if (own := re.match(r"CA_ROTOR(\d{1,3})_", key))}
-    if beyond := sorted(key for key, rotor in rotors.items() if rotor >= count):
+    rotors = {key: own for key in values if (own := re.match(r"CA_ROTOR(\d{1,3})_(\w+)", key))}
+    if beyond := sorted(
+        key
+        for key, own in rotors.items()
+        if int(own[1]) >= count and not math.isclose(values[key], USUAL.get(own[2], 0.0), rel_tol=1e-6)
+    ):
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:
         exchange.note("CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not.")

@@ -5,9 +5,10 @@ channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 4
 (ArduSub, `AP_Motors6DOF`).
 """
 
-import io
+import os
 import re
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +26,17 @@ FIRST_MOTOR, MOTORS, CHANNELS = 33, 8, 14
 """Function of the output of motor 1, most motors, and channels of one message of outputs."""
 WORTH = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
 """Words by which a message is told."""
+VEHICLE = re.compile(r"(Ardu(?!Sub)|Blimp|AntennaTracker)\w*(?= V\d)")
+"""How a message begins by which another vehicle of ArduPilot names itself."""
 Columns = dict[str, Any]
 
 
 def read_dataflash(path: Path) -> Recorded:
     """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
     tables = _tables(path, ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "MSG", "ERR"))
+    said = [*map(_text, tables["MSG"]["Message"])] if "MSG" in tables else []
+    if other := next((name for words in said if (name := VEHICLE.match(words))), None):
+        raise DataError(f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known")
     if "RATE" not in tables:
         lacks = (
             f"holds no RATE, expected the demands of ArduSub; it has {', '.join(sorted(tables)) or 'nothing'}"
@@ -57,8 +63,8 @@ def read_dataflash(path: Path) -> Recorded:
     _outputs(record, tables, parameters)
     _geometry(record, parameters, path)
     if "MSG" in tables:
-        said = zip(tables["MSG"]["TimeUS"], map(_text, tables["MSG"]["Message"]), strict=True)
-        record.events += [Event(float(at) * 1e-6, words) for at, words in said if WORTH.search(words)]
+        told = zip(tables["MSG"]["TimeUS"], said, strict=True)
+        record.events += [Event(float(at) * 1e-6, words) for at, words in told if WORTH.search(words)]
     if "ERR" in tables:
         rows = zip(*(tables["ERR"][key] for key in ("TimeUS", "Subsys", "ECode")), strict=True)
         record.events += [
@@ -79,7 +85,7 @@ def _tables(path: Path, wanted: tuple[str, ...]) -> dict[str, Columns]:
             """Times are those of the autopilot; no message has to be read for them."""
 
     tables = {}
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), Index(str(path)) as log:
+    with _quiet(), Index(str(path)) as log:
         content = np.frombuffer(bytes(log.data_map), np.uint8)
         for name in wanted:
             form = log.formats.get(log.name_to_id.get(name))
@@ -100,6 +106,21 @@ def _tables(path: Path, wanted: tuple[str, ...]) -> dict[str, Columns]:
     return tables
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Drops what pymavlink prints of each byte that is no message, by its part in C, too."""
+    kept = [os.dup(1), os.dup(2)]
+    with open(os.devnull, "wb") as nowhere:
+        for place in (1, 2):
+            os.dup2(nowhere.fileno(), place)
+    try:
+        yield
+    finally:
+        for place, own in enumerate(kept, 1):
+            os.dup2(own, place)
+            os.close(own)
+
+
 def _text(value: bytes) -> str:
     return value.decode("utf-8", "replace")
 
@@ -117,9 +138,10 @@ def _of_pilot(
     pulses = tables.get("RCIN", {}).get(f"C{channel}")
     if pulses is None:
         record.asks.append(
-            f"It holds no {stick.lower()} demand: 0 is taken; log RCIN, channel {channel} (LOG_BITMASK)."
+            f"It holds no {stick.lower()} demand: that axis is not judged; log RCIN, channel {channel} "
+            "(LOG_BITMASK)."
         )
-        return np.zeros(len(time))
+        return np.full(len(time), np.nan)
     record.notes.append("Demands forward and lateral are the pilot's (RCIN); modes that steer them log none.")
     least, rest, most = (
         parameters.get(f"RC{channel}_{key}", value)

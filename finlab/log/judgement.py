@@ -73,14 +73,16 @@ class Judgement:
     """Mean power of the outputs by the actuators' own models [W]; None where the log has no outputs."""
     axis: str | None
     """Axis that lost most, as a share of the yardstick; None where none was lost."""
+    stopped: tuple[str, ...]
+    """Actuators that were at rest all along while what they would have given was missing."""
     spells: tuple[Spell, ...]
     """Those that lost most, by time."""
     n_spells: int
     """How many there were."""
     replays: tuple[Replay, ...]
     held_by: Replay | None
-    """Replay on the robot as it is, or else on the improved one, that holds the axis, with least missing,
-    then least power; None where none does, or nothing was lost."""
+    """Replay on the robot as it is (without the one actuator that was stopped), or else on the improved one,
+    that holds the axis, with least missing, then least power; None where none does, or nothing was lost."""
     improved: Layout | None
     """Layout on which the hardest demands cost least; None where none was found, or asked for."""
     timeline: Timeline
@@ -107,13 +109,20 @@ class Judgement:
         )
         return f"{begin}; {self._remedy(i)}."
 
+    @property
+    def without(self) -> str | None:
+        """The one actuator that was stopped, which replays that could have held an axis do without."""
+        return self.stopped[0] if len(self.stopped) == 1 else None
+
     def _remedy(self, i: int) -> str:
         if (held := self.held_by) is None:
-            least = min(self.replays, key=lambda each: (each.lost is not None, each.missing[i]))
+            least = min(self.replays, key=lambda each: (each.lost != self.without, each.missing[i]))
             where = "" if least.robot == "as it is" else ", on the improved layout,"
+            where = where if least.lost is None else f" without {least.lost}"
             misses = amount(least.missing[i], i)
             return f"no policy would have held it; {least.name}{where} comes nearest and misses {misses}"
         where = "" if held.robot == "as it is" else " on the improved layout, and nothing on this one"
+        where = where if held.lost is None else f" without {held.lost}"
         more = np.subtract(held.missing, self.missing)
         least = 0.02 * self.missing[i] * self.scale / self.scale[i]
         price = [f"{amount(more[k], int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]

@@ -11,9 +11,9 @@ from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Layout, Thruster
 from finlab.log.judgement import Judgement, Spell, Timeline
-from finlab.log.read import Log
+from finlab.log.read import Log, robot_rest
 from finlab.log.replay import Replay, demands_of, replay, six
 from finlab.physics.objective import judged_power, yardstick
 from finlab.physics.plant import plant_of
@@ -25,6 +25,8 @@ OFF = 0.05
 """Share of what was asked for that may be missing with no actuator at a limit before it is said."""
 HELD = 0.02
 """Share of what was missing along an axis that a replay which holds it may miss."""
+DEAD = 0.1
+"""Least share of the square of what was away that a dead thruster explains, and most that none does."""
 MERGED_S = 0.5
 """Losses that are no further apart are one spell."""
 MOST_SPELLS, BINS = 200, 1000
@@ -54,7 +56,9 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
     demand, counts = np.nan_to_num(log.demand), np.isfinite(log.demand)
     away = np.where(counts, demand - delivered, 0.0)
     at = full | ended
-    missing = np.where(_bound(log, at)[:, None], away, 0.0)
+    dead = _dead(log, away / scale, at)
+    stopped = tuple(name for name, one in zip(log.robot.names, dead, strict=True) if one)
+    missing = np.where((_bound(log, at) | dead.any())[:, None], away, 0.0)
     lost = np.abs(missing) > LOST * scale
     impulse = span @ np.abs(missing)
     axis = AXES[int(np.argmax(impulse / scale))] if lost.any() else None
@@ -82,13 +86,14 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         saturated_s=float(span @ lost.any(axis=1)),
         watts=watts,
         axis=axis,
+        stopped=stopped,
         spells=tuple(
-            _spell(log, scale, rows, delivered, missing, lost, full, ended)
+            _spell(log, scale, rows, delivered, missing, lost, full, ended, stopped)
             for rows in sorted(told[:MOST_SPELLS], key=lambda rows: rows.start)
         ),
         n_spells=len(spells),
         replays=tuple(replays),
-        held_by=None if axis is None else _held(replays, AXES.index(axis), impulse, scale),
+        held_by=None if axis is None else _held(replays, AXES.index(axis), impulse, scale, stopped),
         improved=improved,
         timeline=_timeline(log, delivered, missing, at),
         events=tuple((event.time, _words(log, event.actuator, event.words)) for event in log.events),
@@ -137,13 +142,35 @@ def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
     return Policy("priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group)))
 
 
-def _held(replays: list[Replay], i: int, impulse: Array, scale: Array) -> Replay | None:
-    """The best replay that holds axis i, first on the robot as it is."""
+def _dead(log: Log, away: Array, at: Flags) -> Flags:
+    """Thrusters (n,) that were at rest in all of the log, and whose forces are most of what was away (N, 6),
+    in shares of the yardstick, while no actuator was at a limit."""
+    none = np.zeros(log.robot.n, bool)
+    if log.command is None:
+        return none
+    rest = (np.nan_to_num(log.command) == robot_rest(log.robot)).all(axis=(0, 2))
+    rest &= [isinstance(part, Thruster) for part in log.robot.actuators]
+    off = away[~at.any(axis=1)]
+    if not rest.any() or np.abs(off).max(initial=0.0) < LOST:
+        return none
+    counts = rest[:, None] & np.isfinite(log.demand).any(axis=0)
+    columns = np.where(counts, plant_of(log.robot).effectiveness[:, 0] / yardstick(log.robot), 0.0)
+    force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
+    share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
+    told = np.square(off - force @ columns).sum() < DEAD * size
+    return np.asarray(rest & (share > DEAD) & told)
+
+
+def _held(
+    replays: list[Replay], i: int, impulse: Array, scale: Array, stopped: tuple[str, ...]
+) -> Replay | None:
+    """The best replay that holds axis i, first on the robot as it is, without the one that was stopped."""
+    lost = stopped[0] if len(stopped) == 1 else None
     for robot in ("as it is", "improved"):
         held = [
             each
             for each in replays
-            if each.robot == robot and each.lost is None and each.missing[i] <= HELD * impulse[i]
+            if each.robot == robot and each.lost == lost and each.missing[i] <= HELD * impulse[i]
         ]
         if held:
             return min(held, key=lambda each: (round(sum(each.missing / scale), 3), each.watts))
@@ -189,6 +216,7 @@ def _spell(
     lost: Flags,
     full: Flags,
     ended: Flags,
+    stopped: tuple[str, ...],
 ) -> Spell:
     span, some = log.span[rows], np.asarray(lost[rows].any(axis=1))
     return Spell(
@@ -198,7 +226,10 @@ def _spell(
         missing=six(span @ np.abs(missing[rows]), scale),
         asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
         gave=six(span @ delivered[rows] / span.sum(), scale),
-        limits=limit_words(log.robot, *(np.any(flags[rows][some], axis=0) for flags in (full, ended))),
+        limits=(
+            *(f"{name} at rest all along" for name in stopped),
+            *limit_words(log.robot, *(np.any(flags[rows][some], axis=0) for flags in (full, ended))),
+        ),
     )
 
 

@@ -180,8 +180,8 @@ def test_parameters_of_ardusub_name_a_frame(text: str) -> None:
 
 
 def test_px4_says_what_its_defaults_filled() -> None:
-    _, notes = read("a.params", "CA_ROTOR_COUNT 2\nCA_ROTOR0_CT 4\nCA_ROTOR2_PX 1")
-    assert "No CA_ROTORi_CT of rotors 1: 6.5 is taken" in notes and "not read: CA_ROTOR2_PX" in notes
+    _, notes = read("a.params", "CA_ROTOR_COUNT 2\nCA_ROTOR0_CT 4\nCA_ROTOR2_PX 1\nCA_ROTOR2_CT 6.5")
+    assert "No CA_ROTORi_CT of rotors 1: 6.5 is taken" in notes and "not read: CA_ROTOR2_PX." in notes
 
 
 def test_models_inside_models_and_names_of_others() -> None:

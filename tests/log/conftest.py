@@ -20,9 +20,9 @@ FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 ROOT = np.sqrt(0.5)
 LEVER, ROLL, PITCH = 0.24 * ROOT, 0.22, 0.12
 """Arms of yaw, roll and pitch [m]."""
-# PX4 divides columns of the pseudo-inverse: thrust by the mean norm of its entries, which is 1 / 2F of
-# horizontal thrusters and 1 / 4F of others, roll and pitch by sqrt(2) times the larger entry, yaw by its own.
-PX4_UNIT = 4 * FULL * np.array([*(2 / 3,) * 3, PITCH * ROOT, PITCH * ROOT, LEVER])
+# PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and pitch by
+# sqrt(2) times the larger entry, yaw by its own.
+PX4_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, PITCH * ROOT, PITCH * ROOT, LEVER])
 SUB_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, ROLL, PITCH, LEVER])
 """Wrench of a setpoint of 1 on each axis by the rules of both autopilots, worked out for this robot."""
 

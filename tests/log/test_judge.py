@@ -11,7 +11,7 @@ import pytest
 import finlab
 from finlab.log.replay import demands_of, replay
 from finlab.physics.objective import yardstick
-from tests.log.conftest import SUB_UNIT, Dive, px4_dive, sub_dive
+from tests.log.conftest import SUB_UNIT, Dive, columns, px4_dive, sub_dive
 
 YAW = 5
 
@@ -96,6 +96,22 @@ def test_the_robots_health_is_told(px4: Dive) -> None:
     words = ["rear_right failed, says PX4", "lift_rear_left has an ESC offline"]
     assert sorted(said for _, said in judged.events) == sorted(words)
     assert judged.events[0][0] == pytest.approx(px4.time[len(px4.time) // 3], abs=0.1)
+
+
+@pytest.mark.parametrize("rest", [0.0, np.nan])
+def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: float, px4: Dive) -> None:
+    log, name = finlab.read_log(px4.path, px4.robot), px4.robot.names[1]
+    easy = slice(0, len(log) // 2 - 10)
+    some = {key: getattr(log, key)[easy] for key in ("time", "span", "demand", "command")}
+    assert finlab.judge(replace(log, **some), improve=False).stopped == ()
+    force = some["command"][:, 1, 0].copy()
+    some["command"][:, 1] = rest
+    judged = finlab.judge(replace(log, **some), improve=False)
+    assert judged.stopped == (name,) and f"with {name} at rest all along" in judged.sentence
+    np.testing.assert_allclose(
+        judged.missing, some["span"] @ np.abs(force) * np.abs(columns(px4.robot)[1]), 1e-3
+    )
+    assert judged.held_by is not None and judged.held_by.lost == name and f"without {name}" in judged.sentence
 
 
 def test_the_scale_is_the_users_where_it_is_given(sub: Dive) -> None:

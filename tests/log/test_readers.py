@@ -80,6 +80,28 @@ def test_damaged_logs_end_in_a_sentence(kind: str, request: pytest.FixtureReques
             assert len(str(error)) < 1000
 
 
+def test_a_log_of_ardusub_that_ends_in_zeros_is_read_in_silence(
+    sub: Dive, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dive.bin").write_bytes(sub.path.read_bytes() + bytes(2000))
+    assert finlab.read_log(tmp_path / "dive.bin", sub.robot) == finlab.read_log(sub.path, sub.robot)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_demand_that_is_not_logged_is_not_judged(sub: Dive, tmp_path: Path) -> None:
+    (tmp_path / "dive.bin").write_bytes(sub.path.read_bytes().replace(b"RCIN", b"SCIN"))
+    log = finlab.read_log(tmp_path / "dive.bin", sub.robot)
+    assert np.isnan(log.demand[:, :2]).all() and sum("not judged" in ask for ask in log.asks) == 2
+    judged = finlab.judge(log, improve=False)
+    assert judged.axis == "Tz" and judged.missing[:2] == (0.0, 0.0)
+
+
+def test_another_vehicle_of_ardupilot_is_refused(sub: Dive, tmp_path: Path) -> None:
+    (tmp_path / "a.bin").write_bytes(sub.path.read_bytes().replace(b"Leak Detected", b"ArduCopter V4"))
+    with pytest.raises(FinlabError, match="a log of ArduCopter, expected one of ArduSub"):
+        finlab.read_log(tmp_path / "a.bin", sub.robot)
+
+
 def test_what_is_no_log_is_said(tmp_path: Path) -> None:
     for name, content in (("a.bin", b"hello"), ("a.mcap", b"hello"), ("a.ulg", b"ULog\x01\x125" + b"\0" * 9)):
         (tmp_path / name).write_bytes(content)

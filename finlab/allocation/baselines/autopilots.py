@@ -107,12 +107,14 @@ class Px4(LeastErrorMethod):
 
 
 def normalised(mix: Array) -> tuple[Array, Array]:
-    """A mix (n, 6), columns divided as PX4 does, and the divisors (6,), by which it multiplies setpoints."""
+    """A mix (n, 6), columns divided as PX4 does since 1.14 (each of thrust by the mean of its own entries),
+    and the divisors (6,), by which it multiplies setpoints."""
     used = np.abs(mix) > NEGLIGIBLE
     tilt = [np.sqrt((mix[:, k] ** 2).sum() / max(used[:, k].sum() / 2.0, 1e-9)) for k in (ROLL, PITCH)]
-    thrust = np.linalg.norm(mix[:, SURGE:], axis=1)
-    thrust = thrust[thrust > 1e-9]
-    scale = np.array([max(tilt)] * 2 + [mix[:, YAW].max()] + [thrust.mean() if len(thrust) else 1.0] * 3)
+    sizes = np.abs(mix[:, SURGE:])
+    thrust = sizes.sum(axis=0) / np.maximum((sizes > np.finfo(np.float32).eps).sum(axis=0), 1)
+    thrust = np.where(thrust > 0.0, thrust, thrust[-1])  # of an axis that nothing drives: that of heave
+    scale = np.array([max(tilt)] * 2 + [mix[:, YAW].max(), *thrust])
     scale = np.where(scale > 1e-9, scale, 1.0)
     result = mix / scale
     result[np.abs(result) < NEGLIGIBLE] = 0.0
