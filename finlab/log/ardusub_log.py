@@ -63,8 +63,8 @@ def read_dataflash(path: Path) -> Recorded:
     _outputs(record, tables, parameters)
     _geometry(record, parameters, path)
     if "MSG" in tables:
-        told = zip(tables["MSG"]["TimeUS"], said, strict=True)
-        record.events += [Event(float(at) * 1e-6, words) for at, words in told if WORTH.search(words)]
+        messages = zip(tables["MSG"]["TimeUS"], said, strict=True)
+        record.events += [Event(float(at) * 1e-6, words) for at, words in messages if WORTH.search(words)]
     if "ERR" in tables:
         rows = zip(*(tables["ERR"][key] for key in ("TimeUS", "Subsys", "ECode")), strict=True)
         record.events += [

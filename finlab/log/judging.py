@@ -11,7 +11,7 @@ from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import FinlabError
-from finlab.layout import Layout, Thruster
+from finlab.layout import Layout
 from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log, robot_rest
 from finlab.log.replay import Replay, demands_of, replay, six
@@ -74,7 +74,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
     if improved is not None:
         replays += replay(improved, log.demand, span, policies, improved=True)
     spells = [*_spells(log, missing, lost)]
-    told = sorted(spells, key=lambda rows: -float((span[rows] @ np.abs(missing[rows]) / scale).sum()))
+    worst = sorted(spells, key=lambda rows: -float((span[rows] @ np.abs(missing[rows]) / scale).sum()))
     return Judgement(
         source=log.source,
         robot=log.robot,
@@ -89,7 +89,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         stopped=stopped,
         spells=tuple(
             _spell(log, scale, rows, delivered, missing, lost, full, ended, stopped)
-            for rows in sorted(told[:MOST_SPELLS], key=lambda rows: rows.start)
+            for rows in sorted(worst[:MOST_SPELLS], key=lambda rows: rows.start)
         ),
         n_spells=len(spells),
         replays=tuple(replays),
@@ -143,13 +143,13 @@ def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
 
 
 def _dead(log: Log, away: Array, at: Flags) -> Flags:
-    """Thrusters (n,) that were at rest in all of the log, and whose forces are most of what was away (N, 6),
-    in shares of the yardstick, while no actuator was at a limit."""
+    """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and whose forces
+    are most of what was away (N, 6), in shares of the yardstick, while no actuator was at a limit."""
     none = np.zeros(log.robot.n, bool)
     if log.command is None:
         return none
     rest = (np.nan_to_num(log.command) == robot_rest(log.robot)).all(axis=(0, 2))
-    rest &= [isinstance(part, Thruster) for part in log.robot.actuators]
+    rest &= (log.robot.lower[:, 1:] == log.robot.upper[:, 1:]).all(axis=1)
     off = away[~at.any(axis=1)]
     if not rest.any() or np.abs(off).max(initial=0.0) < LOST:
         return none
@@ -157,8 +157,8 @@ def _dead(log: Log, away: Array, at: Flags) -> Flags:
     columns = np.where(counts, plant_of(log.robot).effectiveness[:, 0] / yardstick(log.robot), 0.0)
     force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
     share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
-    told = np.square(off - force @ columns).sum() < DEAD * size
-    return np.asarray(rest & (share > DEAD) & told)
+    explained = np.square(off - force @ columns).sum() < DEAD * size
+    return np.asarray(rest & (share > DEAD) & explained)
 
 
 def _held(

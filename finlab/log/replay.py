@@ -88,13 +88,13 @@ def replay(
     scale = yardstick(robot)
     intact = demands_of(wrench, span, scale, MOST)
     rough = demands_of(intact.wrench, intact.span, scale, MOST_LOST)
-    asked = [("dual", policy) for policy in policies]
-    asked += [(name, CLOSEST) for name in ("px4", "ardusub") if method_class(name).fits(robot)]
-    made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in asked)}
+    questions = [("dual", policy) for policy in policies]
+    questions += [(name, CLOSEST) for name in ("px4", "ardusub") if method_class(name).fits(robot)]
+    made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in questions)}
     gone = [] if improved or robot.n == 1 else robot.names
     for lost in (None, *gone):
         demands = intact if lost is None else rough
-        for name, policy in asked:
+        for name, policy in questions:
             answer = made[name].allocate_batch(
                 demands.wrench, lost=() if lost is None else (lost,), policy=policy
             )

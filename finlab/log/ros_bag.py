@@ -35,15 +35,15 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
     events: list[Event] = []
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         kinds = {each.topic: each.msgtype for each in reader.connections}
-        asked = _topic(path, kinds, WRENCHES, demand, "demand")
+        demanded = _topic(path, kinds, WRENCHES, demand, "demand")
         sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
         wanted = [
-            each for each in reader.connections if each.topic in (asked, sent) or each.msgtype == HEALTH
+            each for each in reader.connections if each.topic in (demanded, sent) or each.msgtype == HEALTH
         ]
         for connection, nanoseconds, raw in reader.messages(wanted):
             message: Any = reader.deserialize(raw, connection.msgtype)
             time = (nanoseconds - reader.start_time) * 1e-9
-            if connection.topic == asked:
+            if connection.topic == demanded:
                 wrench = getattr(message, "wrench", message)
                 parts = (wrench.force, wrench.torque)
                 rows["demand"].append((time, [value for v in parts for value in (v.x, v.y, v.z)]))
@@ -55,7 +55,7 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
                     for each in message.status
                     if each.level >= WARNING
                 ]
-    record = Recorded("ros", _series(path, asked, rows["demand"]), events=events)
+    record = Recorded("ros", _series(path, demanded, rows["demand"]), events=events)
     record.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
     if sent is not None and rows["outputs"]:
         record.outputs, record.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
