@@ -109,6 +109,7 @@ def test_a_phone_watches(resized: Any) -> None:
         settle(page)
         boxes = {name: box for name, box in page.page.evaluate(REGIONS).items() if box["height"] > 0.0}
         assert overlaps(boxes) == [] and boxes["canvas"]["height"] > 200, task
+        assert ("left" in boxes) == (task == "Log"), "what is said of a log is read there"
         assert page.page.evaluate("document.documentElement.scrollWidth") == 390, "nothing is beside the page"
         for box in (*boxes.values(), page.page.locator(".fl-status").bounding_box()):
             assert box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["y"] + box["height"] <= 844

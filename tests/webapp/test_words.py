@@ -234,6 +234,9 @@ def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
     card = score_card(load_layout("torpedo"))
     shown = score_table(load_layout("torpedo"), card, None)
     assert "--flow" not in shown and SPEED.removesuffix(" [m/s]") in shown
+    torpedo = State(load_layout("torpedo"), target=(1.2, 0.0, 0.0, 0.0, 0.0, 0.25))
+    said = answer_sentence(torpedo, Allocator(torpedo.able, "dual").allocate(torpedo.target), False)
+    assert "nan" not in said and "beside its slider" in said
 
 
 def test_every_stop_of_the_tour_stands() -> None:

@@ -131,7 +131,7 @@ def exact_axis(word: str, values: Array) -> Axis:
     return axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
 
 
-NARROW, LOW, INDENT = 250, 128, 40
+NARROW, LOW, INDENT = 250, 128, 46
 """Of a plot that stands beside others, and where its vertical axis stands [px]."""
 
 

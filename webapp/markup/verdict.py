@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.physics.objective import REACHED
-from webapp.markup.words import authority_sentence, listed, three_digits, unlearned_sentence
+from webapp.markup.words import authority_sentence, in_app, listed, three_digits, unlearned_sentence
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
@@ -120,7 +120,7 @@ def answer_sentence(
             remarks = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
             remarks += [*allocation.binding, *(() if searching else allocation.notes)]
             said = "; ".join(note for note in remarks if not note.endswith(AT_REST))
-            sentences.append(f"{said[0].upper()}{said[1:]}." if said else "")
+            sentences.append(in_app(f"{said[0].upper()}{said[1:]}.") if said else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
             if doubt := allocation.measure_next:

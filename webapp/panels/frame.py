@@ -8,6 +8,7 @@ here. So widgets that were seen once stay mounted, and a change of task is one m
 import json
 from collections.abc import Callable
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
@@ -23,6 +24,9 @@ from webapp.session.looking import DRAWERS, WAYS, Desk
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
+
+if TYPE_CHECKING:
+    from finlab.log import Judgement
 
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; "
@@ -111,6 +115,7 @@ class Frame:
         stop: Stop | None,
         swimmer: Swimmer | None,
         layout: Layout,
+        judged: "Judgement | None",
     ) -> None:
         """Write which regions and sections are there; the drawer is low until there are plots in it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
@@ -128,9 +133,12 @@ class Frame:
             "drawer": has_drawer,
             "open": drawer is not None,
             "guide": stop is not None,
+            "log": desk.task == places.LOG,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        height = "" if desk.task != places.SIMULATE else LOW if swimmer is None else TALL
+        plots = {places.SIMULATE: swimmer is not None, places.LOG: judged is not None}
+        low, tall = not plots.get(desk.task, True), desk.task == places.SIMULATE
+        height = LOW if low else TALL if tall else ""
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
             self._shown,

@@ -85,7 +85,7 @@ def add_losses(page: Page) -> None:
 
 def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
     if judged is None:
-        return ""
+        return html("<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here.")
     each = zip(MOTIONS, AXIS_UNITS, judged.asked, judged.missing, judged.lost_s, strict=True)
     rows = [
         row(
@@ -160,7 +160,7 @@ def replays_table(judged: "Judgement | None") -> str:
         "<div class='said'><span class='given'>Green</span>: holds what was lost, at least power.</div>"
     )
     return html(
-        "<div class='fl'><table class='methods'>{}{}</table>{}</div>",
+        "<div class='fl fl-timeline'><table class='methods'>{}{}</table>{}</div>",
         head,
         rows,
         said if judged.held_by else "",
