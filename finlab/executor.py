@@ -105,7 +105,6 @@ def _connected(address: str) -> "Client":
 
 
 def _version() -> str:
-
     version: str = sys.modules["finlab"].__version__
     return version
 

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.errors import DataError, LayoutError
-from finlab.exchange import Exchange
+from finlab.errors import DataError
 from finlab.exchange.motor_factors import read_parameters_of_ardusub
 from finlab.log.recorded import Event, Recorded, Series
 
@@ -177,14 +176,9 @@ def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str,
 
 def _geometry(record: Recorded, parameters: dict[str, float], path: Path) -> None:
     """The robot by its frame, whose arms and newtons nothing says."""
-    exchange = Exchange()
     lines = [f"{name} {value:g}" for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))]
-    try:
-        record.layout = read_parameters_of_ardusub("\n".join(lines), path.stem[:64] or "ardusub", exchange)
-    except LayoutError as error:
-        record.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
-        return
-    record.taken += exchange.notes
-    record.lacking.append(
-        "A frame of ArduSub has no arms and no newtons: guesses are taken; name the robot by --robot LAYOUT."
-    )
+    if record.describe(read_parameters_of_ardusub, "\n".join(lines), path.stem):
+        record.lacking.append(
+            "A frame of ArduSub has no arms and no newtons: guesses are taken; name the robot by --robot "
+            "LAYOUT."
+        )

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.errors import DataError, LayoutError
-from finlab.exchange import Exchange
+from finlab.errors import DataError
 from finlab.exchange.parameters import read_px4
 from finlab.log.recorded import FLU, Event, Recorded, Series, changes
 
@@ -115,14 +114,9 @@ _ENDS = (("MIN", 1000.0), ("MAX", 2000.0))
 def _geometry(record: Recorded, parameters: dict[str, Any], path: Path) -> None:
     """The robot by CA_ROTOR*."""
     lines = [f"{name} {value}" for name, value in parameters.items() if name.startswith("CA_")]
-    exchange = Exchange()
-    try:
-        record.layout = read_px4("\n".join(lines), path.stem[:64] or "px4", exchange)
-    except LayoutError as error:
-        record.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+    if (robot := record.describe(read_px4, "\n".join(lines), path.stem)) is None:
         return
-    record.taken += exchange.notes
-    sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(record.layout.n)]
+    sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)]
     if set(sizes) == {TOY}:
         record.lacking.append(
             f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "

@@ -1,5 +1,6 @@
 """What a reader finds in a log, before the robot's newtons are known."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -7,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.errors import LayoutError
+from finlab.exchange import Exchange
 from finlab.layout import Layout
 
 Form = Literal["px4", "ardusub", "ros"]
@@ -71,6 +74,19 @@ class Recorded:
     """Notes of what was taken for the robot, where its layout is the log's."""
     lacking: list[str] = field(default_factory=list)
     """What the log lacks of the robot, as `asks` are."""
+
+    def describe(
+        self, read: Callable[[str, str, Exchange], Layout], parameters: str, name: str
+    ) -> Layout | None:
+        """The robot that a reader of the autopilot's parameters finds in them; None where it finds none."""
+        exchange = Exchange()
+        try:
+            self.layout = read(parameters, name[:64] or self.form, exchange)
+        except LayoutError as error:
+            self.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+            return None
+        self.taken += exchange.notes
+        return self.layout
 
 
 def changes(time: Array, bits: NDArray[np.bool_], words: str, again: str) -> list[Event]:
