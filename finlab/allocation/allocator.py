@@ -84,7 +84,6 @@ class Answered(NamedTuple):
     wrenches: Array
     """As they came, (6,) or (N, 6)."""
     solution: Solution
-    checkpoint: str | None
 
     @property
     def plant(self) -> Plant:
@@ -92,7 +91,7 @@ class Answered(NamedTuple):
 
     def notes(self) -> tuple[str, ...]:
         (robot, method, *_), _, flow, _ = self.question
-        return answer_notes(robot.healthy, method, self.checkpoint, flow, self.wrenches, self.solution.notes)
+        return answer_notes(robot.healthy, method, flow, self.wrenches, self.solution.notes)
 
     def candidates(self) -> Candidates | None:
         return self._among_all(self.solution.candidates)
@@ -381,7 +380,7 @@ class Allocator:
             flow=flow,
             seed=seed,
             unknown_fins=method.unknown_fins,
-            later=Answered(question, values, solution, self.checkpoint),
+            later=Answered(question, values, solution),
         )
 
     def _ready_for(self, result: Allocation) -> Ready:

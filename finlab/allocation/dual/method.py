@@ -100,11 +100,6 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
-        return self._solve(targets, policy, previous, prices)
-
-    def _solve(
-        self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
-    ) -> Solution:
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
         found = self.forces(targets, policy, self.begin(prices), previous)
