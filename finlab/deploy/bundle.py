@@ -19,7 +19,6 @@ from msgspec import to_builtins
 
 import finlab
 from finlab import bundle_files
-from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
 from finlab.assets import NAME, shipped_checkpoints
@@ -137,24 +136,23 @@ def _about(allocator: Allocator) -> bytes:
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose force tables, and the network of whose interaction, have the names that they have in a
     bundle, and their contents by name; `DataError`: one cannot be read, or is too large to travel."""
-    tables: dict[str, bytes] = {}
-    parts = []
-    for part in layout.actuators:
-        if path := part.reads:
-            content = table_bytes(path)
-            if len(content) > bundle_files.LARGEST_TABLE:
-                raise DataError(
-                    f"{path}: is larger than {bundle_files.LARGEST_TABLE:,} bytes, too large for a bundle"
-                )
-            tables[bundle_files.table_name(content)] = content
-            part = part.reading(bundle_files.table_name(content))
-        parts.append(part)
-    interaction = layout.interaction
-    if isinstance(interaction, Learned):
-        content = named_content(interaction.path, LARGEST_NETWORK, WHAT)
-        name = bundle_files.table_name(content, NETWORK_SUFFIX)
-        tables[name], interaction = content, Learned(name)
-    return replace(layout, actuators=tuple(parts), interaction=interaction), tables
+    names, contents, own = dict[str, str](), dict[str, bytes](), layout.interaction
+    table = bundle_files.LARGEST_TABLE, "a table of forces for a bundle"
+    for path in layout.files:
+        is_network = isinstance(own, Learned) and path == own.path
+        content = named_content(path, *((LARGEST_NETWORK, WHAT) if is_network else table))
+        names[path] = bundle_files.table_name(content, NETWORK_SUFFIX if is_network else ".csv")
+        contents[names[path]] = content
+    return renamed(layout, names), contents
+
+
+def renamed(layout: Layout, names: Mapping[str, str]) -> Layout:
+    """A layout whose tables and network have other names, or paths, by those that they have."""
+    parts = tuple(part.reading(names[part.reads]) if part.reads else part for part in layout.actuators)
+    own = layout.interaction
+    return replace(
+        layout, actuators=parts, interaction=Learned(names[own.path]) if isinstance(own, Learned) else own
+    )
 
 
 def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
