@@ -38,7 +38,7 @@ from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_chec
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.network import POSITION_SCALE, SCALES
 from finlab.physics.objective import yardstick
-from finlab.whole_file import PART, write_together, write_whole
+from finlab.whole_file import PART, write_folder, write_whole
 
 
 @dataclass(frozen=True)
@@ -51,24 +51,16 @@ class Bundle:
         """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the
         folder holds something else, or cannot be written."""
         path = Path(folder)
-        made = not path.exists()
+        made, present = not path.exists(), [file for file in path.rglob("*") if not file.is_dir()]
+        names = {file: file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)}
         try:
-            path.mkdir(parents=True, exist_ok=True)
-            present = [file for file in path.rglob("*") if not file.is_dir()]
-            left = [file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)]
-            if strangers := sorted(name for name in left if bundle_files.largest(name) < 0):
-                raise DataError(
-                    f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
-                )
-            for name in self.files:
-                (path / name).parent.mkdir(exist_ok=True)
             # The checksums come last: what a kill leaves is refused.
-            write_together({path / name: part for name, part in self.files.items()}, DataError, str(path))
-            for file in present:
-                if file.relative_to(path).as_posix() not in self.files:
-                    file.unlink()
+            odd = (file for file, name in names.items() if bundle_files.largest(name) < 0)
+            write_folder(path, self.files, odd, "a bundle")
+            for file in set(present) - {path / name for name in self.files}:
+                file.unlink()
         except OSError as error:
-            raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
+            raise DataError(f"{error.filename}: cannot be written: {error.strerror}") from None
         finally:
             if made and not (path / bundle_files.CHECKSUMS).exists():
                 rmtree(path, ignore_errors=True)
