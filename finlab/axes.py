@@ -25,7 +25,7 @@ def is_full_turn(arc: Any) -> Any:
 
 
 def wrapped(angle: ArrayLike) -> Array:
-    """Returns the same angles within [-pi, pi) [rad]."""
+    """Returns the same angles (...) within [-pi, pi) [rad]."""
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
 
 

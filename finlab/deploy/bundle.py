@@ -48,8 +48,8 @@ class Bundle:
     files: Mapping[str, bytes]  # contents by name
 
     def write(self, folder: str | os.PathLike[str]) -> None:
-        """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the
-        folder holds something else, or cannot be written."""
+        """Write the files into a folder, which is made; an earlier bundle there is replaced. Raises
+        DataError: the folder holds something else, or cannot be written."""
         path = Path(folder)
         made, present = not path.exists(), [file for file in path.rglob("*") if not file.is_dir()]
         names = {file: file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)}
@@ -202,7 +202,7 @@ def graph_text(layout: Layout) -> str:
 
 
 def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a graph file; an existing file is replaced whole. LayoutError: the name does not end in
+    """Writes a graph file; an existing file is replaced whole. Raises LayoutError: the name does not end in
     `.json`, or the file cannot be written."""
     if Path(path).suffix.lower() != ".json":
         raise LayoutError("expected the name of a file that ends in .json", source=str(path))

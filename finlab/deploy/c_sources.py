@@ -67,8 +67,8 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it
-    has other C files, or cannot be written."""
+    """Writes the files into a folder, which is made; those of an earlier export are replaced. Raises
+    DataError: it has other C files, or cannot be written."""
     strangers = (own for own in Path(folder).glob("*.[ch]") if own.name not in files)
     write_folder(folder, files, strangers, "an export")
 

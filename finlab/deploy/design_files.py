@@ -45,7 +45,7 @@ def _kept(content: bytes, folder: Path, suffix: str) -> str:
 
 def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is where its
-    hull is drawn from a shape. DataError: the mesh cannot be read."""
+    hull is drawn from a shape. Raises DataError: the mesh cannot be read."""
     hull = None if layout.body is None else layout.body.hull
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
@@ -94,7 +94,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
 
 
 def read_design(source: str, content: bytes, folder: Path) -> Opened:
-    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file.
+    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file. Raises
     LayoutError: it is none of these, or something in it is wrong."""
     exchange = Exchange()
     text = decoded(content, source, A_DESIGN, LayoutError)
@@ -105,7 +105,7 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
     """The layout in the content of a file; what it names is taken to be in `folder`, and not looked at.
-    LayoutError: it is no text, or no layout."""
+    Raises LayoutError: it is no text, or no layout."""
     text = decoded(content, source, A_LAYOUT, LayoutError)
     return layout_in(text, Path(source).suffix, source, folder, may_open=False)
 
@@ -147,8 +147,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
     """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
 
-    One of too many triangles is kept with fewer. FinlabError: it is no closed mesh, too large, or cannot be
-    kept."""
+    One of too many triangles is kept with fewer. Raises FinlabError: it is no closed mesh, too large, or
+    cannot be kept."""
     mesh, report = read_mesh(name, content, scale)
     if report.triangles > MAX_FACES:
         fewer = simplified(mesh, MAX_FACES)
