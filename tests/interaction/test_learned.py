@@ -23,11 +23,11 @@ from tests.interaction.test_jets import differs
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
     from finlab.fit.interaction.samples import drawn, read_samples, write_samples
-    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
 
     folder = tmp_path_factory.mktemp("interaction")
     write_samples(folder / "data.npz", drawn(wrenches, 60, 20, 0, 0.02, (4, 8)))
-    train(read_samples(folder / "data.npz"), folder, Recipe(steps=120, batch=256), seed=0)
+    train(read_samples(folder / "data.npz"), folder, recipe(steps=120, batch=256), seed=0)
     return Learned(str(folder / WEIGHTS_FILE))
 
 
