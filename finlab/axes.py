@@ -100,7 +100,7 @@ DIGITS = 12
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:
-    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad]."""
+    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad], by Rodrigues' formula."""
     x, y, z = np.asarray(axis, dtype=np.float64)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)

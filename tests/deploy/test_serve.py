@@ -308,8 +308,10 @@ def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams
     assert len(text(streams.newest(10.0))) == MAX_LINE + 1, "enough to refuse it"
 
 
-def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams, requests: int) -> None:
+def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams) -> None:
+    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
     begin = time.monotonic()
+    streams.open(source, sink)
     os.write(requests, b"be")
     time.sleep(0.2)
     os.write(requests, b"gun\n")
@@ -320,6 +322,7 @@ def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams, req
     os.write(requests, b"new\n")
     second = streams.newest(1.0)
     assert second is not None and before - 0.1 < second.since <= time.monotonic()
+    os.close(requests)
 
 
 def test_requests_that_nobody_takes_need_no_memory(requests: int) -> None:
