@@ -87,23 +87,27 @@ function draw() {
     for (const side of [-0.45, 0.45]) pen.lineTo(u - tip * Math.cos(way + side), v - tip * Math.sin(way + side));
     pen.fillStyle = colour; pen.fill();
   };
-  for (const [a, b] of [[0, 1], [0, 2], [1, 2]]) {
-    pen.globalAlpha = 0.35;
-    line(Array.from({ length: 61 }, (_, k) => { const point = robot.center.slice(); point[a] += (robot.hull[a] / 2) * Math.cos((k * Math.PI) / 30); point[b] += (robot.hull[b] / 2) * Math.sin((k * Math.PI) / 30); return point; }), ink, 1);
-    pen.globalAlpha = 0.07;
-    pen.fill();
-  }
+  // The hull as an ellipsoid: its outline, which is an ellipse, and its waterline.
+  const [middle, ...half] = [[0, 0, 0], ...[0, 1, 2].map((axis) => [0, 1, 2].map((k) => (k === axis ? robot.hull[k] / 2 : 0)))].map((point) => at(point.map((value, k) => value + robot.center[k])));
+  const [u, v] = [0, 1].map((k) => half.map((end) => end[k] - middle[k])), times = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
+  const wide = Math.sqrt(times(u, u)), lean = times(u, v) / wide, high = Math.sqrt(times(v, v) - lean * lean);
+  const ring = (right, down) => { pen.beginPath(); for (let k = 0; k < 60; k++) { const [c, s] = [Math.cos((k * Math.PI) / 30), Math.sin((k * Math.PI) / 30)]; pen.lineTo(middle[0] + right[0] * c + right[1] * s, middle[1] + down[0] * c + down[1] * s); } pen.closePath(); };
+  pen.fillStyle = pen.strokeStyle = ink; pen.lineWidth = devicePixelRatio;
+  pen.globalAlpha = 0.08; ring([wide, 0], [lean, high]); pen.fill();
+  pen.globalAlpha = 0.4; pen.stroke(); ring(u, v); pen.stroke();
   pen.globalAlpha = 1;
   pen.font = `${12 * devicePixelRatio}px sans-serif`;
   robot.actuators.forEach((actuator, i) => {
     const [x, y] = at(actuator.position), off = force[i] === null, radius = 4 * devicePixelRatio;
     pen.beginPath(); pen.arc(x, y, radius, 0, 7); pen.fillStyle = off ? "#d55e00" : ink; pen.fill();
-    pen.fillText(actuator.name, x + 1.6 * radius, y - 1.6 * radius);
+    pen.textAlign = x > 0.8 * canvas.width ? "right" : "left";
+    pen.fillText(actuator.name, x + (x > 0.8 * canvas.width ? -1.6 : 1.6) * radius, y + (i % 2 ? 4 : -1.6) * radius);
     if (off) return;
     const push = [0, 1, 2].map((k) => actuator.directions.reduce((sum, way, q) => sum + way[k] * force[i][q], 0));
     if (Math.hypot(...push) > 1e-3 * robot.strongest) arrow(actuator.position, push.map((value) => (0.9 * robot.size * value) / robot.strongest), accent);
   });
   const [x0, y0] = at([0, 0, 0]);
+  pen.textAlign = "left";
   ["x", "y", "z"].forEach((name, k) => { // the body frame, in a corner
     const [x, y] = at([0, 1, 2].map((each) => (each === k ? 0.17 * robot.size : 0))), dx = x - x0, dy = y - y0, cx = 46 * devicePixelRatio, cy = canvas.height - cx;
     pen.beginPath(); pen.moveTo(cx, cy); pen.lineTo(cx + dx, cy + dy); pen.strokeStyle = pen.fillStyle = ["#d55e00", "#009e73", "#0072b2"][k]; pen.lineWidth = 2 * devicePixelRatio; pen.stroke();
