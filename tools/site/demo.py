@@ -1,4 +1,4 @@
-"""The files of the page of six sliders: the core as WebAssembly, and robots as the blocks of numbers it takes."""
+"""The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of numbers."""
 
 import json
 import subprocess
@@ -74,8 +74,8 @@ def _compiled() -> bytes:
     with TemporaryDirectory() as folder:
         made = Path(folder) / "finlab.wasm"
         exports = [f"-Wl,--export={name}" for name in EXPORTS]
-        command = [sys.executable, "-m", "ziglang", *words.split(), *include, *exports, *sources, "-o", str(made)]
-        done = subprocess.run(command, capture_output=True, text=True)
+        command = [sys.executable, "-m", "ziglang", *words.split(), *include, *exports, *sources]
+        done = subprocess.run([*command, "-o", str(made)], capture_output=True, text=True)
         if done.returncode:
             raise PluginError(f"the core did not compile to WebAssembly\n{done.stderr}")
         return made.read_bytes()
