@@ -123,9 +123,6 @@ def _axes(title: str) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 STYLES = ("-", "--", ":", "-.")
 """Of the lines of one color, which the first word of a name has."""
 

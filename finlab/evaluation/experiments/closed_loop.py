@@ -5,8 +5,9 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,18 +35,28 @@ class Swim(NamedTuple):
     path: Trajectory
     method: str
     controller: str
-    seed: int
     lost: tuple[str, ...] = ()
     """Names of the actuators that are lost, announced."""
     lost_s: float = 0.0
     """When they are lost [s]."""
+    seed: int = 0
+    """Of the noise."""
 
 
-def swum(
-    methods: Mapping[str, MethodSpec], swims: Sequence[Swim], what: str, row_of: Callable[[RunLog], Row]
-) -> list[Row]:
-    """What `row_of` makes of each swim, in order, on the cluster where there is one."""
-    return list(map_parts(partial(_row, methods, row_of), swims, what, "swim"))
+Case = tuple[Any, ...]  # what a row is of
+
+
+def repeated(
+    methods: Mapping[str, MethodSpec],
+    cases: Sequence[tuple[Case, Swim]],
+    seeds: Sequence[int],
+    what: str,
+    row_of: Callable[[RunLog], Row],
+) -> list[tuple[Case, list[Row]]]:
+    """Each case with what `row_of` makes of its swim with each seed, on the cluster where there is one."""
+    swims = [swim._replace(seed=seed) for _, swim in cases for seed in seeds]
+    rows = map_parts(partial(_row, methods, row_of), swims, what, "swim")
+    return [(case, list(islice(rows, len(seeds)))) for case, _ in cases]
 
 
 def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: Swim) -> Row:
@@ -104,30 +115,31 @@ def power_row(log: RunLog) -> Row:
 def over_seeds(rows: Sequence[Row]) -> Row:
     """Mean of each number over runs, and under `<name>_std` its spread (0 for a single run)."""
     means: Row = {}
-    for key in rows[0]:
+    for key in [key for key, value in rows[0].items() if isinstance(value, float)]:
         values = np.array([row[key] for row in rows])
         means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
     return means
 
 
-def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]) -> list[Row]:
+def mean_rows(keys: Sequence[str], done: Iterable[tuple[Case, Sequence[Row]]]) -> list[Row]:
     """One row for each case, a value for each key, of the rows of its runs."""
     return [
-        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}
-        for case, rows in done.items()
+        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)} for case, rows in done
     ]
 
 
 def with_losses(
     layouts: Sequence[str], counts: Sequence[int]
-) -> list[tuple[Layout, int, tuple[str, ...] | None]]:
+) -> tuple[list[tuple[Layout, int, tuple[str, ...]]], list[tuple[Layout, int]]]:
     """For each file or shipped name and number of fins the first that may be lost so that the robot can be
-    steered; None where all are needed. Numbers that leave no fin are left out. Raises DataError: a negative
-    number."""
+    steered, and those robots and numbers of which all are needed. Numbers that leave no fin are left out.
+    Raises DataError: a negative number."""
     if min(counts) < 0:
         raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
     robots = [in_worker(load_layout, name) for name in layouts]
-    return [(each, n, steerable_loss(each, n)) for each in robots for n in counts if n < each.n]
+    cases = [(each, n, steerable_loss(each, n)) for each in robots for n in counts if n < each.n]
+    able = [(each, n, lost) for each, n, lost in cases if lost is not None]
+    return able, [(each, n) for each, n, lost in cases if lost is None]
 
 
 POWER = (

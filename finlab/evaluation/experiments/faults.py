@@ -14,8 +14,8 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     Swim,
     follow_row,
-    over_seeds,
-    swum,
+    mean_rows,
+    repeated,
 )
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
@@ -74,18 +74,17 @@ def run(
     """
     robot, path = in_worker(load_layout, layout), in_worker(make_trajectory, trajectory)
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
-    cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
-    done: dict[tuple[Fault, str], list[Row]] = {}
-    parts = list(product(cases, range(seed, seed + runs)))
-    swims = [Swim(robot, path, name, controller, k, fault.fins, fault.time_s) for (fault, name), k in parts]
-    for (case, _), row in zip(parts, swum(specs, swims, "faults", follow_row), strict=True):
-        done.setdefault(case, []).append(row)
-    rows: list[Row] = []
-    for (fault, name), errors_of in done.items():
-        row = {"fault": fault.label, "method": name, "runs": len(errors_of), **over_seeds(errors_of)}
-        row["over_healthy"] = row["ate"] / over_seeds(done[faults[0], name])["ate"]
+    cases = [
+        ((fault.label, name), Swim(robot, path, name, controller, fault.fins, fault.time_s))
+        for fault, name in product(faults, specs)
+        if fault.controllable
+    ]
+    done = repeated(specs, cases, range(seed, seed + runs), "faults", follow_row)
+    rows = mean_rows(("fault", "method"), done)
+    healthy = {row["method"]: row["ate"] for row in rows if row["fault"] == HEALTHY}
+    for row, (_, errors_of) in zip(rows, done, strict=True):
+        row["over_healthy"] = row["ate"] / healthy[row["method"]]
         row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
-        rows.append(row)
     return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
 
 
