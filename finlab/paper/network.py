@@ -52,7 +52,7 @@ class NetworkConfig:
     """Number M of mixture components."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
         width, m = self.width, self.n_components
         shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)

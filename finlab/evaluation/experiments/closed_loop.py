@@ -66,13 +66,14 @@ def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swi
 
 
 def absolute_error(position: Array, reference: Array) -> float:
-    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m]."""
+    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m], world
+    frame."""
     return float(np.sqrt(np.square(position - reference).sum(axis=-1).mean()))
 
 
 def relative_error(position: Array, reference: Array, delta: int) -> float:
-    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. DataError:
-    there are no two samples that far apart."""
+    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. Raises
+    DataError: there are no two samples that far apart."""
     if not 0 < delta < len(position):
         raise DataError(f"relative error: expected a step of 1 to {len(position) - 1} samples, got {delta}")
     error = position - reference
@@ -80,7 +81,8 @@ def relative_error(position: Array, reference: Array, delta: int) -> float:
 
 
 def depth_error(position: Array, reference: Array) -> float:
-    """Root mean square error of the depth [m]."""
+    """Root mean square error of the depth [m] of positions (N, 3) beside a reference (N, 3) [m], world
+    frame."""
     return float(np.sqrt(np.square(position[:, 2] - reference[:, 2]).mean()))
 
 

@@ -30,7 +30,7 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each temperature, before any refinement.
+    """One row for each temperature, before any refinement. Raises DataError: a temperature of 0 or less.
 
     Args:
         temperatures: of the draw, above 0.

@@ -32,6 +32,7 @@ def run(
     seed: int = 0,
 ) -> list[Row]:
     """One row for each layout, number of lost fins, speed, controller and method, and one over all speeds.
+    Raises DataError: a duration of no more than `SETTLED_S`, or over an hour.
 
     Args:
         layouts: names or files.
