@@ -74,7 +74,7 @@ class Met(NamedTuple):
 
 
 class RudderLaw(ActuatorLaw):
-    """n rudders."""
+    """The law of n rudders, whose command is the deflection [rad]; their force is that of the flow."""
 
     feels_flow = True
 
@@ -248,7 +248,7 @@ class RudderGroup(Group):
 
 
 class RudderCommand(actuator.Command, frozen=True, rename={"deflection": "deflection_rad"}):
-    """What a rudder is told."""
+    """The command of a rudder, by name."""
 
     deflection: float
     """Angle of its chord from `zero` towards shaft x zero [rad]."""

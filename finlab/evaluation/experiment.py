@@ -33,7 +33,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Experiment:
-    """A question, and how it is answered."""
+    """A question, what is run to answer it, and the columns of its rows."""
 
     name: str  # of the verb and of the report's section
     question: str  # one sentence, in Markdown, which is the help of the verb, too
@@ -112,11 +112,11 @@ class Experiment:
         return Table(self.columns, [*ours, *printed])
 
     def words(self) -> list[Block]:
-        """Heading and question."""
+        """Blocks of heading and question, which stand before the results."""
         return [f"## {self.name.capitalize()}", self.question]
 
     def results(self, rows: Sequence[Row]) -> list[Block]:
-        """Table and note."""
+        """Blocks of the table of rows and of the note on how to read it."""
         return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
 
 

@@ -56,7 +56,7 @@ class MethodSpec:
     choice: methods.MethodChoice
 
     def on(self, layout: Layout) -> Allocator:
-        """Its allocator for a robot."""
+        """The allocator of the method for a robot. Raises AllocationError: the method does not take it."""
         return Allocator.of_choice(layout, self.choice)
 
     def with_settings(self, **changes: Any) -> "MethodSpec":

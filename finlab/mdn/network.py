@@ -23,7 +23,7 @@ LOG_STD = (-2.0, 2.0)
 
 @dataclass(frozen=True)
 class ForceNetworkConfig:
-    """Sizes of the network."""
+    """The network of method `mdn`: its sizes, the arrays that follow from them, and what it gives."""
 
     features: ClassVar[str] = "forces"
     """What it is fed, by its name in files."""

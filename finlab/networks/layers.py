@@ -48,7 +48,7 @@ def layer_norm(w: Weights, name: str, x: Values) -> Values:
 
 
 def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
-    """Two linear layers with a rectifier between them."""
+    """Two linear layers with a rectifier between them: features (..., width) of the same."""
     hidden = linear(w, up, x)
     return linear(w, down, np.maximum(hidden, 0) if library_of(x) is np else hidden.relu())
 
@@ -88,7 +88,7 @@ def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | 
 
 
 def leaky_relu(x: Values) -> Values:
-    """x above zero, a fifth of it below."""
+    """x above zero, `LEAK` times x below."""
     xp = library_of(x)
     return np.maximum(x, LEAK * x) if xp is np else xp.nn.functional.leaky_relu(x, LEAK)
 

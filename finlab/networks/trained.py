@@ -75,7 +75,7 @@ Kind = TypeVar("Kind", bound=Sizes)
 
 @dataclass(frozen=True)
 class TrainedWeights:
-    """The contents of a checkpoint."""
+    """The contents of a checkpoint: networks, their sizes, how they were made, and what they normalize by."""
 
     name: str
     normalization: Normalization

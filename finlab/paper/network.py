@@ -36,7 +36,7 @@ LOG_STD_BOUND = 3.0
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the paper's network."""
+    """The paper's network: its sizes, the arrays that follow from them, and what it gives with these."""
 
     features: ClassVar[str] = "raw"
     joint: ClassVar[bool] = False

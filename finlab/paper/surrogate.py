@@ -27,7 +27,7 @@ BLOCK = 64
 
 @dataclass(frozen=True)
 class SurrogateConfig:
-    """Sizes of the surrogate."""
+    """Sizes of the surrogate's perceptron, and the arrays that follow from them."""
 
     hidden: tuple[int, ...] = (512, 128)
     """Widths of the hidden layers; the first is printed, the second is not."""

@@ -65,7 +65,7 @@ class GridLaw(FinLaw):
 
 
 class TableLaw(GridLaw):
-    """The law of one table."""
+    """The law of one table of measured or computed forces, with what is known beside them."""
 
     def __init__(
         self,

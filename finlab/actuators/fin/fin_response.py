@@ -58,7 +58,7 @@ class FinTable(NamedTuple):
 
 
 class FinGroup(Group):
-    """The fins of a robot."""
+    """The fins of a robot as answers to prices: planes of forces, each compiled from its law."""
 
     def __init__(self, fins: Sequence[Any], effectiveness: Array) -> None:
         """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process.

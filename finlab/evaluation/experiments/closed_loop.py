@@ -29,7 +29,7 @@ LOST_M = 1.0
 
 
 class Swim(NamedTuple):
-    """One robot along one path."""
+    """One robot along one path, allocated by a method, steered by a controller, with or without losses."""
 
     layout: Layout
     path: Trajectory

@@ -37,13 +37,14 @@ class Fault:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Which fins are lost, and when, in words; `HEALTHY` where none is."""
         when = f" at {self.time_s:.0f} s" if self.time_s > 0 else ""
         return f"{' + '.join(self.fins)} lost{when}" if self.fins else HEALTHY
 
 
 def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
-    """Healthy, each fin, each pair, and each fin half-way."""
+    """The healthy robot, each fin and each pair lost from the start, and each fin at a time [s]; never
+    all."""
     names = layout.names
     lost = [((), 0.0), *(((name,), 0.0) for name in names)]
     lost += [(pair, 0.0) for pair in combinations(names, 2)] + [((name,), half_way_s) for name in names]

@@ -22,7 +22,7 @@ learned, and wide first weights start nearer to that."""
 
 
 def features(batch: Batch) -> Tensor:
-    """Node features x_i (B, n, 10)."""
+    """Node features x_i (B, n, 10) of a batch's robots, scaled as `raw_features` says."""
     x: Tensor = raw_features(batch.position, batch.mounting_angle, batch.lower, batch.upper)
     return x
 
@@ -69,7 +69,7 @@ def physics(surrogate: WrenchOf, batch: Batch, std: Tensor) -> Tensor:
 
 
 def imitation(mixture: Mixture, batch: Batch) -> Tensor:
-    """L_imit = -log p(u* | G) of the recorded commands."""
+    """L_imit = -log p(u* | G) (B,) of the recorded commands (Eq. 7), the sum over fins."""
     recorded = to_normalized(batch.command, batch.lower, batch.upper)
     likelihood: Tensor = mixture.log_prob(recorded[:, None])[:, 0]
     return -(likelihood * batch.mask).sum(1)
@@ -89,7 +89,7 @@ def guidance(
 
 
 def negative_entropy(mixture: Mixture, mask: Tensor) -> Tensor:
-    """L_ent = sum_k pi_k log pi_k, the mean over fins."""
+    """L_ent = sum_k pi_k log pi_k (B,) (Eq. 7), the mean over the fins where `mask` (B, n) is True."""
     log_weight = mixture.logits.log_softmax(-1)
     value = (log_weight.exp() * log_weight).sum(-1)
     mean: Tensor = (value * mask).sum(1) / mask.sum(1)

@@ -37,7 +37,7 @@ class AllocatorTraining(PaperLoop):
     """Weight lambda; not printed."""
 
     def beta(self, step: int) -> float:
-        """Weight of the guidance in a step."""
+        """Weight beta of the guidance in a step: it rises linearly over `ramp`, then stays."""
         ramp = min(1.0, step / max(1.0, self.ramp * self.steps))
         return self.guidance_start + ramp * (self.guidance - self.guidance_start)
 

@@ -89,7 +89,7 @@ def generate(folder: Path, settings: DataSettings) -> None:
 
 
 def drawn_part(settings: DataSettings, number: int) -> bytes:
-    """The file of part `number`."""
+    """The content of the file of part `number`: the arrays `FIELDS` as npz."""
     first = number * settings.together
     some = range(first, min(first + settings.together, settings.layouts))
     robots = [samples_of(settings, k) for k in some]
@@ -121,7 +121,7 @@ def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
 
 
 def part_file(folder: Path, number: int) -> Path:
-    """The file of part `number`."""
+    """Where part `number` lies in the folder of a data set."""
     return folder / f"part-{number:05d}.npz"
 
 

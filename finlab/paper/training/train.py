@@ -59,7 +59,7 @@ class Bench:
         return self.samples.batch(step, settings.batch_size, self.seed, settings.one_layout, self.rows)
 
     def noise(self, step: int) -> tuple[Tensor, Tensor]:
-        """The share of the noise of `guidance`."""
+        """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1, 3)."""
         device, shape = self.place.device, (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
