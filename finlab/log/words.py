@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
-from finlab.axes import AXES
+from finlab.axes import AXES, UNITS
 from finlab.display.pictures import COLORS
 from finlab.evaluation.document import Block, Column, Row, Table, to_text
 from finlab.log.judgement import Judgement
@@ -15,21 +15,19 @@ from finlab.log.judgement import Judgement
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+IMPULSES = [f"{unit} s" for unit in UNITS]
 MOST_SPELLS, MOST_EVENTS = 10, 10
 """Most spells and events that the text tells."""
 
 
 def judgement_text(judged: Judgement) -> str:
     """The sentence, then what was lost on each axis, when, and what each replay misses."""
-    units = ["N s" if k < 3 else "N m s" for k in range(6)]
-    columns = [("axis", "axis", "text"), ("unit", "unit", "text"), ("asked", "asked for", "three")]
-    columns += [("missing", "missing", "three"), ("lost", "lost [s]", "three")]
-    each = zip(MOTIONS, AXES, units, judged.asked, judged.missing, judged.lost_s, strict=True)
-    rows = [
-        {"axis": f"{motion} {axis}", "unit": unit, "asked": asked, "missing": missing, "lost": lost}
-        for motion, axis, unit, asked, missing, lost in each
-    ]
-    blocks: list[Block] = [judged.sentence, Table(tuple(Column(*c) for c in columns), rows)]
+    columns = [Column("axis", "axis"), Column("unit", "unit"), Column("asked", "asked for", "three")]
+    columns += [Column("missing", "missing", "three"), Column("lost", "lost [s]", "three")]
+    names = [f"{motion} {axis}" for motion, axis in zip(MOTIONS, AXES, strict=True)]
+    each = zip(names, IMPULSES, judged.asked, judged.missing, judged.lost_s, strict=True)
+    rows: list[Row] = [dict(zip([column.key for column in columns], row, strict=True)) for row in each]
+    blocks: list[Block] = [judged.sentence, Table(tuple(columns), rows)]
     worst = sorted(judged.spells, key=lambda spell: spell.start - spell.end)[:MOST_SPELLS]
     for spell in sorted(worst, key=lambda spell: spell.start):
         places = [k for k, axis in enumerate(AXES) if axis in spell.axes]
@@ -46,23 +44,21 @@ def judgement_text(judged: Judgement) -> str:
 
 def _replays(judged: Judgement) -> Table:
     """Replays on the robot and the improved one, and, with each actuator lost, the best and the log's own."""
-    own = {"px4", "ardusub"} if judged.held_by is None else {"px4", "ardusub", judged.held_by.name}
+    own = {"px4", "ardusub", "" if judged.held_by is None else judged.held_by.name}
     rows: list[Row] = [
-        {
-            **{axis: value for axis, value in zip(AXES, each.missing, strict=True)},
-            **{"robot": each.robot if each.lost is None else f"without {each.lost}", "by": each.name},
-            **{
-                "watts": each.watts,
-                "seconds": each.saturated_s,
-                "_kind": "ours" if each == judged.held_by else "",
-            },
-        }
+        vars(each)
+        | {axis: missing for axis, missing in zip(AXES, each.missing, strict=True)}
+        | {"robot": each.robot if each.lost is None else f"without {each.lost}"}
+        | {"_kind": "ours" if each == judged.held_by else ""}
         for each in judged.replays
         if each.lost is None or each.name in own
     ]
-    columns = [Column("robot", "robot"), Column("by", "method")]
-    columns += [Column(axis, axis, "three", unit="N s" if k < 3 else "N m s") for k, axis in enumerate(AXES)]
-    columns += [Column("watts", "power", "three", unit="W"), Column("seconds", "short", "three", unit="s")]
+    columns = [Column("robot", "robot"), Column("name", "method")]
+    columns += [Column(axis, axis, "three", unit=unit) for axis, unit in zip(AXES, IMPULSES, strict=True)]
+    columns += [
+        Column("watts", "power", "three", unit="W"),
+        Column("saturated_s", "short", "three", unit="s"),
+    ]
     return Table(tuple(columns), rows)
 
 
@@ -81,7 +77,7 @@ def picture(judged: Judgement) -> Figure:
         cut = np.abs(line.missing[:, k]) > 0.0
         ends = {"step": "post", "color": COLORS[1], "alpha": 0.5, "lw": 0, "label": "missing"}
         axes.fill_between(line.time, line.demand[:, k], line.given[:, k], where=cut, **ends)
-        axes.set_ylabel(f"{MOTIONS[k]} [{'N' if k < 3 else 'N m'}]")
+        axes.set_ylabel(f"{MOTIONS[k]} [{UNITS[k]}]")
         axes.grid(alpha=0.3)
     panels[0].legend(loc="upper right", ncols=3, fontsize="small")
     edges = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
