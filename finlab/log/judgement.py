@@ -79,7 +79,8 @@ class Judgement:
     axis: str | None
     """Axis that lost most, as a share of the yardstick; None where none was lost."""
     stopped: tuple[str, ...]
-    """Actuators that were at rest all along while what they would have given was missing."""
+    """Actuators that were at rest all along while what they would have given was missing, and those that the
+    autopilot had stopped at last, or that had ceased to turn by then."""
     spells: tuple[Spell, ...]
     """Those that lost most, by time."""
     n_spells: int

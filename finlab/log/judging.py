@@ -77,7 +77,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         saturated_s=float(span @ account.lost.any(axis=1)),
         watts=account.watts,
         axis=axis,
-        stopped=account.stopped,
+        stopped=account.names(account.dead | account.gone[-1]),
         spells=tuple(sorted(worst, key=lambda spell: spell.start)),
         n_spells=len(spells),
         replays=tuple(replays),
@@ -105,10 +105,12 @@ class Account:
         self.away = np.where(np.isfinite(log.demand), self.demand - self.given, 0.0)
         """Demand less that (N, 6)."""
         self.at = self.full | self.ended
-        dead = self._dead()
-        self.stopped = tuple(name for name, one in zip(log.robot.names, dead, strict=True) if one)
-        """Actuators at rest all along, to whom most of what was away is due."""
-        self.missing = np.where((self._bound() | dead.any())[:, None], self.away, 0.0)
+        self.dead = self._dead()
+        """Actuators (n,) at rest all along, to whom most of what was away is due."""
+        command = np.zeros((1, log.robot.n, 3)) if log.command is None else log.command
+        self.gone = np.isnan(command).any(axis=-1) & ~self.dead
+        """Which others were stopped, or stood still (N, n)."""
+        self.missing = np.where((self._bound() | self.dead.any())[:, None], self.away, 0.0)
         """The same where a limit is why (N, 6)."""
         self.lost = np.abs(self.missing) > LOST * self.scale
         """Which axes were lost (N, 6)."""
@@ -163,6 +165,10 @@ class Account:
         explained = np.square(off - force @ columns).sum() < DEAD * size
         return np.asarray(rest & (share > DEAD) & explained)
 
+    def names(self, flags: Flags) -> tuple[str, ...]:
+        """Names of the actuators with a flag (n,)."""
+        return tuple(name for name, one in zip(self.log.robot.names, flags, strict=True) if one)
+
     def spells(self) -> list[Spell]:
         """Times between which axes were lost, without longer breaks."""
         time, span, places = self.log.time, self.log.span, np.flatnonzero(self.lost.any(axis=1))
@@ -181,7 +187,11 @@ class Account:
             missing=six(span @ np.abs(self.missing[rows]), self.scale),
             asked=six(span @ self.demand[rows] / span.sum(), self.scale),
             gave=six(span @ self.given[rows] / span.sum(), self.scale),
-            limits=(*(f"{name} at rest all along" for name in self.stopped), *limit_words(log.robot, *flags)),
+            limits=(
+                *(f"{name} at rest all along" for name in self.names(self.dead)),
+                *(f"{name} stopped" for name in self.names(np.any(self.gone[rows], axis=0))),
+                *limit_words(log.robot, *flags),
+            ),
         )
 
     def timeline(self) -> Timeline:

@@ -1,6 +1,7 @@
 """Reads a log and poses it for one robot: demands in newtons, outputs as commands of its actuators."""
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
 from finlab.log import ardusub_log, px4_log, ros_bag
 from finlab.log.ardusub_log import FULL_US, REST_US
-from finlab.log.recorded import Event, Form, Recorded
+from finlab.log.recorded import Event, Form, Recorded, Series
 from finlab.physics.objective import yardstick
 
 MOST_BYTES = 1_000_000_000
@@ -29,6 +30,10 @@ MOST_SAMPLES = 1_000_000
 """Most samples of demands: five hours at 50 Hz."""
 GAP_S = 1.0
 """Longest time that a sample holds; what lies beyond it was not logged."""
+
+STILL_S, PUSHES = 1.0, 0.2
+"""How long [s] a thruster is told to push, by this share of its most at least, before it is dead for not
+turning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +170,10 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
     command = unmet = None
     if record.outputs is not None:
         command = commands_of(record, record.outputs.values, robot, sides)
+        for i, k in _dead(command, record.turns, time, robot):
+            words = "stood still from here on although it was told to push"
+            record.events.append(Event(float(time[k]), words, i))
+            command[k:, i] = np.nan
         idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
         kept &= ~idle
         if idle.any():
@@ -199,6 +208,18 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
+
+
+def _dead(command: Array, turns: Series | None, time: Array, robot: Layout) -> Iterator[tuple[int, int]]:
+    """Thrusters that turned once, but no more although told so (N, n, 3), and the sample where that began."""
+    speed = np.empty((len(time), 0)) if turns is None else turns.at(time)
+    held = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
+    most = np.maximum(robot.upper, -robot.lower)[:, 0]
+    for i, turned in enumerate(speed.T[: robot.n] != 0.0):
+        told = np.abs(command[:, i, 0]) > PUSHES * most[i]
+        told[: len(turned) - turned[::-1].argmax()] = False
+        if np.nan_to_num(speed[:, i]).any() and held[told].sum() > STILL_S:
+            yield i, int(told.argmax())
 
 
 def robot_rest(robot: Layout) -> Array:

@@ -74,8 +74,11 @@ def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.n
     return time, demand
 
 
-def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares") -> Dive:
-    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers."""
+def px4_dive(
+    path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares", speed: np.ndarray | None = None
+) -> Dive:
+    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers. ESCs say
+    the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
     force = Allocator(robot, "px4").allocate_batch(demand).command[..., 0]
@@ -101,7 +104,7 @@ def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares
     topics["failure_detector_status"] = (time, {"motor_failure_mask": np.where(late, 4, 0).astype(np.uint16)})
     escs = {"esc_count": np.full(n, 8, np.uint16)}
     escs["esc_online_flags"] = np.where(late, 0x7F, 0xFF).astype(np.uint16)
-    topics["esc_status"] = (time, escs)
+    topics["esc_status"] = (time, escs if speed is None else escs | {"esc.esc_rpm": speed})
     status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
     topics["control_allocator_status"] = (time + 0.001, status)
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
