@@ -44,7 +44,7 @@ def read_dataflash(path: Path) -> Recorded:
     parameters = {name: float(value) for name, value in _rows(tables, "PARM", "Name", "Value")}
     time, throttle, sticks = rate["time"], rate.get("AOut"), tables.get("RCIN", {})
     if throttle is None and (control := tables.get("CTUN")):
-        throttle = Series.of(control["time"], control["ThO"][:, None]).at(time)[:, 0]
+        throttle = _held(control, "ThO", time)[:, 0]
     heave = np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
     channels = {name: int(parameters.get(f"RCMAP_{name}", usual)) for name, usual in STICKS.items()}
     forward, lateral = (_stick(sticks, parameters, channel, time) for channel in channels.values())
@@ -120,13 +120,14 @@ def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Ar
         parameters.get(f"RC{channel}_{key}", value)
         for key, value in (("MIN", 1100), ("TRIM", 1500), ("MAX", 1900))
     )
-    share = np.interp(np.where(pulses > 0, pulses, rest), [least, rest, most], [-1.0, 0.0, 1.0])
+    ends = np.maximum.accumulate([least, rest, most])
+    share = np.interp(np.where(pulses > 0, pulses, rest), ends, [-1.0, 0.0, 1.0])
     sign = -1.0 if parameters.get(f"RC{channel}_REVERSED", 0) else 1.0
     return np.nan_to_num(Series.of(sticks["time"], sign * share[:, None]).at(time)[:, 0])
 
 
 def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str, float]) -> None:
-    """Shares of full output of the motors, as their frame says which way they push."""
+    """Shares of full output of the motors, as their frame says which way they push, and what ESCs say."""
     if (pulses := tables.get("RCOU")) is None:
         return
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}
@@ -134,12 +135,22 @@ def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str,
         functions = {FIRST_MOTOR + i: i + 1 for i in range(MOTORS)}
         how = "channel n is motor n"
         record.notes.append(f"It says of no output that it is a motor's (SERVOn_FUNCTION): {how}.")
-    shares = []
+    time, escs, shares, speeds = pulses["time"], tables.get("ESC", {}), [], []
     for motor in range(MOTORS):
-        pulse = pulses.get(f"C{functions.get(FIRST_MOTOR + motor)}")
-        if pulse is None:
+        channel = functions.get(FIRST_MOTOR + motor, 0)
+        if (pulse := pulses.get(f"C{channel}")) is None:
             break
         sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
         shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
+        rows, speed = escs.get("Instance", np.empty(0)) == channel - 1, np.full((len(time), 1), np.nan)
+        speeds.append(_held(escs, "RPM", time, rows) if rows.any() else speed)
     if shares:
-        record.outputs = Series.of(pulses["time"], np.stack(shares, axis=1))
+        record.outputs, record.turns = (
+            Series.of(time, np.stack(shares, axis=1)),
+            Series.of(time, np.hstack(speeds)),
+        )
+
+
+def _held(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:
+    """What a column held at times (N,), as (N, 1)."""
+    return Series.of(table["time"][rows], table[column][rows][:, None]).at(time)

@@ -110,9 +110,9 @@ def px4_dive(
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
 
 
-def sub_dive(path: Path, n: int = 3000, dt: float = 0.02) -> Dive:
+def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | None = None) -> Dive:
     """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are the sum of
-    factors, cut at full."""
+    factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
@@ -135,6 +135,9 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02) -> Dive:
         "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **{f"C{i}": pulse[:, i - 1] for i in range(1, 9)}}),
         "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
     }
+    if speed is not None:
+        motors = {"TimeUS": np.repeat(us, 8), "Instance": np.tile(np.arange(8), n), "RPM": speed.ravel()}
+        messages["ESC"] = ("QBe", motors)
     parameters = {"FRAME_CONFIG": 2.0, **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)}}
     parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
     return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)
