@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.axes import AXES, UNITS
-from finlab.display.pictures import COLORS
+from finlab.display.pictures import COLORS, panels
 from finlab.evaluation.document import Block, Column, Row, Table, to_text
 from finlab.log.judgement import Judgement
 
@@ -64,25 +64,21 @@ def _replays(judged: Judgement) -> Table:
 
 def picture(judged: Judgement) -> Figure:
     """Demand and what the outputs gave over time, of each axis asked for, and actuators at limits."""
-    from matplotlib.figure import Figure
-
     line, names = judged.timeline, judged.robot.names
     shown = [k for k in range(6) if judged.asked[k] > 1e-3 * max(judged.asked)] or [0]
-    size: dict[str, Any] = {"figsize": (9.0, 1.6 * len(shown) + 2.2), "layout": "constrained"}
-    figure = Figure(**size)
-    panels: Any = figure.subplots(len(shown) + 1, sharex=True, squeeze=False)[:, 0]
-    for k, axes in zip(shown, panels, strict=False):
+    figure, rows = panels((9.0, 1.6 * len(shown) + 2.2), len(shown) + 1, sharex=True)
+    *upper, last = rows[:, 0]
+    for k, axes in zip(shown, upper, strict=True):
         axes.step(line.time, line.demand[:, k], where="post", color="0.55", label="asked for")
         axes.step(line.time, line.given[:, k], where="post", color=COLORS[0], label="given")
         cut = np.abs(line.missing[:, k]) > 0.0
         ends = {"step": "post", "color": COLORS[1], "alpha": 0.5, "lw": 0, "label": "missing"}
         axes.fill_between(line.time, line.demand[:, k], line.given[:, k], where=cut, **ends)
         axes.set_ylabel(f"{MOTIONS[k]} [{UNITS[k]}]")
-        axes.grid(alpha=0.3)
-    panels[0].legend(loc="upper right", ncols=3, fontsize="small")
+    upper[0].legend(loc="upper right", ncols=3, fontsize="small")
     edges = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
-    panels[-1].pcolormesh(edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0)
-    panels[-1].set_yticks(np.arange(len(names)) + 0.5, names, fontsize="x-small")
-    panels[-1].set(ylabel="at a limit", xlabel="time of the log [s]")
+    last.pcolormesh(edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0)
+    last.set_yticks(np.arange(len(names)) + 0.5, names, fontsize="x-small")
+    last.set(ylabel="at a limit", xlabel="time of the log [s]")
     figure.suptitle(judged.source)
     return figure

@@ -27,6 +27,7 @@ KEPT = ROOT / "build" / "shown"
 FENCE = re.compile(r'^```(\w*)(?: title="(.*?)")?\n(.*?)^```\n', re.MULTILINE | re.DOTALL)
 LONGEST = 40  # lines of output that are shown
 ENVIRONMENT = {"COLUMNS": "100", "NO_COLOR": "1", "PYTHONWARNINGS": "ignore"}
+QUIET = ["--IPKernelApp.log_level=40"]  # of kernels
 WRITE = """from pathlib import Path
 _ = Path({0!r})
 _.parent.mkdir(parents=True, exist_ok=True)
@@ -78,7 +79,8 @@ def run(source: str, notebook: Any, code: str) -> Any:
         if source.startswith("examples/"):
             for data in (ROOT / "examples").glob("*.csv"):
                 shutil.copy(data, folder)
-        client = NotebookClient(whole, timeout=None, resources={"metadata": {"path": folder}})
+        about = {"resources": {"metadata": {"path": folder}}, "extra_arguments": QUIET}
+        client = NotebookClient(whole, timeout=None, **about)
         try:
             client.execute(env=own)
         except CellExecutionError as error:
