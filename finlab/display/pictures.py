@@ -24,8 +24,8 @@ SHARPNESS = {"box": 0.2}
 
 
 def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
-    """Returns a picture as the content of a file: png, svg or pdf. Text in it is no formula: it may be a
-    stranger's."""
+    """Returns a picture as the content of a file: png, svg or pdf, of `dpi` pixels per inch. Text in it is no
+    formula: it may be a stranger's. Raises ImportError: matplotlib is not installed."""
     import matplotlib
 
     content = io.BytesIO()

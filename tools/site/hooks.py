@@ -28,7 +28,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Run all blocks and examples, and add the pages that are made of code."""
     examples = sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))
     pages = {f"docs/{file.src_uri}": file.content_string for file in files.documentation_pages()}
-    notebooks = {f"examples/{path.name}": jupytext.read(path, "py:percent") for path in examples}
+    notebooks = {f"examples/{path.name}": jupytext.read(path, fmt="py:percent") for path in examples}
     notebooks |= {name: blocks.notebook_of(page) for name, page in pages.items() if "```" in page}
     _shown.update(blocks.run_all(notebooks))
     made: dict[str, str | bytes] = {**reference.python_pages(), **reference.command_pages()}
