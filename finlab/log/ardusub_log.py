@@ -33,9 +33,9 @@ Columns = dict[str, Any]
 
 def read_dataflash(path: Path) -> Recorded:
     """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
-    tables, whole = _tables(path)
+    tables, complete = _tables(path)
     messages = [*_rows(tables, "MSG", "time", "Message")]
-    if other := next((found for _, words in messages if (found := VEHICLE.match(words))), None):
+    if other := next((match for _, words in messages if (match := VEHICLE.match(words))), None):
         raise DataError(f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known")
     if (rate := tables.get("RATE")) is None:
         has = ", ".join(sorted(tables)) or "nothing"
@@ -50,7 +50,7 @@ def read_dataflash(path: Path) -> Recorded:
     forward, lateral = (_stick(sticks, parameters, channel, time) for channel in channels.values())
     setpoints = [forward, -lateral, heave, rate["ROut"], -rate["POut"], -rate["YOut"]]
     record = Recorded("ardusub", Series.of(time, np.stack(setpoints, axis=1)))
-    if not whole:
+    if not complete:
         record.notes.append(CUT)
     lacking = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
     for name in lacking:

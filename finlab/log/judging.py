@@ -100,9 +100,9 @@ class Account:
         """Mean power of the outputs [W]; None without outputs."""
         self.full = self.ended = np.zeros((len(log), log.robot.n), bool)
         """Which actuators were at full thrust, and which at the end of their arc (N, n)."""
-        self.given = self._given()
+        self.delivered = self._delivered()
         """Wrench of the outputs (N, 6)."""
-        self.away = np.where(np.isfinite(log.demand), self.demand - self.given, 0.0)
+        self.away = np.where(np.isfinite(log.demand), self.demand - self.delivered, 0.0)
         """Demand less that (N, 6)."""
         self.at = self.full | self.ended
         self.dead = self._dead()
@@ -117,7 +117,7 @@ class Account:
         self.impulse = log.span @ np.abs(self.missing)
         """(6,) [N s, N m s]."""
 
-    def _given(self) -> Array:
+    def _delivered(self) -> Array:
         log = self.log
         if (command := log.command) is None:
             if log.unmet is not None:
@@ -125,14 +125,14 @@ class Account:
             method = "dual" if log.form == "ros" else log.form
             command = Allocator(log.robot, method).allocate_batch(log.demand).command
         self.full, self.ended = at_limits(log.robot, command)
-        plant, given, energy = plant_of(log.robot), np.empty((len(log), 6)), 0.0
+        plant, delivered, energy = plant_of(log.robot), np.empty((len(log), 6)), 0.0
         for k in range(0, len(log), CHUNK):
             rows = slice(k, k + CHUNK)
-            given[rows] = plant.wrench(command[rows])
+            delivered[rows] = plant.wrench(command[rows])
             energy += float(log.span[rows] @ judged_power(plant, command[rows]))
         if log.command is not None:
             self.watts = energy / float(log.span.sum())
-        return given
+        return delivered
 
     def _bound(self) -> Flags:
         """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster
@@ -186,7 +186,7 @@ class Account:
             axes=axes_in(np.any(lost, axis=0)),
             missing=six(span @ np.abs(self.missing[rows]), self.scale),
             asked=six(span @ self.demand[rows] / span.sum(), self.scale),
-            gave=six(span @ self.given[rows] / span.sum(), self.scale),
+            gave=six(span @ self.delivered[rows] / span.sum(), self.scale),
             limits=(
                 *(f"{name} at rest all along" for name in self.names(self.dead)),
                 *(f"{name} stopped" for name in self.names(np.any(self.gone[rows], axis=0))),
@@ -198,7 +198,7 @@ class Account:
         """Means over pieces of the log."""
         span, n = self.log.span, len(self.log)
         starts = np.unique(np.linspace(0, n, BINS, endpoint=False).astype(np.intp))
-        columns = (self.demand, self.given, self.missing, self.at)
+        columns = (self.demand, self.delivered, self.missing, self.at)
         sums = [np.add.reduceat(span[:, None] * each, starts) for each in columns]
         return Timeline(
             self.log.time[starts], *(each / np.add.reduceat(span, starts)[:, None] for each in sums)

@@ -216,10 +216,10 @@ def _dead(command: Array, turns: Series | None, time: Array, robot: Layout) -> I
     held = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
     most = np.maximum(robot.upper, -robot.lower)[:, 0]
     for i, turned in enumerate(speed.T[: robot.n] != 0.0):
-        told = np.abs(command[:, i, 0]) > PUSHES * most[i]
-        told[: len(turned) - turned[::-1].argmax()] = False
-        if np.nan_to_num(speed[:, i]).any() and held[told].sum() > STILL_S:
-            yield i, int(told.argmax())
+        pushes = np.abs(command[:, i, 0]) > PUSHES * most[i]
+        pushes[: len(turned) - turned[::-1].argmax()] = False
+        if np.nan_to_num(speed[:, i]).any() and held[pushes].sum() > STILL_S:
+            yield i, int(pushes.argmax())
 
 
 def robot_rest(robot: Layout) -> Array:

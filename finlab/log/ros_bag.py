@@ -44,8 +44,8 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
             message: Any = reader.deserialize(raw, connection.msgtype)
             time = (nanoseconds - reader.start_time) * 1e-9
             if connection.msgtype == HEALTH:
-                told = [each for each in message.status if each.level >= WARNING]
-                events += [Event(time, f"{each.name}: {each.message}") for each in told]
+                warnings = [each for each in message.status if each.level >= WARNING]
+                events += [Event(time, f"{each.name}: {each.message}") for each in warnings]
             else:
                 rows[connection.topic].append((time, _numbers(message)))
     record = Recorded("ros", _series(path, demanded, rows), events=events)
@@ -66,14 +66,14 @@ def _topic(
     path: Path, kinds: dict[str, str], wanted: Sequence[str], named: str | None, option: str
 ) -> str | None:
     """The topic that an option names, or the only one of some types; None where there are no outputs."""
-    found = [topic for topic in sorted(kinds) if kinds[topic] in wanted and named in (None, topic)]
-    if not found and (named is not None or option == "demand"):
+    topics = [topic for topic in sorted(kinds) if kinds[topic] in wanted and named in (None, topic)]
+    if not topics and (named is not None or option == "demand"):
         what = "" if named is None else f" {named!r:.60}"
         only = ", ".join(sorted(kinds)) or "none"
         raise DataError(f"{path}: has no topic{what} of {' or '.join(wanted)}, only {only}")
-    if len(found) > 1:
-        raise DataError(f"{path}: has several topics for {option}: {', '.join(found)}; say --{option} TOPIC")
-    return found[0] if found else None
+    if len(topics) > 1:
+        raise DataError(f"{path}: has several topics for {option}: {', '.join(topics)}; say --{option} TOPIC")
+    return topics[0] if topics else None
 
 
 def _series(path: Path, topic: str | None, rows: dict[Any, list[tuple[float, Any]]]) -> Series:
