@@ -135,6 +135,8 @@ def vector_words(values: Sequence[float]) -> str:
 Axis = Literal["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
 AXES: tuple[Axis, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 """The axes of a wrench, in order: forces [N] and torques [N m] along x forward, y left, z up."""
+UNITS = ("N", "N", "N", "N m", "N m", "N m")
+"""In which each of them is told."""
 CommandedAxes = Annotated[
     tuple[Axis, ...],
     Meta(min_length=1, max_length=6, description="axes of the wrench that the robot commands"),

@@ -24,8 +24,8 @@ SHARPNESS = {"box": 0.2}
 
 
 def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
-    """Returns a picture as the content of a file: png, svg or pdf. Text in it is no formula: it may be a
-    stranger's."""
+    """Returns a picture as the content of a file: png, svg or pdf, of `dpi` pixels per inch. Text in it is no
+    formula: it may be a stranger's. Raises ImportError: matplotlib is not installed."""
     import matplotlib
 
     content = io.BytesIO()
@@ -85,18 +85,28 @@ def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, 
 
 def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) -> Figure:
     """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at NaN."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.0, 2.4), layout="constrained")
-    axes: Any = figure.subplots(1, 2)
+    figure, axes = panels((6.0, 2.4), 1, 2)
     width, low = np.nan_to_num(high - low), np.nan_to_num(low)
-    for side, unit, rows in zip(axes, ("N", "N m"), (slice(3), slice(3, 6)), strict=True):
+    for side, unit, rows in zip(axes[0], ("N", "N m"), (slice(3), slice(3, 6)), strict=True):
         side.barh(names[rows], width[rows], left=low[rows], color=COLORS[0])
         side.axvline(0.0, color="k", linewidth=0.8)
         side.set(xlabel=unit)
         side.invert_yaxis()
     figure.suptitle(title)
     return figure
+
+
+def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+    """Returns a figure of this size [inches] and its panels (rows, columns), with grids; `how` goes
+    to matplotlib's `subplots`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    axes: Any = figure.subplots(rows, columns, squeeze=False, **how)
+    for each in axes.flat:
+        each.grid(alpha=0.3)
+        each.set_axisbelow(True)
+    return figure, axes
 
 
 def _space(title: str, points: Array, unit: str) -> tuple[Figure, Any]:

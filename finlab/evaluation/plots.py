@@ -10,7 +10,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.assets import install
-from finlab.display.pictures import COLORS, drawn
+from finlab.display.pictures import COLORS, drawn, panels
 from finlab.errors import DataError
 from finlab.evaluation.document import Row
 from finlab.sim.log import RunLog
@@ -24,6 +24,8 @@ FORMATS = (".png", ".svg", ".pdf")  # kinds of files that are written
 DPI = 150
 MARKERS = "osD^v<>"
 LEAST_ERROR = 1e-12  # errors below this one are drawn there: a logarithmic axis has no 0
+STYLES = ("-", "--", ":", "-.")
+"""Of the lines of one color, which the first word of a name has."""
 
 
 def check_picture(path: Path | None) -> None:
@@ -113,19 +115,10 @@ def fins_picture(rows: Sequence[Row]) -> Figure:
 
 
 def _axes(title: str) -> tuple[Figure, Axes]:
-    """A figure of its own, without matplotlib's global state."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.4), layout="constrained")
-    axes: Any = figure.subplots()
-    axes.set_title(title)
-    axes.grid(alpha=0.3, which="major")
-    axes.set_axisbelow(True)
-    return figure, axes
-
-
-STYLES = ("-", "--", ":", "-.")
-"""Of the lines of one color, which the first word of a name has."""
+    """A figure of one panel."""
+    figure, axes = panels((7.0, 4.4))
+    axes[0, 0].set_title(title)
+    return figure, axes[0, 0]
 
 
 def swim_picture(log: RunLog) -> Figure:
@@ -148,11 +141,7 @@ def paths_picture(swims: Mapping[str, tuple[Array, Array, Mapping[str, tuple[Arr
         swims: robot to times (N,) [s] and positions (N, 3) [m] of its reference, and the same of each swim by
             its name; names that begin with one word have one color.
     """
-    from matplotlib.figure import Figure
-
-    size: dict[str, Any] = {"figsize": (max(4.2 * len(swims), 6.0), 7.0), "layout": "constrained"}
-    figure = Figure(**size)
-    axes: Any = figure.subplots(2, len(swims), squeeze=False, height_ratios=(3, 1))
+    figure, axes = panels((max(4.2 * len(swims), 6.0), 7.0), 2, len(swims), height_ratios=(3, 1))
     names = [name for _, _, paths in swims.values() for name in paths]
     firsts = list(dict.fromkeys(name.partition(",")[0] for name in names))
     for (above, below), (robot, (time, reference, paths)) in zip(axes.T, swims.items(), strict=True):
@@ -172,6 +161,4 @@ def paths_picture(swims: Mapping[str, tuple[Array, Array, Mapping[str, tuple[Arr
             fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False
         )
         below.set(xlabel="time [s]", ylabel="z [m]")
-        for each in (above, below):
-            each.grid(alpha=0.3)
     return figure

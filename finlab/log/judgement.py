@@ -1,17 +1,22 @@
 """The judgement of a log, as plain data."""
 
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import to_builtins
 
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.axes import AXES, UNITS
 from finlab.evaluation.document import three
 from finlab.layout import Layout
 from finlab.layout.file import layout_to_dict
 from finlab.log.replay import Replay
+
+HELD = 0.02
+"""Share of what was missing along an axis that a replay which holds it may miss."""
 
 
 @dataclass(frozen=True)
@@ -74,15 +79,13 @@ class Judgement:
     axis: str | None
     """Axis that lost most, as a share of the yardstick; None where none was lost."""
     stopped: tuple[str, ...]
-    """Actuators that were at rest all along while what they would have given was missing."""
+    """Actuators that were at rest all along while what they would have given was missing, and those that the
+    autopilot had stopped at last, or that had ceased to turn by then."""
     spells: tuple[Spell, ...]
     """Those that lost most, by time."""
     n_spells: int
     """How many there were."""
     replays: tuple[Replay, ...]
-    held_by: Replay | None
-    """Replay on the robot as it is (without the one actuator that was stopped), or else on the improved one,
-    that holds the axis, with least missing, then least power; None where none does, or nothing was lost."""
     improved: Layout | None
     """Layout on which the hardest demands cost least; None where none was found, or asked for."""
     timeline: Timeline
@@ -93,6 +96,23 @@ class Judgement:
     """Sentences on what the log lacks, each with the option that gives it."""
 
     @property
+    def without(self) -> str | None:
+        """The one actuator that was stopped, which replays that could have held an axis do without."""
+        return self.stopped[0] if len(self.stopped) == 1 else None
+
+    @property
+    def held_by(self) -> Replay | None:
+        """Replay on the robot as it is, or else on the improved one, that holds the axis, with least missing,
+        then least power; None where none does, or nothing was lost."""
+        if self.axis is None:
+            return None
+        i = AXES.index(self.axis)
+        able = [each for each in self.replays if each.lost == self.without]
+        held = [each for each in able if each.missing[i] <= HELD * self.missing[i]]
+        price = {each: (round(sum(each.missing / self.scale), 3), each.watts) for each in held}
+        return min(held, key=lambda each: (each.robot != "as it is", *price[each]), default=None)
+
+    @property
     def sentence(self) -> str:
         """The answer."""
         if self.axis is None:
@@ -101,53 +121,34 @@ class Judgement:
         longest = max(self.spells, key=lambda spell: spell.end - spell.start)
         worst = max(self.spells, key=lambda spell: spell.missing[i])
         why = f", with {', '.join(worst.limits[:4])}" if worst.limits else ""
-        begin = (
+        return (
             f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {three(self.lost_s[i])} s of "
             f"{three(self.seconds)} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the longest from "
-            f"{longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing[i], i)} of "
-            f"{amount(self.asked[i], i)} were missing{why}"
+            f"{longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} of "
+            f"{amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
         )
-        return f"{begin}; {self._remedy(i)}."
-
-    @property
-    def without(self) -> str | None:
-        """The one actuator that was stopped, which replays that could have held an axis do without."""
-        return self.stopped[0] if len(self.stopped) == 1 else None
 
     def _remedy(self, i: int) -> str:
-        if (held := self.held_by) is None:
-            least = min(self.replays, key=lambda each: (each.lost != self.without, each.missing[i]))
-            where = "" if least.robot == "as it is" else ", on the improved layout,"
-            where = where if least.lost is None else f" without {least.lost}"
-            misses = amount(least.missing[i], i)
-            return f"no policy would have held it; {least.name}{where} comes nearest and misses {misses}"
-        where = "" if held.robot == "as it is" else " on the improved layout, and nothing on this one"
-        where = where if held.lost is None else f" without {held.lost}"
-        more = np.subtract(held.missing, self.missing)
-        least = 0.02 * self.missing[i] * self.scale / self.scale[i]
-        price = [f"{amount(more[k], int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
-        return f"{held.name} would have held it{where}" + (f", for {' and '.join(price)}" if price else "")
+        best = self.held_by or min(self.replays, key=lambda r: (r.lost != self.without, r.missing[i]))
+        where = "" if best.lost is None else f" without {best.lost}"
+        if self.held_by is None:
+            where = where or (", on the improved layout," if best.robot == "improved" else "")
+            misses = f"comes nearest and misses {amount(best.missing, i)}"
+            return f"no policy would have held it; {best.name}{where} {misses}"
+        where = where or " on the improved layout, and nothing on this one" * (best.robot == "improved")
+        more = np.subtract(best.missing, self.missing)
+        least = HELD * self.missing[i] * self.scale / self.scale[i]
+        price = [f"{amount(more, int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
+        return f"{best.name} would have held it{where}" + (f", for {' and '.join(price)}" if price else "")
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it as numbers, strings, lists and None, for JSON."""
-        plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        better = self.improved and layout_to_dict(self.improved)
+        parts = {"robot": layout_to_dict(self.robot), "improved": better, "held_by": self.held_by}
+        plain = to_builtins(vars(self) | parts, enc_hook=lambda array: np.round(array, 6).tolist())
         return {"sentence": self.sentence, "axes": [*AXES], "names": [*self.robot.names], **plain}
 
 
-def amount(value: float, axis: int) -> str:
-    """An impulse along an axis in words."""
-    return f"{three(value)} N{' m' * int(axis > 2)} s"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Layout):
-        return layout_to_dict(value)
-    if isinstance(value, np.ndarray):
-        return np.round(value, 6).tolist()
-    if isinstance(value, tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, Replay):
-        return asdict(value) | {"name": value.name}
-    if isinstance(value, Spell | Timeline):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    return value
+def amount(impulse: Sequence[float] | Array, axis: int) -> str:
+    """What an impulse (6,) has along an axis, in words."""
+    return f"{three(impulse[axis])} {UNITS[axis]} s"

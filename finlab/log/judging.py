@@ -1,6 +1,6 @@
 """Judges a log: what its robot could not, what it gave instead, and which policy would have held it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,13 @@ from finlab.allocation import Allocator
 from finlab.allocation.policy import CLOSEST, Policy, at_limits, limit_words
 from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.axes import AXES, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log, robot_rest
-from finlab.log.replay import Replay, demands_of, replay, six
+from finlab.log.recorded import Event
+from finlab.log.replay import demands_of, replay, six
 from finlab.physics.objective import judged_power, yardstick
 from finlab.physics.plant import plant_of
 
@@ -23,8 +24,6 @@ LOST = 0.01
 """Share of the yardstick from which on a missing wrench counts as an axis lost."""
 OFF = 0.05
 """Share of what was asked for that may be missing with no actuator at a limit before it is said."""
-HELD = 0.02
-"""Share of what was missing along an axis that a replay which holds it may miss."""
 DEAD = 0.1
 """Least share of the square of what was away that a dead thruster explains, and most that none does."""
 MERGED_S = 0.5
@@ -51,19 +50,11 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         CommandError: `priority` names no axes.
         DataError: a table of forces cannot be read.
     """
-    scale, span, notes = yardstick(log.robot), log.span, [*log.notes]
-    delivered, full, ended, watts = _given(log)
-    demand, counts = np.nan_to_num(log.demand), np.isfinite(log.demand)
-    away = np.where(counts, demand - delivered, 0.0)
-    at = full | ended
-    dead = _dead(log, away / scale, at)
-    stopped = tuple(name for name, one in zip(log.robot.names, dead, strict=True) if one)
-    missing = np.where((_bound(log, at) | dead.any())[:, None], away, 0.0)
-    lost = np.abs(missing) > LOST * scale
-    impulse = span @ np.abs(missing)
-    axis = AXES[int(np.argmax(impulse / scale))] if lost.any() else None
-    asked = span @ np.abs(demand)
-    if ((span @ np.abs(away) - impulse) / scale).max() > OFF * (asked / scale).max():
+    account = Account(log)
+    scale, span, impulse, notes = account.scale, log.span, account.impulse, [*log.notes]
+    asked = span @ np.abs(account.demand)
+    axis = AXES[int(np.argmax(impulse / scale))] if account.lost.any() else None
+    if ((span @ np.abs(account.away) - impulse) / scale).max() > OFF * (asked / scale).max():
         notes.append(
             "With no actuator at a limit the outputs gave another wrench than was asked for: forces of the "
             "robot, or what a setpoint stands for (--scale), differ from those of the log."
@@ -73,8 +64,8 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
     improved = _improved(log, scale, notes) if improve else None
     if improved is not None:
         replays += replay(improved, log.demand, span, policies, improved=True)
-    spells = [*_spells(log, missing, lost)]
-    worst = sorted(spells, key=lambda rows: -float((span[rows] @ np.abs(missing[rows]) / scale).sum()))
+    spells = account.spells()
+    worst = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))[:MOST_SPELLS]
     return Judgement(
         source=log.source,
         robot=log.robot,
@@ -82,56 +73,136 @@ def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = T
         seconds=float(span.sum()),
         asked=six(asked, scale),
         missing=six(impulse, scale),
-        lost_s=six(span @ lost, np.zeros(6)),
-        saturated_s=float(span @ lost.any(axis=1)),
-        watts=watts,
+        lost_s=six(span @ account.lost, np.zeros(6)),
+        saturated_s=float(span @ account.lost.any(axis=1)),
+        watts=account.watts,
         axis=axis,
-        stopped=stopped,
-        spells=tuple(
-            _spell(log, scale, rows, delivered, missing, lost, full, ended, stopped)
-            for rows in sorted(worst[:MOST_SPELLS], key=lambda rows: rows.start)
-        ),
+        stopped=account.names(account.dead | account.gone[-1]),
+        spells=tuple(sorted(worst, key=lambda spell: spell.start)),
         n_spells=len(spells),
         replays=tuple(replays),
-        held_by=None if axis is None else _held(replays, AXES.index(axis), impulse, scale, stopped),
         improved=improved,
-        timeline=_timeline(log, delivered, missing, at),
-        events=tuple((event.time, _words(log, event.actuator, event.words)) for event in log.events),
+        timeline=account.timeline(),
+        events=tuple((event.time, _words(log, event)) for event in log.events),
         notes=tuple(notes),
         asks=log.asks,
     )
 
 
-def _given(log: Log) -> tuple[Array, Flags, Flags, float | None]:
-    """Wrenches (N, 6) that the outputs gave, which actuators were at full thrust and which at the end of
-    their arc (N, n), and the mean power [W]."""
-    robot, n = log.robot, len(log)
-    if log.command is None and log.unmet is not None:
-        none = np.zeros((n, robot.n), bool)
-        return np.nan_to_num(log.demand) - log.unmet, none, none, None
-    if (command := log.command) is None:
-        method = "dual" if log.form == "ros" else log.form
-        command = Allocator(robot, method).allocate_batch(log.demand).command
-    plant, delivered, watts = plant_of(robot), np.empty((n, 6)), 0.0
-    for k in range(0, n, CHUNK):
-        rows = slice(k, k + CHUNK)
-        delivered[rows] = plant.wrench(command[rows])
-        watts += float(log.span[rows] @ judged_power(plant, command[rows]))
-    mean = None if log.command is None else watts / float(log.span.sum())
-    return delivered, *at_limits(robot, command), mean
+class Account:
+    """What was asked for in a log of N samples, given and missing; n actuators."""
 
+    def __init__(self, log: Log) -> None:
+        self.log, self.scale = log, yardstick(log.robot)
+        self.demand = np.nan_to_num(log.demand)
+        """(N, 6) [N, N m]."""
+        self.watts: float | None = None
+        """Mean power of the outputs [W]; None without outputs."""
+        self.full = self.ended = np.zeros((len(log), log.robot.n), bool)
+        """Which actuators were at full thrust, and which at the end of their arc (N, n)."""
+        self.delivered = self._delivered()
+        """Wrench of the outputs (N, 6)."""
+        self.away = np.where(np.isfinite(log.demand), self.demand - self.delivered, 0.0)
+        """Demand less that (N, 6)."""
+        self.at = self.full | self.ended
+        self.dead = self._dead()
+        """Actuators (n,) at rest all along, to whom most of what was away is due."""
+        command = np.zeros((1, log.robot.n, 3)) if log.command is None else log.command
+        self.gone = np.isnan(command).any(axis=-1) & ~self.dead
+        """Which others were stopped, or stood still (N, n)."""
+        self.missing = np.where((self._bound() | self.dead.any())[:, None], self.away, 0.0)
+        """The same where a limit is why (N, 6)."""
+        self.lost = np.abs(self.missing) > LOST * self.scale
+        """Which axes were lost (N, 6)."""
+        self.impulse = log.span @ np.abs(self.missing)
+        """(6,) [N s, N m s]."""
 
-def _bound(log: Log, at: Flags) -> Flags:
-    """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster which
-    does not reverse or was stopped, or, in a log without outputs, where the autopilot says so."""
-    if log.command is None and log.unmet is not None:
-        return np.asarray(log.unmet.any(axis=1))
-    if log.command is None:
-        return np.asarray(at.any(axis=1))
-    ends = (log.robot.lower[:, 0] == 0.0) | (log.robot.upper[:, 0] == 0.0)
-    rests = (log.command[..., 0] == 0.0) & ends
-    stopped = np.isnan(log.command).any(axis=-1)
-    return np.asarray((at | rests | stopped).any(axis=1))
+    def _delivered(self) -> Array:
+        log = self.log
+        if (command := log.command) is None:
+            if log.unmet is not None:
+                return self.demand - log.unmet
+            method = "dual" if log.form == "ros" else log.form
+            command = Allocator(log.robot, method).allocate_batch(log.demand).command
+        self.full, self.ended = at_limits(log.robot, command)
+        plant, delivered, energy = plant_of(log.robot), np.empty((len(log), 6)), 0.0
+        for k in range(0, len(log), CHUNK):
+            rows = slice(k, k + CHUNK)
+            delivered[rows] = plant.wrench(command[rows])
+            energy += float(log.span[rows] @ judged_power(plant, command[rows]))
+        if log.command is not None:
+            self.watts = energy / float(log.span.sum())
+        return delivered
+
+    def _bound(self) -> Flags:
+        """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster
+        which does not reverse or was stopped, or, in a log without outputs, where the autopilot says so."""
+        log, bound = self.log, self.at.any(axis=1)
+        if log.command is not None:
+            one_way = (log.robot.lower[:, 0] == 0.0) | (log.robot.upper[:, 0] == 0.0)
+            rests = (log.command[..., 0] == 0.0) & one_way
+            bound |= (rests | np.isnan(log.command).any(axis=-1)).any(axis=1)
+        elif log.unmet is not None:
+            bound |= log.unmet.any(axis=1)
+        return np.asarray(bound)
+
+    def _dead(self) -> Flags:
+        """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and whose
+        forces are most of what was away while no actuator was at a limit."""
+        log, robot = self.log, self.log.robot
+        none = np.zeros(robot.n, bool)
+        if log.command is None:
+            return none
+        rest = (np.nan_to_num(log.command) == robot_rest(robot)).all(axis=(0, 2))
+        rest &= (robot.lower[:, 1:] == robot.upper[:, 1:]).all(axis=1)
+        off = (self.away / self.scale)[~self.at.any(axis=1)]
+        if not rest.any() or np.abs(off).max(initial=0.0) < LOST:
+            return none
+        counts = rest[:, None] & np.isfinite(log.demand).any(axis=0)
+        columns = np.where(counts, plant_of(robot).effectiveness[:, 0] / self.scale, 0.0)
+        force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
+        share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
+        explained = np.square(off - force @ columns).sum() < DEAD * size
+        return np.asarray(rest & (share > DEAD) & explained)
+
+    def names(self, flags: Flags) -> tuple[str, ...]:
+        """Names of the actuators with a flag (n,)."""
+        return tuple(name for name, one in zip(self.log.robot.names, flags, strict=True) if one)
+
+    def spells(self) -> list[Spell]:
+        """Times between which axes were lost, without longer breaks."""
+        time, span, places = self.log.time, self.log.span, np.flatnonzero(self.lost.any(axis=1))
+        apart = time[places[1:]] - (time + span)[places[:-1]] > MERGED_S
+        parts = np.split(places, np.flatnonzero(apart) + 1) if len(places) else []
+        return [self._spell(slice(int(part[0]), int(part[-1]) + 1)) for part in parts]
+
+    def _spell(self, rows: slice) -> Spell:
+        log, lost = self.log, self.lost[rows]
+        span, some = log.span[rows], np.asarray(lost.any(axis=1))
+        flags = (np.any(each[rows][some], axis=0) for each in (self.full, self.ended))
+        return Spell(
+            start=float(log.time[rows.start]),
+            end=float(log.time[rows.stop - 1] + span[-1]),
+            axes=axes_in(np.any(lost, axis=0)),
+            missing=six(span @ np.abs(self.missing[rows]), self.scale),
+            asked=six(span @ self.demand[rows] / span.sum(), self.scale),
+            gave=six(span @ self.delivered[rows] / span.sum(), self.scale),
+            limits=(
+                *(f"{name} at rest all along" for name in self.names(self.dead)),
+                *(f"{name} stopped" for name in self.names(np.any(self.gone[rows], axis=0))),
+                *limit_words(log.robot, *flags),
+            ),
+        )
+
+    def timeline(self) -> Timeline:
+        """Means over pieces of the log."""
+        span, n = self.log.span, len(self.log)
+        starts = np.unique(np.linspace(0, n, BINS, endpoint=False).astype(np.intp))
+        columns = (self.demand, self.delivered, self.missing, self.at)
+        sums = [np.add.reduceat(span[:, None] * each, starts) for each in columns]
+        return Timeline(
+            self.log.time[starts], *(each / np.add.reduceat(span, starts)[:, None] for each in sums)
+        )
 
 
 def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
@@ -140,41 +211,6 @@ def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
         return Policy("priority", order=tuple(map(tuple, groups)))
     rest = (tuple(each for each in group if each != axis) for group in USUAL)
     return Policy("priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group)))
-
-
-def _dead(log: Log, away: Array, at: Flags) -> Flags:
-    """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and whose forces
-    are most of what was away (N, 6), in shares of the yardstick, while no actuator was at a limit."""
-    none = np.zeros(log.robot.n, bool)
-    if log.command is None:
-        return none
-    rest = (np.nan_to_num(log.command) == robot_rest(log.robot)).all(axis=(0, 2))
-    rest &= (log.robot.lower[:, 1:] == log.robot.upper[:, 1:]).all(axis=1)
-    off = away[~at.any(axis=1)]
-    if not rest.any() or np.abs(off).max(initial=0.0) < LOST:
-        return none
-    counts = rest[:, None] & np.isfinite(log.demand).any(axis=0)
-    columns = np.where(counts, plant_of(log.robot).effectiveness[:, 0] / yardstick(log.robot), 0.0)
-    force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
-    share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
-    explained = np.square(off - force @ columns).sum() < DEAD * size
-    return np.asarray(rest & (share > DEAD) & explained)
-
-
-def _held(
-    replays: list[Replay], i: int, impulse: Array, scale: Array, stopped: tuple[str, ...]
-) -> Replay | None:
-    """The best replay that holds axis i, first on the robot as it is, without the one that was stopped."""
-    lost = stopped[0] if len(stopped) == 1 else None
-    for robot in ("as it is", "improved"):
-        held = [
-            each
-            for each in replays
-            if each.robot == robot and each.lost == lost and each.missing[i] <= HELD * impulse[i]
-        ]
-        if held:
-            return min(held, key=lambda each: (round(sum(each.missing / scale), 3), each.watts))
-    return None
 
 
 def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
@@ -196,51 +232,6 @@ def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
     return found.layout if found.improved else None
 
 
-def _spells(log: Log, missing: Array, lost: Flags) -> Iterator[slice]:
-    """Samples between which axes were lost, without longer breaks."""
-    places = np.flatnonzero(lost.any(axis=1))
-    if not len(places):
-        return
-    ends = log.time + log.span
-    apart = log.time[places[1:]] - ends[places[:-1]] > MERGED_S
-    for part in np.split(places, np.flatnonzero(apart) + 1):
-        yield slice(int(part[0]), int(part[-1]) + 1)
-
-
-def _spell(
-    log: Log,
-    scale: Array,
-    rows: slice,
-    delivered: Array,
-    missing: Array,
-    lost: Flags,
-    full: Flags,
-    ended: Flags,
-    stopped: tuple[str, ...],
-) -> Spell:
-    span, some = log.span[rows], np.asarray(lost[rows].any(axis=1))
-    return Spell(
-        start=float(log.time[rows.start]),
-        end=float(log.time[rows.stop - 1] + log.span[rows.stop - 1]),
-        axes=tuple(axis for axis, one in zip(AXES, np.any(lost[rows], axis=0), strict=True) if one),
-        missing=six(span @ np.abs(missing[rows]), scale),
-        asked=six(span @ np.nan_to_num(log.demand[rows]) / span.sum(), scale),
-        gave=six(span @ delivered[rows] / span.sum(), scale),
-        limits=(
-            *(f"{name} at rest all along" for name in stopped),
-            *limit_words(log.robot, *(np.any(flags[rows][some], axis=0) for flags in (full, ended))),
-        ),
-    )
-
-
-def _timeline(log: Log, delivered: Array, missing: Array, at: Flags) -> Timeline:
-    """Means over pieces of the log."""
-    starts = np.unique(np.linspace(0, len(log), BINS, endpoint=False).astype(np.intp))
-    held = np.add.reduceat(log.span, starts)[:, None]
-    columns = (np.nan_to_num(log.demand), delivered, missing, at.astype(np.float64))
-    means = [np.add.reduceat(log.span[:, None] * each, starts) / held for each in columns]
-    return Timeline(log.time[starts], *means)
-
-
-def _words(log: Log, actuator: int | None, words: str) -> str:
-    return words if actuator is None or actuator >= log.robot.n else f"{log.robot.names[actuator]} {words}"
+def _words(log: Log, event: Event) -> str:
+    place = event.actuator
+    return event.words if place is None or place >= log.robot.n else f"{log.robot.names[place]} {event.words}"

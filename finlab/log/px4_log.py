@@ -5,62 +5,66 @@ Setpoints are without unit, in x forward, y right, z down; outputs are shares of
 """
 
 import io
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.exchange.parameters import read_px4
-from finlab.log.recorded import FLU, Event, Recorded, Series, changes
+from finlab.log.recorded import CUT, FLU, Event, Recorded, Series, changes, silent
 
 MAGIC = b"ULog\x01\x125"
-TOPICS = (
-    *("vehicle_thrust_setpoint", "vehicle_torque_setpoint", "actuator_motors", "actuator_outputs"),
-    *("control_allocator_status", "failure_detector_status", "esc_status"),
-)
-MOTORS, FIRST_MOTOR = 12, 101
-"""Most motors, and the number of the first as the function of an output."""
+MOTORS, FIRST_MOTOR, PULSES = 12, 101, 16
+"""Most motors, the number of the first as the function of an output, and most outputs that are pulses."""
 WARNING = ord("4")
 """Level of a message; more serious ones are below."""
 TOY = 6.5
 """PX4's default of CA_ROTORi_CT, which is no force of any thruster in water."""
 
 
+def _each(name: str, count: int) -> tuple[str, ...]:
+    return tuple(name.replace("#", f"[{i}]") for i in range(count))
+
+
+TOPICS = {
+    "vehicle_thrust_setpoint": _each("xyz#", 3),
+    "vehicle_torque_setpoint": _each("xyz#", 3),
+    "actuator_motors": _each("control#", MOTORS),
+    "actuator_outputs": _each("output#", PULSES),
+    "control_allocator_status": (*_each("unallocated_thrust#", 3), *_each("unallocated_torque#", 3)),
+    "failure_detector_status": ("motor_failure_mask",),
+    "esc_status": ("esc_online_flags", "esc_count", *_each("esc#.esc_rpm", 8)),
+}
+"""Topic -> the columns that are read."""
+
+
 def read_ulog(path: Path) -> Recorded:
     """Reads a log of PX4. Raises DataError: it lacks setpoints; any error: it is damaged."""
-    from pyulog import ULog
+    from pyulog import core
 
-    with redirect_stdout(io.StringIO()):
-        log = ULog(str(path), list(TOPICS))
-    topics = {each.name: each.data for each in reversed(log.data_list)}
-    if lacking := [name for name in TOPICS[:2] if name not in topics]:
+    with _File(open(path, "rb", 0)) as file:
+        log = silent(core).ULog(file, [*TOPICS])
+    begin = log.start_timestamp
+    topics = {each.name: _series(each, begin) for each in reversed(log.data_list)}
+    thrust, torque = map(topics.get, list(TOPICS)[:2])
+    if thrust is None or torque is None:
         raise DataError(
-            f"{path}: holds no {lacking[0]}, expected the setpoints that PX4 1.14 and newer log; log them "
-            "with SDLOG_PROFILE, or take a newer PX4"
+            f"{path}: holds no {[name for name in TOPICS if name not in topics][0]}, expected the setpoints "
+            "that PX4 1.14 and newer log; log them with SDLOG_PROFILE, or take a newer PX4"
         )
     parameters = {**log.initial_parameters, **{name: value for _, name, value in log.changed_parameters}}
-    begin = log.start_timestamp
-
-    def series(name: str, *fields: str) -> Series:
-        return Series.of((topics[name]["timestamp"] - float(begin)) * 1e-6, _columns(topics[name], fields))
-
-    thrust, torque = (series(name, "xyz[0]", "xyz[1]", "xyz[2]") for name in TOPICS[:2])
     both = np.hstack([thrust.at(torque.time), torque.values]) * FLU
-    record = Recorded("px4", Series.of(torque.time, both))
-    if "actuator_motors" in topics:
-        names = [f"control[{i}]" for i in range(MOTORS)]
-        record.outputs = series("actuator_motors", *(n for n in names if n in topics["actuator_motors"]))
-    elif "actuator_outputs" in topics:
-        record.outputs = _by_pulses(series, parameters)
-    if "control_allocator_status" in topics:
-        names = [f"unallocated_{kind}[{i}]" for kind in ("thrust", "torque") for i in range(3)]
-        unmet = series("control_allocator_status", *names)
+    record = Recorded("px4", Series(torque.time, both, torque.back), topics.get("actuator_motors"))
+    if record.outputs is None and "actuator_outputs" in topics:
+        record.outputs = _by_pulses(topics["actuator_outputs"], parameters)
+    if unmet := topics.get("control_allocator_status"):
         record.unmet = Series(unmet.time, unmet.values * FLU)
     if log.file_corruption:
         record.notes.append("The file is damaged; what could be read was read.")
+    elif file.cut:
+        record.notes.append(CUT)
     if lost := sum(drop.duration for drop in log.dropouts):
         record.notes.append(f"PX4 says that {lost / 1000:.1f} s are missing from the log.")
     record.events += [
@@ -68,57 +72,60 @@ def read_ulog(path: Path) -> Recorded:
         for each in log.logged_messages
         if each.log_level <= WARNING
     ]
-    if "failure_detector_status" in topics:
-        mask = series("failure_detector_status", "motor_failure_mask")
+    if mask := topics.get("failure_detector_status"):
         record.events += changes(mask.time, _bits(mask), "failed, says PX4", "works again, says PX4")
-    if "esc_status" in topics:
-        online = series("esc_status", "esc_online_flags", "esc_count")
-        known = np.arange(MOTORS) < online.values[:, 1:]
-        record.events += changes(online.time, known & ~_bits(online), "has an ESC offline", "is online again")
-    _geometry(record, parameters, path)
-    return record
-
-
-def _columns(data: dict[str, Any], fields: tuple[str, ...]) -> Array:
-    """Columns of a topic; zeros for one that it lacks."""
-    zero = np.zeros(len(data["timestamp"]))
-    with np.errstate(invalid="ignore"):  # numbers of a damaged file may be none
-        return np.stack([np.asarray(data.get(name, zero), np.float64) for name in fields], axis=1)
-
-
-def _bits(series: Series) -> Any:
-    """Flags (N, 12) in the first column."""
-    return (np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MOTORS) & 1).astype(bool)
-
-
-def _by_pulses(series: Any, parameters: dict[str, Any]) -> Series | None:
-    """Outputs of motors by PWM_MAIN_FUNCi and the ends of their pulses; None where no output is a motor's."""
-    outputs = series("actuator_outputs", *(f"output[{i}]" for i in range(16)))
-    motors: dict[int, Array] = {}
-    reversing = int(parameters.get("CA_R_REV", 0))
-    for i in range(16):
-        motor = int(parameters.get(f"PWM_MAIN_FUNC{i + 1}", 0)) - FIRST_MOTOR
-        least, most = (float(parameters.get(f"PWM_MAIN_{end}{i + 1}", usual)) for end, usual in _ENDS)
-        if 0 <= motor < MOTORS and most > least:
-            share = (outputs.values[:, i] - least) / (most - least)
-            share = 2.0 * share - 1.0 if reversing >> motor & 1 else share
-            motors[motor] = np.where(outputs.values[:, i] < least, np.nan, np.clip(share, -1.0, 1.0))
-    if not motors or [*sorted(motors)] != [*range(len(motors))]:
-        return None
-    return Series(outputs.time, np.stack([motors[motor] for motor in sorted(motors)], axis=1))
-
-
-_ENDS = (("MIN", 1000.0), ("MAX", 2000.0))
-
-
-def _geometry(record: Recorded, parameters: dict[str, Any], path: Path) -> None:
-    """The robot by CA_ROTOR*."""
-    lines = [f"{name} {value}" for name, value in parameters.items() if name.startswith("CA_")]
-    if (robot := record.describe(read_px4, "\n".join(lines), path.stem)) is None:
-        return
-    sizes = [abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)]
-    if set(sizes) == {TOY}:
+    if escs := topics.get("esc_status"):
+        known = np.arange(MOTORS) < escs.values[:, 1:2]
+        record.events += changes(escs.time, known & ~_bits(escs), "has an ESC offline", "is online again")
+        record.turns = Series(escs.time, escs.values[:, 2:])
+    robot = record.describe(read_px4, {k: v for k, v in parameters.items() if k.startswith("CA_")}, path.stem)
+    if robot and {abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)} == {TOY}:
         record.lacking.append(
             f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "
             "robot by --robot LAYOUT."
         )
+    return record
+
+
+class _File(io.BufferedReader):
+    """A file that knows whether it ended amid what was read; a message begins with a head of 3 bytes."""
+
+    cut = False
+
+    def read(self, size: int | None = -1) -> bytes:
+        data = super().read(size)
+        self.cut |= (size or 0) - len(data) not in (0, 3)
+        return data
+
+
+def _series(topic: Any, begin: int) -> Series:
+    """The columns of a topic that are read; NaN for one that it lacks."""
+    stamps = topic.data["timestamp"]
+    none = np.full(len(stamps), np.nan)
+    with np.errstate(invalid="ignore"):  # numbers of a damaged file may be none
+        columns = [np.asarray(topic.data.get(name, none), np.float64) for name in TOPICS[topic.name]]
+    return Series.of((stamps - float(begin)) * 1e-6, np.stack(columns, axis=1))
+
+
+def _bits(series: Series) -> NDArray[np.bool_]:
+    """Flags (N, 12) in the first column."""
+    return (np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MOTORS) & 1).astype(bool)
+
+
+def _by_pulses(outputs: Series, parameters: dict[str, Any]) -> Series | None:
+    """Outputs of motors by PWM_MAIN_FUNCi and the ends of their pulses; None where no output is a motor's."""
+    motors = {}
+    reversing = int(parameters.get("CA_R_REV", 0))
+    for i, pulse in enumerate(outputs.values.T, 1):
+        motor = int(parameters.get(f"PWM_MAIN_FUNC{i}", 0)) - FIRST_MOTOR
+        least, most = (float(parameters.get(f"PWM_MAIN_{end}{i}", usual)) for end, usual in _ENDS)
+        if 0 <= motor < MOTORS and most > least:
+            share = (pulse - least) / (most - least)
+            share = 2.0 * share - 1.0 if reversing >> motor & 1 else share
+            motors[motor] = np.where(pulse < least, np.nan, np.clip(share, -1.0, 1.0))
+    if not motors or {*motors} != {*range(len(motors))}:
+        return None
+    return Series(outputs.time, np.stack([motors[motor] for motor in sorted(motors)], axis=1), outputs.back)
+
+
+_ENDS = (("MIN", 1000.0), ("MAX", 2000.0))

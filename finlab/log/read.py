@@ -1,6 +1,7 @@
 """Reads a log and poses it for one robot: demands in newtons, outputs as commands of its actuators."""
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
 from finlab.log import ardusub_log, px4_log, ros_bag
 from finlab.log.ardusub_log import FULL_US, REST_US
-from finlab.log.recorded import Event, Form, Recorded
+from finlab.log.recorded import Event, Form, Recorded, Series
 from finlab.physics.objective import yardstick
 
 MOST_BYTES = 1_000_000_000
@@ -29,6 +30,10 @@ MOST_SAMPLES = 1_000_000
 """Most samples of demands: five hours at 50 Hz."""
 GAP_S = 1.0
 """Longest time that a sample holds; what lies beyond it was not logged."""
+
+STILL_S, PUSHES = 1.0, 0.2
+"""How long [s] a thruster is told to push, by this share of its most at least, before it is dead for not
+turning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,73 +103,77 @@ def read_log(
         raise
     except Exception as problem:  # of many kinds, by a file that is damaged
         why = f"{type(problem).__name__}: {problem!s:.80}"
-        raise DataError(
-            f"{place}: cannot be read as a log ({why}); it is damaged or of an unknown version"
-        ) from None
-    layout = load_layout(robot) if isinstance(robot, str) else robot
-    known = layout or record.layout
+        damaged = f"cannot be read as a log ({why}); it is damaged or of an unknown version"
+        raise DataError(f"{place}: {damaged}") from None
+    known = load_layout(robot) if isinstance(robot, str) else robot or record.layout
     if known is None:
         raise DataError(f"{place}: {record.lacking[0]}")
-    sides = np.ones(known.n)
-    if layout is None:
+    if known is record.layout:
         record.notes, record.asks = record.notes + record.taken, record.lacking + record.asks
-    elif record.layout is not None:
-        sides = _sides(record.layout, layout)
-    return _posed(place.name, record, known, sides, scale)
+    return _posed(place.name, record, known, scale)
 
 
 def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
-    head = b"" if place.is_dir() else read_file(place, MOST_BYTES, "a log", head=64)
+    folder = place.is_dir()
+    head = b"" if folder else read_file(place, MOST_BYTES, "a log", head=64)
     if head.startswith(px4_log.MAGIC):
         return px4_log.read_ulog(place)
     if head.startswith(ardusub_log.MAGIC):
         return ardusub_log.read_dataflash(place)
-    if place.is_dir() and sum(each.stat().st_size for each in place.iterdir()) > MOST_BYTES:
+    if folder and sum(each.stat().st_size for each in place.iterdir()) > MOST_BYTES:
         raise DataError(f"{place}: is larger than {MOST_BYTES:,} bytes; cut it")
-    if place.is_dir() or place.suffix.lower() in ros_bag.ENDS:
+    if folder or place.suffix.lower() in ros_bag.ENDS:
         return ros_bag.read_bag(place, demand, outputs)
     raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
 
 
-def _sides(own: Layout, robot: Layout) -> Array:
-    """1 for each actuator (n,) that pushes as the log's motor in its place does, -1 for one mounted the other
-    way round. Raises LayoutError: they do not fit."""
+def _sides(own: Layout | None, robot: Layout) -> Array:
+    """1 for each actuator (n,) that pushes as the log's motor in its place does, if the log says that, and -1
+    for one mounted the other way round. Raises LayoutError: they do not fit."""
+    if own is None or own is robot:
+        return np.ones(robot.n)
     if own.n != robot.n:
         raise LayoutError(
             f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have {own.n} motors"
         )
     axes = [[getattr(part, "axis", (0.0,) * 3) for part in each.actuators] for each in (own, robot)]
     along = np.einsum("nk,nk->n", *map(np.array, axes))
-    for part, share in zip(robot.actuators, along, strict=True):
-        if abs(share) < 0.5:
-            raise LayoutError(
-                f"{part.name!r:.60} of layout {robot.name!r:.60} pushes another way than the log's motor in "
-                "its place; list the actuators in the order of the motors"
-            )
+    if (apart := np.abs(along) < 0.5).any():
+        raise LayoutError(
+            f"{robot.names[apart.argmax()]!r:.60} of layout {robot.name!r:.60} pushes another way than the "
+            "log's motor in its place; list the actuators in the order of the motors"
+        )
     return np.asarray(np.sign(along))
 
 
-def unit_of(form: Form, robot: Layout) -> Array:
-    """Returns what a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along an
-    axis that the robot does not drive. Raises LayoutError: the robot has other actuators than thrusters."""
+def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
+    """What a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along an axis
+    that the robot does not drive. Raises LayoutError: it has other actuators than an autopilot drives."""
+    if scale is not None:
+        unit = np.asarray(scale, np.float64)
+        if unit.shape == (6,) and np.isfinite(unit).all() and (unit > 0.0).all():
+            return unit
+        raise DataError(f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}")
     if form == "ros":
         return np.ones(6)
     kind = Px4 if form == "px4" else ArduSub
-    return kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit
+    return np.abs(kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit)
 
 
-def _posed(source: str, record: Recorded, robot: Layout, sides: Array, scale: ArrayLike | None) -> Log:
+def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None) -> Log:
     """The log in the robot's newtons, at the times of its outputs, or else of what says what was left."""
-    unit = unit_of(record.form, robot) if scale is None else _scale(scale)
-    time = (record.outputs or record.unmet or record.demand).time
-    demand = record.demand.at(time) * np.where(robot.commanded, np.abs(unit), np.nan)
-    command = None if record.outputs is None else commands_of(record, record.outputs.values, robot, sides)
-    unmet = None
-    if command is None and record.unmet is not None:
-        unmet = np.nan_to_num(record.unmet.values * np.abs(unit), posinf=0.0, neginf=0.0)
+    sides, unit = _sides(record.layout, robot), _unit(record.form, robot, scale)
+    basis = record.outputs or record.unmet or record.demand
+    time, notes, asks = basis.time, [*record.notes], [*record.asks]
+    demand = record.demand.at(time) * np.where(robot.commanded, unit, np.nan)
     kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MOST_FORCE).any(axis=1)
-    notes, asks = [*record.notes], [*record.asks]
-    if command is not None:
+    command = unmet = None
+    if record.outputs is not None:
+        command = commands_of(record, record.outputs.values, robot, sides)
+        for i, k in _dead(command, record.turns, time, robot):
+            words = "stood still from here on although it was told to push"
+            record.events.append(Event(float(time[k]), words, i))
+            command[k:, i] = np.nan
         idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
         kept &= ~idle
         if idle.any():
@@ -173,6 +182,8 @@ def _posed(source: str, record: Recorded, robot: Layout, sides: Array, scale: Ar
         asks.append(
             "It holds no outputs: what the autopilot gave is what its method gives, not what it sent."
         )
+        if record.unmet is not None:
+            unmet = np.nan_to_num(record.unmet.values * unit, posinf=0.0, neginf=0.0)
     if kept.sum() < 2:
         raise DataError(f"{source}: holds no demands while outputs moved; there is nothing to judge")
     if len(time) > MOST_SAMPLES:
@@ -180,8 +191,9 @@ def _posed(source: str, record: Recorded, robot: Layout, sides: Array, scale: Ar
     step = np.diff(time, append=time[-1] + np.median(np.diff(time)))
     if (beyond := float(np.maximum(step - GAP_S, 0.0)[kept].sum())) > 0.0:
         notes.append(f"Gaps between samples, {beyond:.0f} s beyond {GAP_S:g} s each, are left out.")
-    undriven = [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]
-    if undriven:
+    if back := max(basis.back, record.demand.back):
+        notes.append(f"Its clock jumps back, by up to {back:.3g} s; samples were sorted by their times.")
+    if undriven := [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]:
         notes.append(f"No thruster drives {', '.join(undriven)}; what was asked there is not judged.")
     return Log(
         source=source,
@@ -198,16 +210,21 @@ def _posed(source: str, record: Recorded, robot: Layout, sides: Array, scale: Ar
     )
 
 
+def _dead(command: Array, turns: Series | None, time: Array, robot: Layout) -> Iterator[tuple[int, int]]:
+    """Thrusters that turned once, but no more although told so (N, n, 3), and the sample where that began."""
+    speed = np.empty((len(time), 0)) if turns is None else turns.at(time)
+    held = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
+    most = np.maximum(robot.upper, -robot.lower)[:, 0]
+    for i, turned in enumerate(speed.T[: robot.n] != 0.0):
+        pushes = np.abs(command[:, i, 0]) > PUSHES * most[i]
+        pushes[: len(turned) - turned[::-1].argmax()] = False
+        if np.nan_to_num(speed[:, i]).any() and held[pushes].sum() > STILL_S:
+            yield i, int(pushes.argmax())
+
+
 def robot_rest(robot: Layout) -> Array:
     """Commands (n, 3) of actuators at rest."""
     return np.asarray(np.clip(0.0, robot.lower, robot.upper))
-
-
-def _scale(scale: ArrayLike) -> Array:
-    values = np.asarray(scale, np.float64)
-    if values.shape != (6,) or not (np.isfinite(values).all() and (values > 0.0).all()):
-        raise DataError(f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}")
-    return values
 
 
 def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
@@ -224,12 +241,11 @@ def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -
     values = outputs[:, :n] * sides
     command = np.zeros((len(values), n, 3))
     low, high = robot.lower[:, 0], robot.upper[:, 0]
-    command[..., 0] = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
+    force = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
     for i, part in enumerate(robot.actuators):
         model = getattr(part, "model", None)
         if record.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
-            pulse, force, _ = model.columns
-            command[:, i, 0] = np.interp(REST_US + FULL_US * values[:, i], pulse, force)
-    command[..., 0] = np.clip(command[..., 0], low, high)
+            force[:, i] = np.interp(REST_US + FULL_US * values[:, i], *model.columns[:2])
+    command[..., 0] = np.clip(force, low, high)
     command[np.isnan(values)] = np.nan
     return command

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from finlab.layout import Layout
 Form = Literal["px4", "ardusub", "ros"]
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Turns a wrench of x forward, y right, z down into x forward, y left, z up."""
+
+CUT = "It ends in the middle of a message: it was cut there, or the power went."
+"""What is said of a log without its end."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +39,16 @@ class Series:
     """Rising, on the log's clock (N,) [s]."""
     values: Array
     """(N, K)."""
+    back: float = 0.0
+    """How far the clock jumped back, at most, before the samples were sorted [s]."""
 
     @classmethod
     def of(cls, time: Array, values: Array) -> "Series":
         """Sorts samples by time (N,) [s]; of those at one time the last stays."""
         order = np.argsort(time, kind="stable")
         kept = order[np.append(np.diff(time[order]) > 0.0, True)] if len(order) else order
-        return cls(np.asarray(time[kept], np.float64), np.asarray(values[kept], np.float64))
+        back = -float(np.diff(time).min(initial=0.0))
+        return cls(np.asarray(time[kept], np.float64), np.asarray(values[kept], np.float64), back)
 
     def at(self, time: Array) -> Array:
         """Values (M, K) that hold at times (M,) [s]; NaN before the first."""
@@ -63,6 +69,8 @@ class Recorded:
     """Whether outputs are shares."""
     unmet: Series | None = None
     """What the autopilot says that it left of a demand (M, 6), in its unit."""
+    turns: Series | None = None
+    """How fast motors turned (M, n), by their ESCs, in any unit; NaN where none says it."""
     layout: Layout | None = None
     """The robot by the log's own parameters."""
     events: list[Event] = field(default_factory=list)
@@ -76,12 +84,12 @@ class Recorded:
     """What the log lacks of the robot, as `asks` are."""
 
     def describe(
-        self, read: Callable[[str, str, Exchange], Layout], parameters: str, name: str
+        self, read: Callable[[str, str, Exchange], Layout], parameters: dict[str, Any], name: str
     ) -> Layout | None:
         """The robot that a reader of the autopilot's parameters finds in them; None where it finds none."""
-        exchange = Exchange()
+        exchange, lines = Exchange(), "\n".join(f"{key} {value}" for key, value in parameters.items())
         try:
-            self.layout = read(parameters, name[:64] or self.form, exchange)
+            self.layout = read(lines, name[:64] or self.form, exchange)
         except LayoutError as error:
             self.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
             return None
@@ -96,3 +104,9 @@ def changes(time: Array, bits: NDArray[np.bool_], words: str, again: str) -> lis
         Event(float(time[row]), words if bits[row, i] else again, int(i))
         for row, i in zip(*np.nonzero(bits != before), strict=True)
     ]
+
+
+def silent(module: Any) -> Any:
+    """A library's module, which from now on prints nothing of what is wrong with a file."""
+    vars(module)["print"] = lambda *_, **__: None
+    return module

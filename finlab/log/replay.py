@@ -30,20 +30,16 @@ class Replay:
     """`as it is`, or `improved`."""
     lost: str | None
     """Actuator that was taken out."""
+    name: str
+    """Method, and policy in words if it has several, such as `dual priority Tz, Fz`."""
     method: str
     policy: str
-    """In words, such as `priority Tz, Fz`."""
     missing: tuple[float, ...]
     """Impulse that was missing along each axis (6,) [N s, N m s]."""
     watts: float
     """Mean power [W] by the actuators' own models."""
     saturated_s: float
     """Time over which a wrench was not delivered, by more than a thousandth of the yardstick [s]."""
-
-    @property
-    def name(self) -> str:
-        """Method and policy."""
-        return f"{self.method} {self.policy}" if self.method == "dual" else self.method
 
 
 class Demands(NamedTuple):
@@ -102,6 +98,7 @@ def replay(
             yield Replay(
                 robot="improved" if improved else "as it is",
                 lost=lost,
+                name=f"{name} {policy_words(policy)}" if name == "dual" else name,
                 method=name,
                 policy=policy_words(policy),
                 missing=six(missing, scale),

@@ -37,52 +37,47 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
         kinds = {each.topic: each.msgtype for each in reader.connections}
         demanded = _topic(path, kinds, WRENCHES, demand, "demand")
         sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
-        wanted = [
+        read = [
             each for each in reader.connections if each.topic in (demanded, sent) or each.msgtype == HEALTH
         ]
-        for connection, nanoseconds, raw in reader.messages(wanted):
+        for connection, nanoseconds, raw in reader.messages(read):
             message: Any = reader.deserialize(raw, connection.msgtype)
             time = (nanoseconds - reader.start_time) * 1e-9
-            if connection.topic == demanded:
-                wrench = getattr(message, "wrench", message)
-                parts = (wrench.force, wrench.torque)
-                rows["demand"].append((time, [value for v in parts for value in (v.x, v.y, v.z)]))
-            elif connection.topic == sent:
-                rows["outputs"].append((time, getattr(message, "normalized", getattr(message, "data", ()))))
+            if connection.msgtype == HEALTH:
+                warnings = [each for each in message.status if each.level >= WARNING]
+                events += [Event(time, f"{each.name}: {each.message}") for each in warnings]
             else:
-                events += [
-                    Event(time, f"{each.name}: {each.message}")
-                    for each in message.status
-                    if each.level >= WARNING
-                ]
-    record = Recorded("ros", _series(path, demanded, rows["demand"]), events=events)
+                rows[connection.topic].append((time, _numbers(message)))
+    record = Recorded("ros", _series(path, demanded, rows), events=events)
     record.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
-    if sent is not None and rows["outputs"]:
-        record.outputs, record.of_shares = _series(path, sent, rows["outputs"]), kinds[sent] == SHARES
+    if sent in rows:
+        record.outputs, record.of_shares = _series(path, sent, rows), kinds[sent] == SHARES
     return record
+
+
+def _numbers(message: Any) -> Any:
+    """What a message of a wrench or of outputs holds."""
+    if (wrench := getattr(message, "wrench", message)) is message and not hasattr(message, "force"):
+        return getattr(message, "normalized", getattr(message, "data", ()))
+    return [value for part in (wrench.force, wrench.torque) for value in (part.x, part.y, part.z)]
 
 
 def _topic(
     path: Path, kinds: dict[str, str], wanted: Sequence[str], named: str | None, option: str
 ) -> str | None:
     """The topic that an option names, or the only one of some types; None where there are no outputs."""
-    known = sorted(topic for topic, kind in kinds.items() if kind in wanted)
-    if named is not None and named not in known:
-        raise DataError(
-            f"{path}: has no topic {named!r:.60} of {' or '.join(wanted)}, only {', '.join(known) or 'none'}"
-        )
-    if named is None and len(known) > 1:
-        raise DataError(f"{path}: has several topics for {option}: {', '.join(known)}; say --{option} TOPIC")
-    if not known and option == "demand":
-        raise DataError(
-            f"{path}: has no topic of {' or '.join(wanted)}, only {', '.join(sorted(kinds)) or 'none'}"
-        )
-    return named or (known[0] if known else None)
+    topics = [topic for topic in sorted(kinds) if kinds[topic] in wanted and named in (None, topic)]
+    if not topics and (named is not None or option == "demand"):
+        what = "" if named is None else f" {named!r:.60}"
+        only = ", ".join(sorted(kinds)) or "none"
+        raise DataError(f"{path}: has no topic{what} of {' or '.join(wanted)}, only {only}")
+    if len(topics) > 1:
+        raise DataError(f"{path}: has several topics for {option}: {', '.join(topics)}; say --{option} TOPIC")
+    return topics[0] if topics else None
 
 
-def _series(path: Path, topic: str | None, rows: list[tuple[float, Any]]) -> Series:
-    widths = {len(row) for _, row in rows}
-    if len(widths) != 1 or 0 in widths:
+def _series(path: Path, topic: str | None, rows: dict[Any, list[tuple[float, Any]]]) -> Series:
+    times, values = zip(*rows[topic], strict=True) if rows[topic] else ((), ())
+    if len(widths := {*map(len, values)}) != 1 or 0 in widths:
         raise DataError(f"{path}: {topic}: expected messages of one length, got {sorted(widths) or 'none'}")
-    times, values = zip(*rows, strict=True)
     return Series.of(np.array(times), np.array(values, np.float64))

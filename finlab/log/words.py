@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
-from finlab.axes import AXES
-from finlab.display.pictures import COLORS
+from finlab.axes import AXES, UNITS
+from finlab.display.pictures import COLORS, panels
 from finlab.evaluation.document import Block, Column, Row, Table, to_text
 from finlab.log.judgement import Judgement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+IMPULSES = [f"{unit} s" for unit in UNITS]
 MOST_SPELLS, MOST_EVENTS = 10, 10
 """Most spells and events that the text tells."""
 
 
 def judgement_text(judged: Judgement) -> str:
     """The sentence, then what was lost on each axis, when, and what each replay misses."""
-    units = ["N s" if k < 3 else "N m s" for k in range(6)]
-    columns = [("axis", "axis", "text"), ("unit", "unit", "text"), ("asked", "asked for", "three")]
-    columns += [("missing", "missing", "three"), ("lost", "lost [s]", "three")]
-    each = zip(MOTIONS, AXES, units, judged.asked, judged.missing, judged.lost_s, strict=True)
-    rows = [
-        {"axis": f"{motion} {axis}", "unit": unit, "asked": asked, "missing": missing, "lost": lost}
-        for motion, axis, unit, asked, missing, lost in each
-    ]
-    blocks: list[Block] = [judged.sentence, Table(tuple(Column(*c) for c in columns), rows)]
+    columns = [Column("axis", "axis"), Column("unit", "unit"), Column("asked", "asked for", "three")]
+    columns += [Column("missing", "missing", "three"), Column("lost", "lost [s]", "three")]
+    names = [f"{motion} {axis}" for motion, axis in zip(MOTIONS, AXES, strict=True)]
+    each = zip(names, IMPULSES, judged.asked, judged.missing, judged.lost_s, strict=True)
+    rows: list[Row] = [dict(zip([column.key for column in columns], row, strict=True)) for row in each]
+    blocks: list[Block] = [judged.sentence, Table(tuple(columns), rows)]
     worst = sorted(judged.spells, key=lambda spell: spell.start - spell.end)[:MOST_SPELLS]
     for spell in sorted(worst, key=lambda spell: spell.start):
         places = [k for k, axis in enumerate(AXES) if axis in spell.axes]
@@ -46,47 +44,41 @@ def judgement_text(judged: Judgement) -> str:
 
 def _replays(judged: Judgement) -> Table:
     """Replays on the robot and the improved one, and, with each actuator lost, the best and the log's own."""
-    own = {"px4", "ardusub"} if judged.held_by is None else {"px4", "ardusub", judged.held_by.name}
+    own = {"px4", "ardusub", "" if judged.held_by is None else judged.held_by.name}
     rows: list[Row] = [
-        {
-            **{axis: value for axis, value in zip(AXES, each.missing, strict=True)},
-            **{"robot": each.robot if each.lost is None else f"without {each.lost}", "by": each.name},
-            **{
-                "watts": each.watts,
-                "seconds": each.saturated_s,
-                "_kind": "ours" if each == judged.held_by else "",
-            },
-        }
+        vars(each)
+        | {axis: missing for axis, missing in zip(AXES, each.missing, strict=True)}
+        | {"robot": each.robot if each.lost is None else f"without {each.lost}"}
+        | {"_kind": "ours" if each == judged.held_by else ""}
         for each in judged.replays
         if each.lost is None or each.name in own
     ]
-    columns = [Column("robot", "robot"), Column("by", "method")]
-    columns += [Column(axis, axis, "three", unit="N s" if k < 3 else "N m s") for k, axis in enumerate(AXES)]
-    columns += [Column("watts", "power", "three", unit="W"), Column("seconds", "short", "three", unit="s")]
+    columns = [Column("robot", "robot"), Column("name", "method")]
+    columns += [Column(axis, axis, "three", unit=unit) for axis, unit in zip(AXES, IMPULSES, strict=True)]
+    columns += [
+        Column("watts", "power", "three", unit="W"),
+        Column("saturated_s", "short", "three", unit="s"),
+    ]
     return Table(tuple(columns), rows)
 
 
 def picture(judged: Judgement) -> Figure:
     """Demand and what the outputs gave over time, of each axis asked for, and actuators at limits."""
-    from matplotlib.figure import Figure
-
     line, names = judged.timeline, judged.robot.names
     shown = [k for k in range(6) if judged.asked[k] > 1e-3 * max(judged.asked)] or [0]
-    size: dict[str, Any] = {"figsize": (9.0, 1.6 * len(shown) + 2.2), "layout": "constrained"}
-    figure = Figure(**size)
-    panels: Any = figure.subplots(len(shown) + 1, sharex=True, squeeze=False)[:, 0]
-    for k, axes in zip(shown, panels, strict=False):
+    figure, rows = panels((9.0, 1.6 * len(shown) + 2.2), len(shown) + 1, sharex=True)
+    *upper, last = rows[:, 0]
+    for k, axes in zip(shown, upper, strict=True):
         axes.step(line.time, line.demand[:, k], where="post", color="0.55", label="asked for")
         axes.step(line.time, line.given[:, k], where="post", color=COLORS[0], label="given")
         cut = np.abs(line.missing[:, k]) > 0.0
         ends = {"step": "post", "color": COLORS[1], "alpha": 0.5, "lw": 0, "label": "missing"}
         axes.fill_between(line.time, line.demand[:, k], line.given[:, k], where=cut, **ends)
-        axes.set_ylabel(f"{MOTIONS[k]} [{'N' if k < 3 else 'N m'}]")
-        axes.grid(alpha=0.3)
-    panels[0].legend(loc="upper right", ncols=3, fontsize="small")
+        axes.set_ylabel(f"{MOTIONS[k]} [{UNITS[k]}]")
+    upper[0].legend(loc="upper right", ncols=3, fontsize="small")
     edges = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
-    panels[-1].pcolormesh(edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0)
-    panels[-1].set_yticks(np.arange(len(names)) + 0.5, names, fontsize="x-small")
-    panels[-1].set(ylabel="at a limit", xlabel="time of the log [s]")
+    last.pcolormesh(edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0)
+    last.set_yticks(np.arange(len(names)) + 0.5, names, fontsize="x-small")
+    last.set(ylabel="at a limit", xlabel="time of the log [s]")
     figure.suptitle(judged.source)
     return figure

@@ -24,16 +24,15 @@ def test_blocks_share_names_and_files_and_show_what_they_print(site: Any) -> Non
     page = '```text title="a.txt"\nhello\n```\n```python\nx = open("a.txt").read()\n```\n'
     page += "```sh\nwc -l a.txt\n```\n"
     page += '```sh title="Not run here"\nexit 1\n```\n```python\nx.strip()\n```\n'
-    found = site.blocks_of(page)
-    shown = site._run("docs/page.md", found, "")
-    assert [each["text"].strip() for each in shown] == ["", "", "1 a.txt", "hello"]
-    assert site.with_output(page, shown).count(".output") == 2
+    ran = site.run("docs/page.md", site.notebook_of(page), "")
+    shown = site.with_output(page, ran)
+    assert shown.count(".output") == 2 and "\n1 a.txt\n" in shown and "\n'hello'\n" in shown
 
 
 @pytest.mark.parametrize("page", ["```sh\nfinlab nothing\n```\n", "```python\n1 / 0\n```\n", "```\nx\n```\n"])
 def test_a_block_that_fails_or_has_no_language_ends_the_build(site: Any, page: str) -> None:
-    with pytest.raises(site.PluginError, match="ended with code|ZeroDivisionError|has no language"):
-        site._run("docs/page.md", site.blocks_of(page), "")
+    with pytest.raises(site.PluginError, match="exit status 2|ZeroDivisionError|has no language"):
+        site.run("docs/page.md", site.notebook_of(page), "")
 
 
 def test_every_name_of_the_package_has_a_page(site: Any) -> None:

@@ -74,8 +74,11 @@ def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.n
     return time, demand
 
 
-def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares") -> Dive:
-    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers."""
+def px4_dive(
+    path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares", speed: np.ndarray | None = None
+) -> Dive:
+    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers. ESCs say
+    the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
     force = Allocator(robot, "px4").allocate_batch(demand).command[..., 0]
@@ -101,15 +104,15 @@ def px4_dive(path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares
     topics["failure_detector_status"] = (time, {"motor_failure_mask": np.where(late, 4, 0).astype(np.uint16)})
     escs = {"esc_count": np.full(n, 8, np.uint16)}
     escs["esc_online_flags"] = np.where(late, 0x7F, 0xFF).astype(np.uint16)
-    topics["esc_status"] = (time, escs)
+    topics["esc_status"] = (time, escs if speed is None else escs | {"esc.esc_rpm": speed})
     status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
     topics["control_allocator_status"] = (time + 0.001, status)
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
 
 
-def sub_dive(path: Path, n: int = 3000, dt: float = 0.02) -> Dive:
+def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | None = None) -> Dive:
     """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are the sum of
-    factors, cut at full."""
+    factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
@@ -132,6 +135,9 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02) -> Dive:
         "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **{f"C{i}": pulse[:, i - 1] for i in range(1, 9)}}),
         "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
     }
+    if speed is not None:
+        motors = {"TimeUS": np.repeat(us, 8), "Instance": np.tile(np.arange(8), n), "RPM": speed.ravel()}
+        messages["ESC"] = ("QBe", motors)
     parameters = {"FRAME_CONFIG": 2.0, **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)}}
     parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
     return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)

@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -114,6 +115,26 @@ def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: f
     assert judged.held_by is not None and judged.held_by.lost == name and f"without {name}" in judged.sentence
 
 
+@pytest.mark.parametrize("write", [px4_dive, sub_dive])
+def test_a_thruster_that_ceases_to_turn_is_named_and_its_force_is_missing(
+    write: Callable[..., Dive], tmp_path: Path
+) -> None:
+    speed = np.full((600, 8), 900.0)
+    speed[200:, 2] = 0.0
+    dive = write(tmp_path / "dive", n=600, speed=speed)
+    log, name = finlab.read_log(dive.path, dive.robot), dive.robot.names[2]
+    (event,) = (each for each in log.events if "stood still" in each.words)
+    assert event.actuator == 2 and 0.0 <= event.time - dive.time[200] < 0.5
+    whole = finlab.read_log(write(tmp_path / "whole", n=600).path, dive.robot)
+    judged, late = finlab.judge(log, improve=False), log.time >= event.time
+    force = np.outer(whole.command[:, 2, 0], columns(dive.robot)[2])
+    missing = whole.span[late] @ np.abs(dive.demand - dive.given + force)[late]
+    np.testing.assert_allclose(judged.missing, missing, rtol=0.01, atol=0.01)
+    assert judged.stopped == (name,) and f"{name} stopped" in judged.sentence
+    assert f"without {name}" in judged.sentence
+    assert finlab.judge(whole, improve=False).stopped == ()
+
+
 def test_the_scale_is_the_users_where_it_is_given(sub: Dive) -> None:
     log = finlab.read_log(sub.path, sub.robot, scale=2.0 * SUB_UNIT)
     np.testing.assert_allclose(log.demand, 2.0 * sub.demand, atol=1e-3)
@@ -155,8 +176,10 @@ def test_demands_taken_together_keep_their_impulse(seed: int, px4: Dive) -> None
 
 
 @pytest.mark.parametrize("write", [sub_dive, pytest.param(px4_dive, marks=pytest.mark.exhaustive)])
-def test_twenty_minutes_at_fifty_hertz_are_judged_in_ten_seconds(write: object, tmp_path: Path) -> None:
-    dive: Dive = write(tmp_path / "dive", n=60_000)  # type: ignore[operator]
+def test_twenty_minutes_at_fifty_hertz_are_judged_in_ten_seconds(
+    write: Callable[..., Dive], tmp_path: Path
+) -> None:
+    dive = write(tmp_path / "dive", n=60_000)
     begin = time.process_time()
     judged = finlab.judge(finlab.read_log(dive.path, dive.robot))
     assert time.process_time() - begin < 10.0

@@ -1,7 +1,9 @@
 """Logs that lack something, are damaged, or are bags of ROS; and the command."""
 
 import json
+import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -86,6 +88,28 @@ def test_a_log_of_ardusub_that_ends_in_zeros_is_read_in_silence(
     (tmp_path / "dive.bin").write_bytes(sub.path.read_bytes() + bytes(2000))
     assert finlab.read_log(tmp_path / "dive.bin", sub.robot) == finlab.read_log(sub.path, sub.robot)
     assert capfd.readouterr() == ("", "")
+    with ThreadPoolExecutor(1) as other:
+        other.submit(finlab.read_log, tmp_path / "dive.bin", sub.robot)
+        for _ in range(50):
+            print("heard", flush=True)
+            os.write(1, b"heard\n")
+    assert capfd.readouterr() == ("heard\n" * 100, "")
+
+
+@pytest.mark.parametrize("kind", ["px4", "sub"])
+def test_a_log_that_is_cut_says_so(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    dive: Dive = request.getfixturevalue(kind)
+    assert not any("It ends" in note for note in finlab.read_log(dive.path, dive.robot).notes)
+    (tmp_path / "cut").write_bytes(dive.path.read_bytes()[:150_001])
+    assert any("It ends" in note for note in finlab.read_log(tmp_path / "cut", dive.robot).notes)
+
+
+def test_a_clock_that_jumps_back_is_told(sub: Dive, tmp_path: Path) -> None:
+    content = sub.path.read_bytes()
+    half = content.index(bytes([0xA3, 0x95, 2]), len(content) // 2)
+    (tmp_path / "a.bin").write_bytes(content[:half] + content[half - half // 4 :])
+    notes = finlab.read_log(tmp_path / "a.bin", sub.robot).notes
+    assert any("clock jumps back, by up to" in note for note in notes)
 
 
 def test_a_demand_that_is_not_logged_is_not_judged(sub: Dive, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import tostring
 
+import jupytext
 from latex2mathml.converter import convert_to_element
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
@@ -21,20 +22,18 @@ import reference
 from demo import demo_files
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
-_shown: dict[str, blocks.Shown] = {}
+_shown: dict[str, Any] = {}
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Run all blocks and examples, and add the pages that are made of code."""
-    examples = {
-        f"examples/{path.name}": path.read_text()
-        for path in sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))
-    }
-    pages = {file.src_uri: blocks.blocks_of(file.content_string) for file in files.documentation_pages()}
-    cells = {name: blocks.cells_of(text)[1] for name, text in examples.items()}
-    _shown.update(blocks.run_all(cells | {f"docs/{name}": page for name, page in pages.items()}))
+    examples = sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))
+    pages = {f"docs/{file.src_uri}": file.content_string for file in files.documentation_pages()}
+    notebooks = {f"examples/{path.name}": jupytext.read(path, fmt="py:percent") for path in examples}
+    notebooks |= {name: blocks.notebook_of(page) for name, page in pages.items() if "```" in page}
+    _shown.update(blocks.run_all(notebooks))
     made: dict[str, str | bytes] = {**reference.python_pages(), **reference.command_pages()}
-    made |= {**reference.format_pages(), **reference.robots_page(), **gallery(examples)}
+    made |= {**reference.format_pages(), **reference.robots_page(), **gallery()}
     picture = io.BytesIO()
     Image.open(blocks.ROOT / "docs" / "app-jets.png").convert("RGB").save(picture, "webp", quality=82)
     made["app-jets.webp"] = picture.getvalue()  # a quarter of the bytes, for the first page
@@ -47,20 +46,27 @@ def on_files(files: Files, config: Any) -> Files:
     return files
 
 
-def gallery(examples: dict[str, str]) -> dict[str, str | bytes]:
+def gallery() -> dict[str, str | bytes]:
     """A page for each example, with what it shows, and one of all."""
     made: dict[str, str | bytes] = {}
     index = "# Gallery\n\nThe files of `examples`, run when this site was built.\n\n"
     index += '<div class="grid cards gallery" markdown>\n\n'
-    for name, text in examples.items():
-        stem, (title, cells), shown = Path(name).stem, blocks.cells_of(text), _shown[name]
-        page = "" if cells[0]["language"] == "markdown" else f"# {title}\n"
-        for cell, out in zip(cells, shown, strict=True):
-            code = f"```python\n{cell['text']}```\n{blocks.output(out)}"
-            page += "\n" + (cell["text"] if cell["language"] == "markdown" else code)
+    for name, notebook in _shown.items():
+        if not name.startswith("examples/"):
+            continue
+        stem, page = Path(name).stem, ""
+        for cell in notebook.cells:
+            words = cell.cell_type == "markdown"
+            page += (
+                "\n"
+                + (cell.source if words else f"```python\n{cell.source}\n```\n{blocks.output(cell)}")
+                + "\n"
+            )
+        title = re.findall(r'^(?:# |""")(.*)', page, re.MULTILINE)[0].rstrip(".")
+        page = page if page.startswith("\n# ") else f"# {title}\n{page}"
         made[f"gallery/{stem}.md"] = f"{page}\nThis is `{name}`, which runs as it is.\n"
         seen = ""
-        if data := blocks.picture(shown):
+        if data := blocks.picture(notebook):
             made[f"gallery/{stem}.png"] = data
             seen = f"![]({stem}.png)\n\n    "
         index += f"-   {seen}[{title}]({stem}.md)\n\n"
@@ -80,7 +86,7 @@ def _in_navigation(nav: Any, made: list[str]) -> None:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Show what the blocks of a page gave."""
     source = f"docs/{page.file.src_uri}"
-    return blocks.with_output(markdown, _shown[source]) if _shown.get(source) else markdown
+    return blocks.with_output(markdown, _shown[source]) if source in _shown else markdown
 
 
 def on_page_content(content: str, page: Any, **_: Any) -> str:

@@ -71,14 +71,10 @@ class Px4(LeastErrorMethod):
         self._low, self._high = lower / self._most, upper / self._most
         effectiveness = SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most)[ROWS]
         self.mix, self.setpoint_scale = normalised(np.linalg.pinv(effectiveness, rcond=ROUNDS_OFF))
-
-    @property
-    def setpoint_unit(self) -> Array:
+        self.setpoint_unit: Array = np.empty(6)
         """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where nothing
         answers."""
-        unit = np.empty(6)
-        unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
-        return unit
+        self.setpoint_unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         part = (self.setpoint_scale * SIGNS * targets[:, ROWS])[:, None, :] * self.mix
