@@ -105,7 +105,7 @@ class Presses:
         self._gui, self._do, self._later = gui, do, later
         self._acts: dict[str, Act] = {}
         self._last = 0
-        hidden = "<style>div:has(>.fl-presses) + div {{ display: none; }}</style>{}"
+        hidden = "<style>[data-fl~=presses] + div {{ display: none; }}</style>{}"
         add_html(gui, html(hidden, marker("fl-presses")))
         self._box = gui.add_text("presses", "")
         on_user_change(self._box, self.read)

@@ -32,8 +32,8 @@ BEGIN = "What is its first actuator? Add others in the list; it can be deleted o
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
 DRAWN_S = 0.004
-"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the view at once,
-and the rest with its next picture."""
+"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the view at
+once, and the rest with its next picture."""
 
 Input = TypeVar("Input")
 

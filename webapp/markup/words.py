@@ -45,7 +45,7 @@ def row(*cells: object) -> str:
 
 
 def marker(name: str) -> str:
-    """Invisible element that styles find; put right before what they are about."""
+    """Invisible element, put right before what a style is about; its holder gets `data-fl` (`habits.js`)."""
     return html("<i class='{}'></i>", name)
 
 
@@ -53,8 +53,8 @@ def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     """A style that paints the buttons of the group behind the marker: background and text colour of each."""
     rules = [
         html(
-            "div:has(>.{}) + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: {}; }}",
-            name,
+            "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: {}; }}",
+            name.removeprefix("fl-"),
             k + 1,
             back,
             text,
