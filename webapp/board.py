@@ -147,6 +147,8 @@ class Board:
         """What is drawn in the view, after all words."""
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
+        self._seen: Facts | None = None
+        """What the view shows soon."""
 
     def group(self, fail: Fail = lambda _: None, is_view: bool = False) -> Group:
         """Rules that are declared from now on belong to a group; groups are written in their order, that of
@@ -186,12 +188,14 @@ class Board:
 
     def fail(self, error: Exception) -> None:
         """There are no facts: nothing is shown."""
+        self._seen = None
         for group in self.groups:
             group.fail(error)
 
     def refresh(self, facts: Facts) -> None:
         """Write what has changed where it can be seen; the rest waits until it can."""
         before, self.facts = self.facts, facts
+        self._seen = facts
         if before is None:
             for group in self.groups:
                 for rule in group.rules:
@@ -208,5 +212,5 @@ class Board:
 
     def draw(self) -> None:
         """Write what has changed in the view."""
-        if self.view.is_due and self.facts is not None:
-            self.view.write(self.facts)
+        if self.view.is_due and self._seen is not None:
+            self.view.write(self._seen)

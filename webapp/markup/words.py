@@ -171,7 +171,7 @@ def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
 
 
 def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
-    """Which axes the working fins cannot act on at all, given their reach (6,); None if there is none."""
+    """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for none."""
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:
         return None
@@ -188,7 +188,7 @@ def righting_sentences(layout: Layout) -> tuple[str, ...]:
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
-    """What keeping its depth takes of the working fins, given their reach (6,); None if it is little."""
+    """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if little."""
     vehicle = Vehicle(complete_body(layout))
     over = vehicle.lift - vehicle.weight
     if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
