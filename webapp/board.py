@@ -143,12 +143,19 @@ class Board:
         self.groups: list[Group] = []
         self._of_fact: dict[str, list[Rule]] = defaultdict(list)
         self._of_handle: dict[int, list[Rule]] = {}
+        self.view = Group(lambda _: None, fault)
+        """What is drawn in the view, after all words."""
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
+        self._seen: Facts | None = None
+        """What the view shows soon."""
 
-    def group(self, fail: Fail = lambda _: None) -> Group:
-        """Rules that are declared from now on belong to a group; groups are written in their order."""
+    def group(self, fail: Fail = lambda _: None, is_view: bool = False) -> Group:
+        """Rules that are declared from now on belong to a group; groups are written in their order, that of
+        the view by `draw`."""
         self.groups.append(Group(fail, self._fault))
+        if is_view:
+            self.view = self.groups[-1]
         return self.groups[-1]
 
     def show(self, handle: Any, **made: Callable[..., Any]) -> Any:
@@ -181,12 +188,14 @@ class Board:
 
     def fail(self, error: Exception) -> None:
         """There are no facts: nothing is shown."""
+        self._seen = None
         for group in self.groups:
             group.fail(error)
 
     def refresh(self, facts: Facts) -> None:
         """Write what has changed where it can be seen; the rest waits until it can."""
         before, self.facts = self.facts, facts
+        self._seen = facts
         if before is None:
             for group in self.groups:
                 for rule in group.rules:
@@ -198,5 +207,10 @@ class Board:
                     for rule in rules:
                         rule.is_due = rule.group.is_due = True
         for group in self.groups:
-            if group.is_due and group.there:
+            if group.is_due and group.there and group is not self.view:
                 group.write(facts)
+
+    def draw(self) -> None:
+        """Write what has changed in the view."""
+        if self.view.is_due and self._seen is not None:
+            self.view.write(self._seen)

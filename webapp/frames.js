@@ -16,7 +16,7 @@
   const APART = 1.9; // between the phases of fins, which look alive so
 
   let parts = [], speed = 1, frozen = true, phases = [], turns = [];
-  let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0, cost = 0, worked = -Infinity;
+  let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0, cost = 0, worked = -Infinity, over = false;
   const viewer = () => window.__viserMutable;
   const root = () => viewer()?.scene?.__r3f?.root.getState();
 
@@ -75,6 +75,7 @@
 
   // Where a frame takes long, time is left to the rest of the page, and what a user asks for goes first.
   const slow = () => cost > QUICK_MS;
+  const typing = () => !over && document.activeElement?.matches('input, textarea'); // the next key is not to wait for a frame
   const free = () => drawnAt + (slow() ? SPACING * cost : QUICK_MS);
   function ask() {
     const now = performance.now();
@@ -90,6 +91,7 @@
 
   function touch(event) {
     touched = performance.now();
+    if (event) over = event.type.startsWith('pointer') && event.target.tagName === 'CANVAS';
     if (event && event.type !== 'pointermove' && event.target.tagName !== 'CANVAS') worked = touched;
     due = Math.max(due, touched + 2 * QUICK_MS); // what the pointer is over may look otherwise
     beat();
@@ -125,6 +127,7 @@
     const pause = since < LOOKED_AT_MS ? QUICK_MS : SLOW_MS;
     timer = setTimeout(() => requestAnimationFrame(() => {
       timer = 0;
+      if (slow() && typing()) return;
       const now = performance.now(), elapsed = Math.min((now - stepped) / 1000, LONGEST_STEP_S);
       stepped = now;
       const on = 2 * Math.PI * elapsed;

@@ -111,23 +111,48 @@
     }
   }
 
-  // Folders of viser's that are regions and sections of the frame get the words of their markers, `data-fl="region top"`:
-  // a style that looked for the marker itself (`:has`) would cost tens of milliseconds at every change of the page.
-  const MARKERS = 'i.fl-region, i.fl-section', DEPTH = 5;
+  // Elements get the words of the markers and markup in them: a style that looked for these itself (`:has`) would cost tens
+  // of milliseconds at every change of the page. A folder has those of its marker (`region top`, `section at-3 Check`), what
+  // holds markup those of that, `plot` and `score` among them, and `bare` where it shows nothing, and inputs stand in a `row`.
+  const FOLDER = '.mantine-Paper-root', MARKUP = ':not([class^=fl]) > [class^=fl]', HEADING = `${FOLDER} > ${FOLDER}:first-child`;
+  const ROWS = '.mantine-Flex-root, .mantine-Button-root', CANVAS = '[data-dock-root] > div > canvas', DEPTH = 5;
 
-  function tag(marker) {
-    if (!marker.matches(MARKERS)) return;
-    let folder = marker;
-    for (let k = 0; k < DEPTH; k++) folder = folder?.parentElement;
-    if (folder?.matches('.mantine-Paper-root')) folder.dataset.fl = marker.className.replaceAll('fl-', '');
+  function tag(element) {
+    const { parentElement: holder } = element;
+    if (!holder || holder.nodeType !== Node.ELEMENT_NODE) return;
+    if (element.matches(HEADING)) holder.dataset.titled = '';
+    else if (element.matches(CANVAS)) holder.dataset.fl = 'canvas';
+    else if (element.matches(ROWS)) {
+      if (!holder.matches(ROWS)) holder.dataset.fl = 'row';
+      else holder.toggleAttribute('data-many', holder.childElementCount > 5);
+    } else if (element.matches('i.fl-region, i.fl-section')) {
+      let folder = element;
+      for (let k = 0; k < DEPTH; k++) folder = folder?.parentElement;
+      if (folder?.matches(FOLDER)) folder.dataset.fl = element.className.replaceAll('fl-', '');
+      holder.dataset.fl = 'bare';
+    } else if (element.matches(MARKUP)) {
+      const parts = [...holder.children], words = parts.flatMap((part) => [...part.classList]).map((word) => word.replace('fl-', ''));
+      words.push(...['plot', 'score'].filter((word) => holder.querySelector(`.${word}`)));
+      if (parts.every((part) => part.matches('i, style'))) words.push('bare');
+      holder.dataset.fl = words.join(' ');
+      if (element.matches('.fl-chrome'))
+        for (let up = holder; up; up = up.parentElement) if (up.matches(`[data-dock-region], #root ${FOLDER}`)) up.dataset.fl = 'panel';
+    }
   }
 
-  new MutationObserver((changes) => {
+  const TAGGED = [MARKUP, HEADING, ROWS, CANVAS].join();
+  function look(changes) {
     asked ||= setTimeout(name, 100);
     for (const { addedNodes } of changes)
       for (const node of addedNodes)
-        if (node.nodeType === Node.ELEMENT_NODE) [node, ...node.querySelectorAll(MARKERS)].forEach(tag);
-  }).observe(document.body, { childList: true, subtree: true, characterData: true });
-  document.querySelectorAll(MARKERS).forEach(tag);
-  name();
+        if (node.nodeType === Node.ELEMENT_NODE) [node, ...node.querySelectorAll(TAGGED)].forEach(tag);
+    page.toggleAttribute('data-ready', !!document.querySelector('.fl-chrome'));
+    page.toggleAttribute('data-long', !!document.querySelector('.fl-legend .wide, .fl-status .pill.long'));
+  }
+  new MutationObserver(look).observe(document.body, { childList: true, subtree: true, characterData: true });
+  look([{ addedNodes: [document.body] }]);
+
+  // Where the mouse or the focus is: what explains a row stands beside its region.
+  for (const kind of ['pointerover', 'focusin'])
+    listen(kind, ({ target }) => { page.dataset.over = target.closest?.('[data-fl~=region]')?.dataset.fl ?? ''; });
 })();

@@ -66,6 +66,8 @@ def _alike(known: Any, value: Any) -> bool:
 
 MAX_MESSAGE = 100_000
 """Longest message of the page that is read; a link with a design is the longest honest one."""
+HEARD_S = 0.1
+"""When a page is told that it was heard [s]: a script would hold up the answer until the next picture."""
 KINDS = [int, str, str, str]
 """Number, kind, key and text of a word."""
 
@@ -93,12 +95,17 @@ def placed(key: str, count: int) -> int:
 class Presses:
     """All of one page."""
 
-    def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None]) -> None:
-        """Listen to the page; `do` carries out what was meant."""
-        self._gui, self._do = gui, do
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        do: Callable[[Callable[[], object]], None],
+        later: Callable[[float, Callable[[], object]], object],
+    ) -> None:
+        """Listen to the page; `do` carries out what was meant, `later` something after some time [s]."""
+        self._gui, self._do, self._later = gui, do, later
         self._acts: dict[str, Act] = {}
         self._last = 0
-        hidden = "<style>div:has(>.fl-presses) + div {{ display: none; }}</style>{}"
+        hidden = "<style>[data-fl~=presses] + div {{ display: none; }}</style>{}"
         add_html(gui, html(hidden, marker("fl-presses")))
         self._box = gui.add_text("presses", "")
         on_user_change(self._box, self.read)
@@ -127,6 +134,9 @@ class Presses:
                 self._last = number
                 if kind in self._acts:
                     self._do(partial(self._acts[kind], key, text))
+        self._later(HEARD_S, self._tell)
+
+    def _tell(self) -> None:
         run_script(self._gui, f"finlabPresses.heard({self._last});")
 
 

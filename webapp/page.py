@@ -31,6 +31,9 @@ from webapp.viser_internals import hold_uploads, run_script, uuid_of
 BEGIN = "What is its first actuator? Add others in the list; it can be deleted once there is another."
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
+DRAWN_S = 0.004
+"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the view at
+once, and the rest with its next picture."""
 
 Input = TypeVar("Input")
 
@@ -56,7 +59,7 @@ class Page:
         self.context, self.jobs = context, Jobs(context)
         self.board = Board(self.fault)
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
-        self.presses = Presses(client.gui, self.do)
+        self.presses = Presses(client.gui, self.do, page.later)
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
@@ -206,6 +209,13 @@ class Page:
                 self.board.fail(error)
             else:
                 self.board.refresh(facts)
+        self.client.flush()
+        self._loop.later(DRAWN_S, self._draw)
+
+    def _draw(self) -> None:
+        with self.client.atomic():
+            self.board.draw()
+        self.client.flush()
 
     def fault(self, error: Exception) -> None:
         """An error of our own: it is reported, and nothing that was drawn before is trusted."""

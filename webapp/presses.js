@@ -69,7 +69,7 @@
     if (files.length !== 1 || items[0].webkitGetAsEntry?.()?.isDirectory) return void tell('dropped', '', '');
     const row = event.target.closest?.('.fin-list [data-press=fin]');
     if (row) tell('fin', row.dataset.key, '');
-    const box = document.querySelector('div:has(> .fl-file) ~ div input[type=file]');
+    const box = document.querySelector('[data-fl~=file] ~ div input[type=file]');
     box.files = files;
     box.dispatchEvent(new Event('change', { bubbles: true }));
   });

@@ -110,6 +110,7 @@ class SilentClient:
         self.kept: dict[str, str] = {}
         self.local_storage = SimpleNamespace(set_item=self.kept.__setitem__, get_item=self.kept.get)
         self.notes: list[str] = []
+        self.flush = server.flush
         self.files: dict[str, bytes] = {}
 
     def add_notification(self, title: str, body: str, **_: Any) -> None:

@@ -42,13 +42,18 @@ def test_a_design_comes_back_whole(name: str) -> None:
 
 
 def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path) -> None:
+    path, turn = tmp_path / "fin.csv", np.linspace(-np.pi, np.pi, 9)
+    write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
+    model = stored_table(path.read_bytes(), files.table_folder())
     session = Session(load_layout("pair"))
+    session.set_model([session.state.layout.names[0]], model=model)
     session.import_hull(
         files.stored_hull("hull.stl", trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl"))
     )
-    opened = files.unpacked(files.packed(session.state.layout))
+    opened = files.unpacked(files.packed(session.state.layout, 60_000))
     assert opened.layout.body is not None and opened.layout.body.hull is not None
     assert opened.layout.body.hull.mesh is not None and opened.missing == ()
+    assert opened.layout.fins[0].model == model
 
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
@@ -126,7 +131,8 @@ def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(monkeypatch: pytes
     scripts: list[str] = []
     monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))
     designs_of(mine, browser).share()
-    fragment = re.findall(r'"(design=[^"]*)"', scripts[0])[0]
+    fragment = re.findall(rf'"({files.FRAGMENT}[^"]*)"', scripts[0])[0]
+    assert files.FRAGMENT == "design="
     there = designs_of(theirs, browser)
     there.open_link(fragment)
     assert theirs.state.layout == mine.state.layout
@@ -137,16 +143,3 @@ def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(monkeypatch: pytes
         with pytest.raises(FinlabError, match="expected"):
             there.open_link(f"{fragment.partition('&')[0]}&wrench={wrench}")
         assert theirs.state.target == state.target
-
-
-def test_a_measured_fin_travels_with_its_table(tmp_path: Path) -> None:
-    path = tmp_path / "fin.csv"
-    turn = np.linspace(-np.pi, np.pi, 9)
-    write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
-    session = Session(load_layout("pair"))
-    session.set_model(
-        [session.state.layout.names[0]], model=stored_table(path.read_bytes(), files.table_folder())
-    )
-    opened = files.unpacked(files.packed(session.state.layout, 60_000))
-    assert opened.layout.fins[0].model == session.state.layout.fins[0].model
-    assert files.FRAGMENT == "design="

@@ -107,7 +107,7 @@ class Tab:
         ):
             assert time.monotonic() < end
             time.sleep(0.01)
-        self.on_loop(lambda: None)
+        self.on_loop(self.view._draw)
 
     def figures(self) -> list[str]:
         """The markup that can be seen in any task, in order, without what no two runs have in common."""

@@ -100,7 +100,8 @@ def test_every_widget_survives_a_fault_in_what_it_does(
                 told += any(WORDS in note for note in faults(view))
         assert told > 100, "most widgets do something"
         assert session.state == before
-    assert "Task exception" not in capsys.readouterr().err
+    printed = capsys.readouterr().err
+    assert "Task exception" not in printed and f"RuntimeError: {WORDS}" in printed
     on_loop(server, lambda: view.do(lambda: session.set_target(0, 0.4)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.4

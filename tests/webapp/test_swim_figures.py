@@ -65,6 +65,7 @@ def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     figures, log = swimmer.shown.figures, swimmer.log()
     assert isinstance(figures, Figures)
     power = log.driving_power.sum(axis=1)
+    assert swimmer.moment().record[:, POWER] == pytest.approx(power)
     off = np.linalg.norm(log.position - log.reference, axis=1)
     assert figures.mean_w == pytest.approx(power.mean()) and figures.now_w == pytest.approx(
         power[-10:].mean()
@@ -87,12 +88,6 @@ def test_the_log_is_sent_whole(shelf: Shelf) -> None:
     assert name == "ucat_analytic_nominal.npz"
     with np.load(io.BytesIO(content), allow_pickle=False) as log:
         assert len(log["time"]) == 20
-
-
-def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:
-    shelf.swim(1.0, "analytic")
-    swimmer = shelf.begun()
-    assert swimmer.moment().record[:, POWER] == pytest.approx(swimmer.log().driving_power.sum(axis=1))
 
 
 def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
@@ -144,21 +139,6 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
         return
     (loss,) = chosen("lost-in-current").plan(State(robot, damage=Damage((robot.names[0],)))).losses
     assert loss.name in robot.names[1:]
-
-
-@pytest.mark.parametrize(("key", "wrong"), [("scenario", "hexa")])
-def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
-    with pytest.raises(FinlabError):
-        SwimSettings().with_value(key, wrong)
-
-
-@pytest.fixture
-def swimming() -> Any:
-    worker = Worker()
-    swim = Swimming(page_of(worker))
-    yield swim
-    swim.stop()
-    worker.stop()
 
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:

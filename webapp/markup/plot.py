@@ -35,7 +35,8 @@ class Axis(NamedTuple):
 
 
 def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
-    """An axis that shows all of some values, with round ticks, `most` at most."""
+    """An axis that shows all of some values (N,), in the unit that `word` names, with round ticks, `most` at
+    most."""
     low, high = float(values.min()), float(values.max())
     margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
     low, high = low - margin, high + margin
@@ -46,7 +47,7 @@ def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
 
 
 def error_axis(logs: Array) -> Axis:
-    """The same for logarithms of errors, in powers of ten."""
+    """The same for logarithms (N,) of errors, to base ten, in powers of ten."""
     low = math.floor(logs.min())
     high = max(math.ceil(logs.max()), low + 1)
     ticks = []
@@ -81,12 +82,12 @@ class Plot(NamedTuple):
         return right, self.floor - self.up.share(y) * (self.floor - TOP)
 
     def points(self, x: Array, y: Array) -> str:
-        """Some places, as lines take them."""
+        """Some places, x and y (N,) in the units of the axes, as lines take them [px]."""
         places = zip(*self.place(x, y), strict=True)
         return " ".join([f"{right:.1f},{down:.1f}" for right, down in places])
 
     def curve(self, x: Array, y: Array, color: Rgb) -> str:
-        """A line through some places."""
+        """A line through some places, x and y (N,) in the units of the axes."""
         line = "<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>"
         return html(line, self.points(x, y), css(color))
 
@@ -120,13 +121,13 @@ class Plot(NamedTuple):
 
 
 def positive(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
-    """An axis from 0, or the least of some values, that shows all of them."""
+    """An axis from 0, or the least of some values (N,), that shows all of them."""
     least = min(0.0, float(values.min()))
     return cost_axis(word, np.append(values, least), most)._replace(low=least)
 
 
 def exact_axis(word: str, values: Array) -> Axis:
-    """An axis from the first of some values to the last."""
+    """An axis from the first of some values (N,) to the last."""
     axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
     return axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
 
@@ -144,8 +145,8 @@ def over_time(
     words: Sequence[str] = (),
     moment: float | None = None,
 ) -> str:
-    """Curves over the same times, of as many colours, the first of which have words; with an upright line at
-    a moment."""
+    """Curves (T,), in the unit of `up`, over the same times (T,) [s], of as many colours, the first of which
+    have words; with an upright line at a moment [s]."""
     drawing = Plot(across, up._replace(word=""), LOW, INDENT, NARROW)
     parts = [html("<text x='2' y='14'>{}</text>", up.word)]
     parts += [drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)]

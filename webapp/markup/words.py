@@ -45,7 +45,7 @@ def row(*cells: object) -> str:
 
 
 def marker(name: str) -> str:
-    """Invisible element that styles find; put right before what they are about."""
+    """Invisible element, put right before what a style is about; its holder gets `data-fl` (`habits.js`)."""
     return html("<i class='{}'></i>", name)
 
 
@@ -53,8 +53,8 @@ def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     """A style that paints the buttons of the group behind the marker: background and text colour of each."""
     rules = [
         html(
-            "div:has(>.{}) + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: {}; }}",
-            name,
+            "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: {}; }}",
+            name.removeprefix("fl-"),
             k + 1,
             back,
             text,
@@ -171,7 +171,7 @@ def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
 
 
 def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
-    """Which axes the working fins cannot act on at all, given their reach (6,); None if there is none."""
+    """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for none."""
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:
         return None
@@ -188,7 +188,7 @@ def righting_sentences(layout: Layout) -> tuple[str, ...]:
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
-    """What keeping its depth takes of the working fins, given their reach (6,); None if it is little."""
+    """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if little."""
     vehicle = Vehicle(complete_body(layout))
     over = vehicle.lift - vehicle.weight
     if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):

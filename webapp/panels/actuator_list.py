@@ -98,12 +98,13 @@ def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
     places = [_minus(f"{value:.3f}") for value in part.position]
     twin = partner(state.links, part.name)
     return html(
-        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",
+        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name {}' title='{}'>{}</span>{}</td>{}</tr>",
         html("<tr><th colspan='5'>{}</th></tr>", part.type) if head else "",
         "chosen" if chosen else "",
         part.name,
         press("fin", str(index)),
         swatch(index, part.name in state.failed),
+        "" if twin is None else "paired",
         part.name,
         part.name,
         "" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin),

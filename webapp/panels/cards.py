@@ -145,6 +145,7 @@ def add_answering(page: Page) -> None:
     about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
     least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
+    add_html(gui, marker("fl-method"))
     methods = gui.add_dropdown("Method", tuple(METHODS))
     page.board.show(methods, options=_options)
     named = {_option(name): name for name in METHODS}

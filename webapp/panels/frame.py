@@ -18,6 +18,7 @@ from webapp.handles import add_html, button, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
+from webapp.panels.log_tab import plot_rows
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, WAYS, Desk
@@ -39,7 +40,9 @@ STYLE = html(
     (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in ("style.css", "frame.css")),
 )
 LOW = ":root { --tall: 92px; }"
-TALL = ":root { --fl-usual: 344px; }"
+USUAL = ":root {{ --fl-usual: {}px; }}"
+ROW_PX, HEAD_PX = 138, 68
+"""Height of a row of plots over time, and of what is in the drawer beside them [px]."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
 
 
@@ -53,7 +56,7 @@ class Section:
         gui = page.gui
         self.group = page.board.group(self._fail)
         with gui.add_folder(place.title, expand_by_default=not place.folded) as self.whole:
-            add_html(gui, marker(f"fl-section fl-{self.name}"))
+            add_html(gui, marker(f"fl-section fl-{self.name} {place.title}"))
             self._sentence = gui.add_html("", visible=False)
             with gui.add_folder(None, visible=False) as self._folder:
                 place.make(page)
@@ -136,9 +139,11 @@ class Frame:
             "log": desk.task == places.LOG,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        plots = {places.SIMULATE: swimmer is not None, places.LOG: judged is not None}
-        low, tall = not plots.get(desk.task, True), desk.task == places.SIMULATE
-        height = LOW if low else TALL if tall else ""
+        swum, rows = 2 * (swimmer is not None), 0 if judged is None else plot_rows(judged)
+        rows = {places.SIMULATE: swum, places.LOG: rows}.get(desk.task, 0)
+        is_timeline = drawer in (*DRAWERS[places.SIMULATE], DRAWERS[places.LOG][0])
+        low = desk.task in (places.SIMULATE, places.LOG) and not rows
+        height = LOW if low else USUAL.format(HEAD_PX + ROW_PX * rows) if is_timeline else ""
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
             self._shown,

@@ -19,6 +19,8 @@ from webapp.theme import ASKED, DELIVERED, fin_color
 if TYPE_CHECKING:
     from finlab.log import Judgement
 
+ACROSS = 4
+"""Plots that stand beside each other."""
 FIRST = (
     "Drop a log on the page: PX4 (.ulg), ArduSub (.bin), or a bag of ROS (.mcap, .db3, .bag). It is told "
     "when and on which axis the robot could not, and what would have held it."
@@ -113,6 +115,15 @@ def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
     return html("<div class='fl'>{}</div>", tables)
 
 
+def _asked_axes(judged: "Judgement") -> list[int]:
+    return np.flatnonzero(np.array(judged.asked) > 1e-3 * max(judged.asked)).tolist()
+
+
+def plot_rows(judged: "Judgement") -> int:
+    """Rows that the plots of a log take, in a window of usual width."""
+    return 1 if len(_asked_axes(judged)) < ACROSS else 2
+
+
 def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
     """Demand and what was given over time, of each axis that was asked for, and actuators at their limits."""
     if judged is None:
@@ -120,7 +131,7 @@ def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
     line, parts = judged.timeline, []
     ends: Any = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
     across = exact_axis("time [s]", ends)
-    for k in np.flatnonzero(np.array(judged.asked) > 1e-3 * max(judged.asked)).tolist():
+    for k in _asked_axes(judged):
         both = [line.demand[:, k], line.given[:, k]]
         up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), both), 4)
         words = ("asked", "given")

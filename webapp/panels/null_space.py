@@ -25,7 +25,6 @@ def add_null_space(page: Page) -> None:
     page.add_html(_about)
     add_html(page.gui, marker("fl-reach"))
     sliders = [_add_slider(page, k) for k in range(MOST)]
-    add_html(page.gui, marker("fl-reach-end"))
 
     def place(modes: Modes, shifts: tuple[float, ...]) -> None:
         known = modes.null

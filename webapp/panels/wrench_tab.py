@@ -124,10 +124,8 @@ def _at_rest(layout: Layout, flow: Flow | None) -> str:
 
 
 def _sentence(ranges_error: str | None) -> str:
-    if ranges_error is None:
-        return marker("fl-reach-end")
-    said = "{}<div class='fl missing'>What is in reach: {}</div>"
-    return html(said, marker("fl-reach-end"), ranges_error)
+    said = "<div class='fl missing'>What is in reach: {}</div>"
+    return "" if ranges_error is None else html(said, ranges_error)
 
 
 def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:

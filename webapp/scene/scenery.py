@@ -43,7 +43,7 @@ class Scenery:
         self._fault = fault
         self._scale = self._swam = FIRST
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
-        board.group(self._fail)
+        board.group(self._fail, is_view=True)
         board.act(self._show)
         self.robot = RobotScene(context, board)
         self.swim = SwimScene(self._client, swimming, self.robot.root)

@@ -136,7 +136,7 @@ class AttainableNodes:
         self, findings: Findings | None, better: AttainableSet | None, target: Array, size: float
     ) -> None:
         """Show the sets of findings, nothing for None, as large as `size` says, or a better one around the
-        present one; the ball marks what `target` (6,) asks in them."""
+        present one; the ball marks what `target` (6,) [N, N m] asks in them."""
         if findings is None and not (self._now.node.visible or self._whole.node.visible):
             return
         now, full = (None, None) if findings is None else (findings.now, findings.whole)

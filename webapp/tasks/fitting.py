@@ -2,7 +2,8 @@
 
 import re
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -102,17 +103,12 @@ class Fitting(Newest[Upload, Fitted]):
     def _fit(self, upload: Upload) -> Fitted:
         """On the worker's thread."""
         done = Upload(upload.part, upload.name, b"")
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / upload.name
-            path.write_bytes(upload.content)
-            try:
-                if not isinstance(upload.part, Fin):
-                    return _bench(path, done)
-                if in_worker(_is_table, path):
-                    return Fitted(done, {"model": stored_table(upload.content, table_folder())})
-                return self._fit_measurements(path, upload, done)
-            except FinlabError as error:
-                raise type(error)(str(error).replace(f"{folder}/", "")) from None
+        with as_file(upload.name, upload.content) as path:
+            if not isinstance(upload.part, Fin):
+                return _bench(path, done)
+            if in_worker(_is_table, path):
+                return Fitted(done, {"model": stored_table(upload.content, table_folder())})
+            return self._fit_measurements(path, upload, done)
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
         from finlab.fit.fin_fit import fin_csv, fit_fin
@@ -134,6 +130,18 @@ class Fitting(Newest[Upload, Fitted]):
 def short_name(name: str) -> str:
     """The name of an upload as that of a file here."""
     return re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
+
+
+@contextmanager
+def as_file(name: str, content: bytes) -> Iterator[Path]:
+    """An upload as a file while it is read; what is wrong with it is said without the file's folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_bytes(content)
+        try:
+            yield path
+        except FinlabError as error:
+            raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
 
 def _model(part: Actuator) -> object:

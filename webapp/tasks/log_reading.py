@@ -1,8 +1,6 @@
 """A log of an autopilot or of ROS that one page judges, and its moments on the robot."""
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +10,7 @@ from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
 from webapp.tasks.background import Context, Newest
-from webapp.tasks.fitting import short_name
+from webapp.tasks.fitting import as_file, short_name
 
 if TYPE_CHECKING:  # who opens no log needs none of it
     from finlab.log import Judgement
@@ -80,13 +78,8 @@ class LogReading(Newest[LogFile, "Judgement"]):
         try:
             from finlab.log import judge, read_log
 
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / file.name
-                path.write_bytes(file.content)
-                try:
-                    log = in_worker(read_log, path, file.robot)
-                except FinlabError as error:
-                    raise type(error)(str(error).replace(f"{folder}/", "")) from None
+            with as_file(file.name, file.content) as path:
+                log = in_worker(read_log, path, file.robot)
         except ModuleNotFoundError as error:
             raise FinlabError(f"{file.name} needs {error.name}; {install('logs')}") from None
         self.report(file, "asking other methods and policies the same")
