@@ -121,7 +121,8 @@ class Dual(Method):
     def _reach_peaks(self, found: Found, targets: Array) -> None:
         """Meets targets (N, 6) that take the last share of a force, which tables leave out: steps by the laws
         lead there from what is nearest."""
-        near = np.flatnonzero(~found.within & (self._missing(found.aim, targets) <= 10.0 * CLOSE))
+        beyond = np.flatnonzero(~found.within)
+        near = beyond[self._missing(found.aim[beyond], targets[beyond]) <= 10.0 * CLOSE]
         if not len(near):
             return
         ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
