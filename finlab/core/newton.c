@@ -5,7 +5,8 @@
    g is concave, its Hessian is -G with G = sum B (dy/ds) B'. Where actuators are at their limits G loses rank:
    a ridge mu (S + c tr(G) M) keeps the step finite and is adapted to what a step brought (Levenberg, Marquardt).
    S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as they are, and M the Hessian
-   of quadratic costs over its mean. Whatever its rank, all vectors of the basis are of 6, with zeros behind. */
+   of quadratic costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have 6 numbers,
+   those behind its range are 0. */
 #include "inner.h"
 
 #define SATURATED R(1e-1) /* ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
@@ -107,7 +108,8 @@ void look(const real *block, const fl_work *work, const real *target, const real
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
     slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
     int line = a->rows == 1;
-    slope[3] = (line ? FABS(o.force[0]) : size_of(o.force)) / MAX(line ? FABS(own[0]) : size_of(own), a->most[0] / a->gain[0]);
+    real paid = line ? FABS(own[0]) : size_of(own), size = line ? FABS(o.force[0]) : size_of(o.force);
+    slope[3] = work->drags ? 0 : size / MAX(paid, a->most[0] / a->gain[0]);
     conjugate += o.conjugate;
     for (int j = 0; j < 6; j++) given[j] += o.force[0] * a->matrix[0][j] + o.force[1] * a->matrix[1][j];
   }
@@ -124,18 +126,18 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
   *ridge = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real own[2], most = a->most[0], ratio = 1;
+    real own[2], most = a->most[0], gain[2] = {a->gain[0], a->gain[1]};
     own_price(block, i, even, own);
     real size = a->gain[0] * (is_plane(a) ? size_of(own) : FABS(own[0]));
     if (a->rows == 1) {
       const real *table = block + (int)(own[0] < 0 && a->back > 0 ? a->back : a->ahead);
       most = a->share * table[3 + 3 * (int)table[1]];
-      ratio = most * a->share / (table[0] * a->worth * a->gain[0]);
+      gain[0] = most * a->share / (table[0] * a->worth);
     }
     real share = size / most;
     if (share > R(0.8)) *ridge = SATURATED;
-    ratio *= share > 1 ? 1 / share : SQRT(MAX(share, CLOSE));
-    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], ratio * a->gain[q]);
+    real weight = share > 1 && !work->drags ? 1 / share : SQRT(CLIP(share, CLOSE, 1));
+    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], weight * gain[q]);
   }
   trace = trace_of(h);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
@@ -160,7 +162,7 @@ static int step_of(const real *block, const fl_work *work, const fl_state *s, re
       for (int k = 0; k <= j; k++) h[j][k] += u * b[k] + v * c[k];
     }
   }
-  real added = EVEN * ridge * MAX(trace_of(h), work->least_trace);
+  real added = (work->drags ? 1 : EVEN) * ridge * MAX(trace_of(h), work->least_trace);
   for (int j = 0; j < 6; j++)
     for (int k = 0; k <= j; k++) h[j][k] += added * work->metric[j][k];
   if (!factor(h)) return 0;
