@@ -9,8 +9,7 @@
    those behind its range are 0. */
 #include "inner.h"
 
-#define SATURATED R(1e-1) /* ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
-#define EVEN R(1e-2)      /* share c of M in the ridge */
+#define SATURATED R(1e-1) /* share c of M, and ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
 
 /* Scaled wrench in the basis. */
 void to_basis(const real *block, const real *wrench, real *target) {
@@ -162,7 +161,7 @@ static int step_of(const real *block, const fl_work *work, const fl_state *s, re
       for (int k = 0; k <= j; k++) h[j][k] += u * b[k] + v * c[k];
     }
   }
-  real added = (work->drags ? 1 : EVEN) * ridge * MAX(trace_of(h), work->least_trace);
+  real added = (work->drags ? 1 : SATURATED) * ridge * MAX(trace_of(h), work->least_trace);
   for (int j = 0; j < 6; j++)
     for (int k = 0; k <= j; k++) h[j][k] += added * work->metric[j][k];
   if (!factor(h)) return 0;
