@@ -164,6 +164,6 @@ class PropellerLaw(ActuatorLaw):
         return gradient
 
 
-def held(force: AnyArray, dead_band: Array) -> AnyArray:
-    """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
-    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force))
+def held(force: AnyArray, dead_band: Array, rest: Array | float = 0.0) -> AnyArray:
+    """Returns the forces (..., n) [N] that come of commanded ones: `rest` within the dead bands (n,) [N]."""
+    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), rest, force))

@@ -122,7 +122,7 @@ static int leaves(const real *block, const fl_box *box, int i, int c, const real
 static void change_for(const real *block, fl_work *work, const real *miss, real damping,
                        const unsigned char held[][3], real step[][3]) {
   int n = COUNT(block);
-  real gram[6][6] = {{0}}, factor[6][6], x[6] = {0}, trace = 0;
+  real gram[6][6] = {{0}}, x[6] = {0}, trace = 0;
   for (int i = 0; i < n; i++)
     for (int c = 0; c < 3; c++) {
       const real *row = work->slope[i][c];
@@ -132,7 +132,7 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
     }
   for (int j = 0; j < 6; j++) trace += gram[j][j];
   for (int j = 0; j < 6; j++) gram[j][j] += damping + NOTHING + ROUNDING * R(0.01) * trace;
-  if (cholesky(gram, factor, 6)) solve(factor, miss, x, 6);
+  if (factor(gram)) solve(gram, miss, x);
   for (int i = 0; i < n; i++)
     for (int c = 0; c < 3; c++) step[i][c] = held[i][c] ? 0 : dot(work->slope[i][c], x, 6);
 }

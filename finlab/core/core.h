@@ -82,8 +82,9 @@ typedef struct { /* what one actuator may give now */
 } fl_set;
 
 typedef struct { /* prices, and what they give */
-  fl_real price[6], residual[6], hessian[6][6], force[FL_MOST][2];
-  fl_real value, size, trace; /* dual value [W], size of the residual, trace of the hessian */
+  fl_real price[6], residual[6], force[FL_MOST][2];
+  fl_real slope[FL_MOST][4]; /* of forces by prices: xx, xy, yy; then force over price [N^2/W] */
+  fl_real value, size;       /* dual value [W], size of the residual */
 } fl_state;
 
 #define FL_POINTS 8              /* of a mixture near to a point out of reach */

@@ -66,15 +66,15 @@ static inline real dot(const real *a, const real *b, int n) {
 }
 static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
 real wrapped(real angle);
-int cholesky(real a[6][6], real factor[6][6], int n);
-void solve(real factor[6][6], const real *right, real *x, int n);
+int factor(real a[6][6]);
+void solve(real a[6][6], const real *right, real *x);
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
 /* Prices of an actuator's rows at prices of the wrench in the basis. */
 static inline void own_price(const real *block, int i, const real *price, real *own) {
   const fl_actuator *a = ACTUATOR(block, i);
-  own[0] = dot(a->matrix[0], price, RANGE(block)), own[1] = a->rows == 2 ? dot(a->matrix[1], price, RANGE(block)) : 0;
+  own[0] = dot(a->matrix[0], price, 6), own[1] = dot(a->matrix[1], price, 6);
 }
 
 /* table.c */

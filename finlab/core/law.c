@@ -1,13 +1,13 @@
 /* Laws of actuators by tables: the force of a command, its derivatives, and a command for a force. */
 #include "inner.h"
 
-/* Weights of four neighbours in value and derivative, and the first of them, on an axis of knots: a cubic whose
-   slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
-typedef struct { real value[4], slope[4]; int first; } weights;
+/* Weights of four neighbours in value and derivative, and where their values are, on an axis of knots with values `each`
+   apart: a cubic whose slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
+typedef struct { real value[4], slope[4]; int at[4], count; } weights;
 
-static weights weights_at(const real *knot, int count, real period, real x, int slopes) {
-  weights w = {{0, 1, 0, 0}, {0}, -1};
-  if (count == 1) return w;
+static void weights_at(const real *knot, int count, int each, real period, real x, weights *w) {
+  *w = (weights){{1}, {0}, {0}, 1};
+  if (count == 1) return;
   int cells = period > 0 ? count : count - 1, low = 0, high = cells;
   real begin = knot[0], end = period > 0 ? begin + period : knot[count - 1], held;
   if (period > 0) x -= period * FLOOR((x - begin) / period);
@@ -30,12 +30,12 @@ static weights weights_at(const real *knot, int count, real period, real x, int 
   real early = width / (before + width), late = width / (width + after), pace = held == x ? 1 / width : 0;
   real linear[4] = {-early, 0, early, 0}, square[4] = {2 * early, late - 3, 3 - 2 * early, -late};
   real cubic[4] = {-early, 2 - late, early - 2, late};
+  w->count = 4;
   for (int k = 0; k < 4; k++) {
-    w.value[k] = (k == 1) + t * (linear[k] + t * (square[k] + t * cubic[k]));
-    if (slopes) w.slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
+    w->value[k] = (k == 1) + t * (linear[k] + t * (square[k] + t * cubic[k]));
+    w->slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
+    w->at[k] = each * (period > 0 ? (low + k - 1 + count) % count : CLIP(low + k - 1, 0, count - 1));
   }
-  w.first = low - 1;
-  return w;
 }
 
 /* A grid: counts of three axes, period of the third (0: none), whether the first axis is the product of the first
@@ -43,33 +43,24 @@ static weights weights_at(const real *knot, int count, real period, real x, int 
    values at each point. Values (c,) and, where there is room for them, their derivatives by each command (3, c). */
 static void grid_at(const real *grid, const real *command, real *value, real (*slope)[3]) {
   int count[3] = {(int)grid[0], (int)grid[1], (int)grid[2]}, product = grid[4] != 0, columns = (int)grid[5];
+  int each[3] = {columns * count[2] * count[1], columns * count[2], columns};
   const real *knot = grid + 7, *values = knot + count[0] + count[1] + count[2];
   real at[3] = {product ? command[0] * command[1] : command[0], command[1], command[2]};
   weights w[3];
-  for (int k = 0; k < 3; knot += count[k++]) w[k] = weights_at(knot, count[k], count[k] > 1 && k == 2 ? grid[3] : 0, at[k], slope != 0);
-  for (int c = 0; c < columns; c++) value[c] = 0;
-  if (slope) memset(slope, 0, 9 * sizeof **slope);
-  for (int a = 0; a < 4; a++) {
-    if (count[0] == 1 && a != 1) continue;
-    int i = CLIP(w[0].first + a, 0, count[0] - 1);
-    for (int f = 0; f < 4; f++) {
-      if (count[1] == 1 && f != 1) continue;
-      int j = CLIP(w[1].first + f, 0, count[1] - 1);
-      real both = w[0].value[a] * w[1].value[f], by_a = w[0].slope[a] * w[1].value[f];
-      real by_f = w[0].value[a] * w[1].slope[f];
-      for (int d = 0; d < 4; d++) {
-        if (count[2] == 1 && d != 1) continue;
-        int k = w[2].first + d;
-        k = grid[3] > 0 ? (k + count[2]) % count[2] : CLIP(k, 0, count[2] - 1);
-        const real *own = values + columns * (k + count[2] * (j + count[1] * i));
-        for (int c = 0; c < columns; c++) {
-          real v = own[c] * w[2].value[d];
-          value[c] += both * v;
+  for (int k = 0; k < 3; knot += count[k++]) weights_at(knot, count[k], each[k], k == 2 ? grid[3] : 0, at[k], w + k);
+  for (int c = 0; c < columns; c++, values++) {
+    real sum = 0, by[3] = {0};
+    for (int a = 0; a < w[0].count; a++)
+      for (int f = 0; f < w[1].count; f++)
+        for (int d = 0; d < w[2].count; d++) {
+          real own = values[w[0].at[a] + w[1].at[f] + w[2].at[d]], v = own * w[2].value[d];
+          sum += w[0].value[a] * w[1].value[f] * v;
           if (!slope) continue;
-          slope[0][c] += by_a * v, slope[1][c] += by_f * v, slope[2][c] += both * own[c] * w[2].slope[d];
+          by[0] += w[0].slope[a] * w[1].value[f] * v, by[1] += w[0].value[a] * w[1].slope[f] * v;
+          by[2] += w[0].value[a] * w[1].value[f] * own * w[2].slope[d];
         }
-      }
-    }
+    value[c] = sum;
+    for (int k = 0; slope && k < 3; k++) slope[k][c] = by[k];
   }
   if (product && slope)
     for (int c = 0; c < columns; c++) {
@@ -111,10 +102,11 @@ void force_of(const real *block, int i, const real *command, real *force, real (
     for (int k = 0; k < 2; k++) force[k] *= a->pressure, slope[0][k] = a->pressure * by[2][k];
     force[1] -= a->pressure * a->rest;
   } else if (grid[5] == 1) { /* a size along a direction */
-    real size, by[3][3] = {{0}}, around = command[2] - a->uneven_at, uneven = a->uneven != 0 ? 1 + a->uneven * COS(around) : 1;
+    real size, by[3][3] = {{0}}, around = command[2] - a->uneven_at, uneven = 1, bend = 0;
     real c = COS(command[2] + a->lean), s = SIN(command[2] + a->lean);
     grid_at(grid, command, &size, steep ? by : 0);
-    real parts[3] = {by[0][0] * uneven, by[1][0] * uneven, -size * a->uneven * SIN(around)};
+    if (a->uneven != 0) uneven += a->uneven * COS(around), bend = -a->uneven * SIN(around);
+    real parts[3] = {by[0][0] * uneven, by[1][0] * uneven, size * bend};
     size *= uneven;
     force[1] = size * c, force[2] = size * s;
     for (int k = 0; k < 3; k++) slope[k][1] = parts[k] * c, slope[k][2] = parts[k] * s;

@@ -3,26 +3,22 @@
 
 real wrapped(real angle) { return angle - 2 * PI * FLOOR((angle + PI) / (2 * PI)); }
 
-/* Cholesky factor of the lower triangle of a (n x n), its diagonal inverted; 0 where a is singular to rounding. */
-int cholesky(real a[6][6], real factor[6][6], int n) {
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j <= i; j++) {
-      real sum = a[i][j] - dot(factor[i], factor[j], j);
-      if (i > j)
-        factor[i][j] = sum * factor[j][j];
-      else if (sum > 0)
-        factor[i][i] = 1 / SQRT(sum);
-      else
-        return 0;
-    }
+/* Turns the lower triangle of a (6 x 6) into L and 1 / D of L D L'; 0 where a is singular to rounding. */
+int factor(real a[6][6]) {
+  for (int i = 0; i < 6; i++) {
+    real row[6], rest = a[i][i];
+    for (int j = 0; j < i; j++) row[j] = a[i][j] - dot(row, a[j], j);
+    for (int j = 0; j < i; j++) a[i][j] = row[j] * a[j][j], rest -= row[j] * a[i][j];
+    if (!(rest > 0)) return 0;
+    a[i][i] = 1 / rest;
+  }
   return 1;
 }
 
-void solve(real factor[6][6], const real *right, real *x, int n) {
-  for (int i = 0; i < n; i++) x[i] = (right[i] - dot(factor[i], x, i)) * factor[i][i];
-  for (int i = n - 1; i >= 0; i--) {
-    real sum = x[i];
-    for (int k = i + 1; k < n; k++) sum -= factor[k][i] * x[k];
-    x[i] = sum * factor[i][i];
+void solve(real a[6][6], const real *right, real *x) {
+  for (int i = 0; i < 6; i++) x[i] = right[i] - dot(a[i], x, i);
+  for (int i = 5; i >= 0; i--) {
+    x[i] *= a[i][i];
+    for (int k = 5; k > i; k--) x[i] -= a[k][i] * x[k];
   }
 }

@@ -3,16 +3,18 @@
        max over l of  g(l) = l.w - sum c*(B'l),   with gradient  w - sum B y(B'l)
 
    g is concave, its Hessian is -G with G = sum B (dy/ds) B'. Where actuators are at their limits G loses rank:
-   a ridge mu tr(G) M, with M the Hessian of quadratic costs over its mean, keeps the step finite and is
-   adapted to what a step brought (Levenberg, Marquardt; Nielsen's growth where steps are refused). */
+   a ridge mu (S + c tr(G) M) keeps the step finite and is adapted to what a step brought (Levenberg, Marquardt).
+   S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as they are, and M the Hessian
+   of quadratic costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have 6 numbers,
+   those behind its range are 0. */
 #include "inner.h"
 
-#define SATURATED R(1e-2) /* ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
+#define SATURATED R(1e-1) /* share c of M, and ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
 
 /* Scaled wrench in the basis. */
 void to_basis(const real *block, const real *wrench, real *target) {
   const fl_head *h = HEAD(block);
-  for (int j = 0; j < RANGE(block); j++) {
+  for (int j = 0; j < 6; j++) {
     target[j] = 0;
     for (int k = 0; k < 6; k++) target[j] += h->basis[k][j] * (wrench[k] / h->scale[k]);
   }
@@ -21,7 +23,7 @@ void to_basis(const real *block, const real *wrench, real *target) {
 /* Prices in the basis of those of the wrench. */
 void price_in_basis(const real *block, const real *price, real *inner) {
   const fl_head *h = HEAD(block);
-  for (int j = 0; j < RANGE(block); j++) {
+  for (int j = 0; j < 6; j++) {
     inner[j] = 0;
     for (int k = 0; k < 6; k++) inner[j] += h->basis[k][j] * h->scale[k] * price[k];
   }
@@ -32,7 +34,7 @@ real beside_range(const real *block, const real *wrench, const real *target, rea
   const fl_head *h = HEAD(block);
   real rest = 0, all = 0;
   for (int k = 0; k < 6; k++) {
-    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, RANGE(block));
+    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, 6);
     rest += left * left, all += scaled * scaled;
   }
   *size = SQRT(all);
@@ -48,30 +50,38 @@ void wrench_of(const real *block, real force[][2], real *wrench) {
     for (int q = 0; q < (int)a->rows; q++)
       for (int j = 0; j < RANGE(block); j++) given[j] += force[i][q] * a->matrix[q][j];
   }
-  for (int k = 0; k < 6; k++) wrench[k] = h->scale[k] * dot(h->basis[k], given, RANGE(block));
+  for (int k = 0; k < 6; k++) wrench[k] = h->scale[k] * dot(h->basis[k], given, 6);
 }
 
-static void add_square(real h[6][6], const real *row, real weight, int r) {
-  for (int j = 0; j < r; j++)
-    for (int k = 0; k <= j; k++) h[j][k] += weight * row[j] * row[k];
+/* Adds b b' times a weight to a lower triangle. */
+static void add_square(real h[6][6], const real *b, real weight) {
+  for (int j = 0; j < 6; j++) {
+    real own = weight * b[j];
+    for (int k = 0; k <= j; k++) h[j][k] += own * b[k];
+  }
+}
+
+static real trace_of(real h[6][6]) {
+  real sum = 0;
+  for (int j = 0; j < 6; j++) sum += h[j][j];
+  return sum;
 }
 
 int fl_prepare(const real *block, fl_work *work) {
-  int n = COUNT(block), r = RANGE(block);
-  real h[6][6] = {{0}}, trace = 0;
-  for (int i = 0; i < n; i++) {
+  real(*h)[6] = work->factor, trace;
+  memset(work->factor, 0, sizeof work->factor);
+  for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
-    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], a->gain[q], r);
+    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], a->gain[q]);
   }
-  for (int j = 0; j < r; j++) trace += h[j][j];
-  for (int j = 0; j < r; j++)
-    for (int k = 0; k <= j; k++)
-      work->metric[j][k] = work->metric[k][j] = h[j][k] * r / trace + (j == k ? NEARLY : 0);
-  for (int j = 0; j < r; j++) h[j][j] += NOTHING * trace;
+  trace = trace_of(h);
+  for (int j = 0; j < 6; j++)
+    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * RANGE(block) / trace + (j == k ? NEARLY : 0);
+  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
   work->least_trace = NEARLY * trace, work->enough = TOLERANCE;
   sums_of(block, work);
-  return cholesky(h, work->factor, r) ? 0 : FL_BAD_NUMBER;
+  return RANGE(block) == 0 || factor(h) ? 0 : FL_BAD_NUMBER;
 }
 
 /* What follows from all sets. */
@@ -88,86 +98,79 @@ void sums_of(const real *block, fl_work *work) {
 
 /* What prices give for a target in the basis. */
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
-  int n = COUNT(block), r = RANGE(block);
-  real given[6] = {0}, conjugate = 0, (*h)[6] = state->hessian;
-  memset(state->hessian, 0, sizeof state->hessian);
-  for (int i = 0; i < n; i++) {
+  real given[6] = {0}, conjugate = 0;
+  for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const real *first = a->matrix[0], *second = a->matrix[1];
-    int two = a->rows == 2;
-    real own[2];
+    real own[2], *slope = state->slope[i];
     own_price(block, i, price, own);
     reply o = reply_of(block, i, work->set + i, own);
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
+    slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
+    int line = a->rows == 1;
+    real paid = line ? FABS(own[0]) : size_of(own), size = line ? FABS(o.force[0]) : size_of(o.force);
+    slope[3] = work->drags ? 0 : size / MAX(paid, a->most[0] / a->gain[0]);
     conjugate += o.conjugate;
-    for (int j = 0; j < r; j++) {
-      real u = o.xx * first[j], v = 0;
-      given[j] += o.force[0] * first[j];
-      if (two) {
-        given[j] += o.force[1] * second[j];
-        u += o.xy * second[j], v = o.xy * first[j] + o.yy * second[j];
-        for (int k = 0; k <= j; k++) h[j][k] += u * first[k] + v * second[k];
-      } else if (u != 0)
-        for (int k = 0; k <= j; k++) h[j][k] += u * first[k];
-    }
+    for (int j = 0; j < 6; j++) given[j] += o.force[0] * a->matrix[0][j] + o.force[1] * a->matrix[1][j];
   }
-  state->trace = 0;
-  for (int j = 0; j < r; j++) {
-    state->price[j] = price[j];
-    state->residual[j] = target[j] - given[j];
-    state->trace += h[j][j];
-  }
-  state->value = dot(price, target, r) - conjugate;
-  state->size = SQRT(dot(state->residual, state->residual, r));
+  for (int j = 0; j < 6; j++) state->price[j] = price[j], state->residual[j] = target[j] - given[j];
+  state->value = dot(price, target, 6) - conjugate;
+  state->size = SQRT(dot(state->residual, state->residual, 6));
 }
 
-/* Prices to begin with: those that come nearest to the marginal costs of the forces of quadratic costs,
-   weighted by what costs ~ T^1.5 would answer. */
+/* Prices to begin with: those at which actuators whose costs are ~ T^1.5 give a target, each with its force over price
+   at what it gives where costs are quadratic. */
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge) {
-  int n = COUNT(block), r = RANGE(block);
-  real even[6], h[6][6] = {{0}}, right[6] = {0}, factor[6][6], trace = 0;
-  solve((real(*)[6])work->factor, target, even, r);
+  real even[6], h[6][6] = {{0}}, trace;
+  solve((real(*)[6])work->factor, target, even);
   *ridge = NEARLY;
-  for (int i = 0; i < n; i++) {
+  for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    int plane = is_plane(a);
-    real force[2];
-    own_price(block, i, even, force);
-    for (int q = 0; q < 2; q++) force[q] *= a->gain[q];
-    real size = plane ? size_of(force) : FABS(force[0]);
-    real share = size / a->most[0], within = MIN(size, R(0.97) * a->most[0]), paid, per;
-    if (share > R(0.8)) *ridge = SATURATED;
-    per = a->share / a->worth;
-    marginal(block + (int)(!plane && force[0] < 0 && a->back > 0 ? a->back : a->ahead), within / a->share, &paid);
-    paid /= per * MAX(size, TINY);
-    real weight = SQRT(CLIP(share, R(1e-4), 1));
-    for (int q = 0; q < (int)a->rows; q++) {
-      add_square(h, a->matrix[q], weight * a->gain[q], r);
-      for (int j = 0; j < r; j++) right[j] += a->matrix[q][j] * weight * a->gain[q] * paid * force[q];
+    real own[2], most = a->most[0], gain[2] = {a->gain[0], a->gain[1]};
+    own_price(block, i, even, own);
+    real size = a->gain[0] * (is_plane(a) ? size_of(own) : FABS(own[0]));
+    if (a->rows == 1) {
+      const real *table = block + (int)(own[0] < 0 && a->back > 0 ? a->back : a->ahead);
+      most = a->share * table[3 + 3 * (int)table[1]];
+      gain[0] = most * a->share / (table[0] * a->worth);
     }
+    real share = size / most;
+    if (share > R(0.8)) *ridge = SATURATED;
+    real weight = share > 1 && !work->drags ? 1 / share : SQRT(CLIP(share, CLOSE, 1));
+    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], weight * gain[q]);
   }
-  for (int j = 0; j < r; j++) trace += h[j][j];
-  for (int j = 0; j < r; j++) h[j][j] += NOTHING * trace;
-  /* Where lift drags, forces of quadratic costs say little of its marginal cost. */
-  if (cholesky(h, factor, r))
-    solve(factor, work->drags ? target : right, price, r);
+  trace = trace_of(h);
+  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
+  if (factor(h))
+    solve(h, target, price);
   else
-    for (int j = 0; j < r; j++) price[j] = target[j] / trace;
+    for (int j = 0; j < 6; j++) price[j] = target[j] / trace;
 }
 
 /* The step of the prices at a ridge; 0 where there is none. */
-static int step_of(const fl_work *work, const fl_state *s, real ridge, int r, real *step) {
-  real a[6][6], factor[6][6], added = ridge * MAX(s->trace, work->least_trace);
-  for (int j = 0; j < r; j++)
-    for (int k = 0; k <= j; k++) a[j][k] = s->hessian[j][k] + added * work->metric[j][k];
-  if (!cholesky(a, factor, r)) return 0;
-  solve(factor, s->residual, step, r);
+static int step_of(const real *block, const fl_work *work, const fl_state *s, real ridge, real *step) {
+  real h[6][6] = {{0}};
+  for (int i = 0; i < COUNT(block); i++) {
+    const real *b = ACTUATOR(block, i)->matrix[0], *c = b + 6, *slope = s->slope[i];
+    real xx = slope[0] + ridge * slope[3], xy = slope[1], yy = slope[2] + ridge * slope[3];
+    if (ACTUATOR(block, i)->rows == 1) {
+      if (xx > 0) add_square(h, b, xx);
+      continue;
+    }
+    for (int j = 0; j < 6; j++) {
+      real u = xx * b[j] + xy * c[j], v = xy * b[j] + yy * c[j];
+      for (int k = 0; k <= j; k++) h[j][k] += u * b[k] + v * c[k];
+    }
+  }
+  real added = (work->drags ? 1 : SATURATED) * ridge * MAX(trace_of(h), work->least_trace);
+  for (int j = 0; j < 6; j++)
+    for (int k = 0; k <= j; k++) h[j][k] += added * work->metric[j][k];
+  if (!factor(h)) return 0;
+  solve(h, s->residual, step);
   return 1;
 }
 
 /* Newton's method from prices on; work->now is what it comes to. */
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most_steps) {
-  int r = RANGE(block);
   fl_state *s = work->state, *trial = work->state + 1;
   real first[6], step[6], next[6], ridge = NEARLY, growth = 2, most = work->most_cost * (1 + NOTHING) + NOTHING;
   if (!price) first_price(block, work, target, first, &ridge);
@@ -181,25 +184,24 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
       value = s->value, size = s->size, idle = 0;
     if (k >= most_steps || idle++ > IDLE || !(ridge <= 1 / ROUNDING)) return s->size <= ENOUGH ? FL_MET : FL_STUCK;
     work->steps++;
-    if (!step_of(work, s, ridge, r, step)) {
+    if (!step_of(block, work, s, ridge, step)) {
       ridge *= 10;
       continue;
     }
-    for (int j = 0; j < r; j++) next[j] = s->price[j] + step[j];
+    for (int j = 0; j < 6; j++) next[j] = s->price[j] + step[j];
     look(block, work, target, next, trial);
     /* A step is kept that ends uphill, or where the value rose, or is the same and the residual fell. */
-    real change = dot(step, trial->residual, r) / MAX(dot(step, s->residual, r), TINY);
+    real slope = dot(step, s->residual, 6), end = dot(step, trial->residual, 6), change = end / MAX(slope, TINY);
     real rose = trial->value - s->value, slack = ROUNDING * FABS(s->value);
-    int good = change >= 0 || rose > 0 || (rose > -slack && trial->size < R(0.9) * s->size);
-    if (good) {
-      real kept = FABS(change) < R(0.5) ? R(0.1) : change > R(0.5) ? R(0.3) : 1;
-      ridge = MAX(ridge * kept, ROUNDING), growth = 2;
-      fl_state *other = s;
-      s = trial, trial = other;
+    if (change >= 0 || rose > 0 || (rose > -slack && trial->size < R(0.9) * s->size)) {
+      real left = FABS(change);
+      ridge = MAX(ridge * (change > R(0.5) ? R(0.3) : CLIP(left / 2, R(0.05), 1)), ROUNDING), growth = 2;
+      work->now = trial, trial = s, s = work->now;
     } else {
-      real grown = MIN(-change, 10);
-      ridge = MAX(ridge * MAX(growth, grown), ROUNDING), growth *= 2;
+      /* Where the cubic along the step, of both values and slopes, is largest. */
+      real square = 3 * (slope + end - 2 * rose), line = end - slope - square, root = line * line - 4 * square * slope;
+      real share = root > 0 ? 2 * slope / (SQRT(root) - line) : R(0.5);
+      ridge = MAX(ridge * MAX(growth, 1 / CLIP(share, R(1e-3), R(0.7))), ROUNDING), growth *= 2;
     }
-    work->now = s;
   }
 }

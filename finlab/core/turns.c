@@ -83,7 +83,7 @@ static int span(real *block, fl_work *work) {
   for (int p = 0; p < 2 * n; p++) {
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, p / 2);
     for (int k = 0; k < 6; k++) row[p][k] /= h->scale[k];
-    for (int j = 0; j < r; j++) {
+    for (int j = 0; j < 6; j++) {
       a->matrix[p % 2][j] = 0;
       for (int k = 0; k < 6; k++) a->matrix[p % 2][j] += h->basis[k][j] * row[p][k];
     }

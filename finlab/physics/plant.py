@@ -218,8 +218,7 @@ class Plant:
         """Returns commands (..., n, 3) with those inside a dead band, which give no force, at rest."""
         if self._dead_band is None:
             return command
-        rest = np.clip(0.0, self.lower, self.upper)
-        return np.where(held(command, self._dead_band) == command, command, rest)
+        return held(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
 
     def grid(self, counts: Sequence[int]) -> Array:
         """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each number."""

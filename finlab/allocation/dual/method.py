@@ -119,7 +119,8 @@ class Dual(Method):
     def _beyond(self, found: Found, targets: Array) -> list[int]:
         """Places of the targets (N, 6) out of reach. Those that take the last share of a force, which tables
         leave out, are met first: steps by the laws lead there from what is nearest."""
-        near = np.flatnonzero(~found.within & (_sizes((found.aim - targets) / self.scale) <= 10.0 * CLOSE))
+        beyond = np.flatnonzero(~found.within)
+        near = beyond[_sizes((found.aim[beyond] - targets[beyond]) / self.scale) <= 10.0 * CLOSE]
         if len(near):
             ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
             met = ends.error <= NEARLY
