@@ -22,8 +22,8 @@ from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
-DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
-STARTS, FEWEST, MOST = 2800, 2, 20  # climbs, times the square of the free numbers; at least and at most
+DRAWS = 64  # random vectors, each of them at three distances from where the actuators are
+STARTS, FEWEST, MOST = 2800, 6, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
 LITTLE = 1e-4  # share of the goal that a climb has to gain to count
 FINALISTS = 3  # of so many climbs the best one goes on
@@ -204,15 +204,17 @@ class _Search:
                 self._note(*climb.rounded(self._moves))
 
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
-        """The present vector and the best of some random ones, of those that keep all rules."""
+        """The present vector and the best of some random ones, half of which keep the symmetry that there is
+        now, of those that keep all rules."""
         moves, random = self._moves, np.random.default_rng(seed)
         if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
+        drawn[::2] = moves.mirrored(drawn[::2])
         nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
         kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
         count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
-        drawn = np.concatenate(kept)[: RANK * count]
+        drawn = np.concatenate(kept)
         for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
             yield hill.look(drawn[k])
 
