@@ -63,7 +63,8 @@ class Bounds:
 
 
 def azimuth(part: Actuator) -> float:
-    """The angle [rad] that `Bounds.mounting_angle` is about, as it is now."""
+    """Returns the angle [rad] that `Bounds.mounting_angle` is about, as it is now: 0 of an actuator without a
+    mounting angle."""
     return (getattr(part, "mounting_angle", None) or 0.0) + 0.0
 
 
