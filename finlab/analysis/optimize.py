@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +23,9 @@ from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
-DRAWS = 64  # random vectors, each of them at three distances from where the actuators are
-STARTS, FEWEST, MOST = 2800, 6, 20  # climbs, times the square of the free numbers; at least and at most
+DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
+SHARES = (1.0, 0.5, 0.25)  # of the way from the present vector to a random one
+STARTS, FEWEST, MOST = 2800, 4, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
 LITTLE = 1e-4  # share of the goal that a climb has to gain to count
 FINALISTS = 3  # of so many climbs the best one goes on
@@ -204,19 +206,22 @@ class _Search:
                 self._note(*climb.rounded(self._moves))
 
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
-        """The present vector and the best of some random ones, half of which keep the symmetry that there is
-        now, of those that keep all rules."""
+        """The present vector and the best of some random ones, far from it and nearer, as they are and as
+        symmetric as the robot is now, of those that keep all rules."""
         moves, random = self._moves, np.random.default_rng(seed)
         if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
-        drawn[::2] = moves.mirrored(drawn[::2])
-        nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
-        kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
+        ways = [way - moves.start for way in (drawn, moves.mirrored(drawn))]
         count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
-        drawn = np.concatenate(kept)
-        for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
-            yield hill.look(drawn[k])
+        most, best = -(-count // (len(SHARES) * len(ways))), list[Array]()
+        for share, way in product(SHARES, ways):
+            some = moves.start + share * way
+            some = some[self._rules.broken(some) <= 0.0][: RANK * most]
+            if len(some):
+                best.append(some[np.argsort(-hill.guess(some), kind="stable")[:most]])
+        for vector in [some[k] for k in range(most) for some in best if k < len(some)][:count]:
+            yield hill.look(vector)
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Whether the search has to stop."""
