@@ -19,6 +19,8 @@ def library_of(value: Any) -> Any:
 
     Whoever made a tensor or a symbol has loaded its library; nothing is imported here.
     """
+    if type(value) is np.ndarray:
+        return np
     module = type(value).__module__.partition(".")[0]
     return sys.modules[module] if module in ("torch", "casadi") else np
 
@@ -30,6 +32,7 @@ except ImportError:
 
 
 def solve(matrix: Array, right: Array) -> AnyArray:
-    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast."""
+    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast; NaN where one is
+    singular."""
     solution: AnyArray = _lapack.solve(matrix, right)
     return solution

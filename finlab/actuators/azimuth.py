@@ -36,7 +36,7 @@ AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
 
 
 class AzimuthLaw(PropellerLaw):
-    """n turning thrusters."""
+    """The law of n turning thrusters, whose commands are angle [rad] and force [N]."""
 
     column = 1
 
@@ -93,7 +93,7 @@ def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 class AzimuthCommand(actuator.Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
-    """What a thruster that turns is told."""
+    """The command of a thruster that turns, by name."""
 
     angle: float
     """Angle of its force from `zero` towards turn_axis x zero [rad]."""

@@ -25,7 +25,7 @@ KINDS: dict[str, type[Actuator]] = {kind.type: kind for kind in (Fin, Thruster, 
 
 
 def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places, by kind; a `DataError` at a bad table."""
+    """Returns the laws of a robot's actuators with their places, by kind. Raises DataError: a bad table."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(actuators):
         groups += [(places[among], law) for among, law in kind.laws([actuators[i] for i in places])]

@@ -25,7 +25,7 @@ LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
 
 
 class Propeller(Actuator):
-    """Base of thrusters; see `Actuator`."""
+    """Base of thrusters, fixed or turning: limits of the force [N], dead band, power, jet; see `Actuator`."""
 
     KEYS: ClassVar[Mapping[str, str]] = {
         "position": "position_m",

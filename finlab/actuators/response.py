@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 
 from finlab.actuators.form import Form
-from finlab.actuators.thrust_model import lower_hull
 from finlab.arrays import Array
 from finlab.precision import NOTHING
 
@@ -53,21 +52,6 @@ class RadialTable:
         """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson, 1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
         return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
-
-    @classmethod
-    def of_costs(cls, force: Array, cost: Array) -> "RadialTable":
-        """A table from points of force (K,) [N], rising, and power (K,) [W]: that of their convex hull, with
-        a quadratic cost between its points."""
-        force, cost = lower_hull(force, cost)
-        if len(force) == 1:
-            return cls.of_forces(1e-9, np.full(CELLS + 1, force[0]), float(cost[0]))
-        chord = np.diff(cost) / np.diff(force)
-        first = max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)
-        last = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1]) if len(chord) > 1 else chord[-1]
-        marginal = np.concatenate([[first], 0.5 * (chord[1:] + chord[:-1]), [last]])
-        marginal = np.maximum.accumulate(marginal) + 1e-12 * chord[-1] * np.arange(len(marginal))
-        grid = price_grid(float(marginal[-1]))
-        return cls.of_forces(float(marginal[-1]), np.interp(grid, marginal, force), float(cost[0]))
 
     @property
     def largest(self) -> float:

@@ -21,6 +21,8 @@ from finlab.actuators import actuator
 from finlab.actuators.form import Form, grid_numbers
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
+from finlab.actuators.thrust_model import lower_hull
+from finlab.actuators.thrust_power import Curve, radial_table
 from finlab.arrays import Array, Values
 from finlab.axes import AHEAD, SHORT, Direction3, Vector, across, arc_words
 from finlab.errors import LayoutError
@@ -72,7 +74,7 @@ class Met(NamedTuple):
 
 
 class RudderLaw(ActuatorLaw):
-    """n rudders."""
+    """The law of n rudders, whose command is the deflection [rad]; their force is that of the flow."""
 
     feels_flow = True
 
@@ -158,7 +160,8 @@ class RudderGroup(Group):
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
             self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
             rise = np.maximum(drag[:last] - drag[0], LEAST_DRAG * lift[:last] ** 2)
-            self._tables.append(RadialTable.of_costs(lift[:last], drag[0] + rise))
+            curve = Curve(*lower_hull(lift[:last], drag[0] + rise))
+            self._tables.append(radial_table(curve, 1, 0.0, float(lift[last - 1])))
         self._meet(np.zeros((len(rudders), 3)))
 
     def at(self, inflow: Array | None) -> "RudderGroup":
@@ -245,7 +248,7 @@ class RudderGroup(Group):
 
 
 class RudderCommand(actuator.Command, frozen=True, rename={"deflection": "deflection_rad"}):
-    """What a rudder is told."""
+    """The command of a rudder, by name."""
 
     deflection: float
     """Angle of its chord from `zero` towards shaft x zero [rad]."""

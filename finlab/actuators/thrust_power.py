@@ -14,7 +14,7 @@ from finlab.precision import NOTHING
 
 
 class PowerCurve(Protocol):
-    """Watts over newtons: convex, least at rest."""
+    """Watts over newtons, of one propeller or of n: convex, least at rest."""
 
     def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
@@ -84,7 +84,7 @@ class Curve:
 
 
 class Sides:
-    """Both sides of one table."""
+    """Watts over newtons of a table, forward and reverse, each side a `Curve`."""
 
     def __init__(self, model: PowerTable) -> None:
         """Makes the curves of the sides that the table has."""

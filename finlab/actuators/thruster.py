@@ -31,7 +31,7 @@ from finlab.files.schema import Name
 
 
 class ThrusterLaw(PropellerLaw):
-    """n thrusters."""
+    """The law of n thrusters with a fixed axis, whose command is the force [N]."""
 
     column = 0
 
@@ -78,7 +78,7 @@ def _line(thruster: "Thruster", along: Array) -> Line:
 
 
 class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
-    """What a thruster with a fixed axis is told."""
+    """The command of a thruster with a fixed axis, by name."""
 
     force: float
     """Force along its axis [N], signed."""

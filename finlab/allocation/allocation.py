@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +27,18 @@ CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
 
-class Later(NamedTuple):
+class Later(Protocol):
     """What an answer computes when it is first read."""
 
-    plant: Plant
-    """Judge of commands: the laws of all actuators, failed ones included, in the question's flow."""
-    notes: Callable[[], tuple[str, ...]]
-    candidates: Callable[[], Candidates | None] = lambda: None
-    samples: Callable[[], Candidates | None] = lambda: None
-    bound: Callable[[], Array | None] = lambda: None
+    @property
+    def plant(self) -> Plant:
+        """Judge of commands: the laws of all actuators, failed ones included, in the question's flow."""
+        ...
+
+    def notes(self) -> tuple[str, ...]: ...
+    def candidates(self) -> Candidates | None: ...
+    def samples(self) -> Candidates | None: ...
+    def bound(self) -> Array | None: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -276,9 +279,7 @@ class Allocation(Answer[float]):
 
     def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
         """The same answer with other candidates."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, candidates=candidates, samples=samples)
-        return other
+        return self.of(**{**self.__dict__, "candidates": candidates, "samples": samples})
 
     def __repr__(self) -> str:
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""

@@ -6,17 +6,16 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
-from finlab.allocation.allocation import Allocation, BatchAllocation, Later, chunks_of, first_of
+from finlab.allocation.allocation import Allocation, BatchAllocation, chunks_of, first_of
 from finlab.allocation.method import Method
 from finlab.allocation.notes import answer_notes
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Axes,
     Usable,
@@ -24,6 +23,7 @@ from finlab.allocation.question import (
     check_flow,
     check_layout,
     check_previous,
+    check_reference,
     check_seed,
     check_wrenches,
     damage_of,
@@ -55,6 +55,8 @@ class Ready(NamedTuple):
     """Made for these."""
     plant: Plant
     """Of all actuators; judges."""
+    free: NDArray[np.bool_] | None
+    """Axes (6,) that do not count; None where all do."""
 
 
 class Question(NamedTuple):
@@ -73,6 +75,39 @@ class Question(NamedTuple):
         if options.get("previous") is not None:
             return solution
         return solution._replace(command=method.plant.rested(solution.command))
+
+
+class Answered(NamedTuple):
+    """A question with its answer: what a result computes when it is first read."""
+
+    question: Question
+    wrenches: Array
+    """As they came, (6,) or (N, 6)."""
+    solution: Solution
+
+    @property
+    def plant(self) -> Plant:
+        return self.question.ready.plant.at(self.question.flow)
+
+    def notes(self) -> tuple[str, ...]:
+        (robot, method, *_), _, flow, _ = self.question
+        return answer_notes(robot.healthy, method, flow, self.wrenches, self.solution.notes)
+
+    def candidates(self) -> Candidates | None:
+        return self._among_all(self.solution.candidates)
+
+    def samples(self) -> Candidates | None:
+        return self._among_all(self.solution.samples)
+
+    def bound(self) -> Array | None:
+        own = self.solution.bound
+        return None if own is None else own(self.solution.command)
+
+    def _among_all(self, make: Callable[[], Candidates] | None) -> Candidates | None:
+        """Candidates of the healthy actuators, put among all."""
+        robot = self.question.ready.robot
+        own = None if make is None else make()
+        return replace(own, command=robot.among_all(own.command)) if own and robot.damage.lost else own
 
 
 class Allocator:
@@ -241,17 +276,20 @@ class Allocator:
             if method.begins_at_prices and previous.prices is not None:
                 options["prices"] = previous.prices
             previous = previous.command
-        before = None if previous is None else check_previous(previous, robot.layout)[robot.alive]
+        before = None if previous is None else check_previous(previous, robot.layout)
+        if before is not None and robot.damage.lost:
+            before = before[robot.alive]
         start = time.perf_counter()
-        counts = method.layout.commanded
-        target = np.where(counts, values, 0.0)
+        target, free = values, question.ready.free
         if reference is not None:
-            later = np.where(counts, check_wrenches(reference, single=False, name="reference"), 0.0)
-            target = method.in_time(target, np.where(np.isnan(later), 0.0, later))
+            target = method.in_time(target, check_reference(reference))
+        if free is not None:
+            target = np.where(free, 0.0, target)
         solution = question.solution(method, target[None], previous=before, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
-        return Allocation(
-            **self._about(question, np.where(counts, target, np.nan), values, solution),
+        shown = target.copy() if free is None else np.where(free, np.nan, target)
+        return Allocation.of(
+            **self._about(question, shown, values, solution),
             command=robot.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
@@ -306,7 +344,7 @@ class Allocator:
         counts = self._layout.commanded
         targets = values if counts.all() else np.where(counts, values, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
-        return BatchAllocation(
+        return BatchAllocation.of(
             **self._about(question, targets, values, solution),
             command=solution.command,
             solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
@@ -321,7 +359,7 @@ class Allocator:
         seed: int,
         axes: Axes | None = None,
     ) -> Question:
-        policy = policy if isinstance(policy, Policy) else Policy(policy)
+        policy = as_policy(policy)
         check_seed(seed)
         water = check_flow(flow)
         ready = self._ready(damage, axes)
@@ -330,19 +368,20 @@ class Allocator:
 
     def _about(self, question: Question, target: Array, values: Array, solution: Solution) -> dict[str, Any]:
         """Fields that answers to one target and to many share; `values` are the wrenches as they came."""
-        (robot, method, plant), policy, flow, seed = question
-        later = Later(
-            plant.at(flow),
-            partial(answer_notes, robot.healthy, method, self.checkpoint, flow, values, solution.notes),
-            partial(_among_all, solution.candidates, robot),
-            partial(_among_all, solution.samples, robot),
-            *(() if solution.bound is None else (partial(solution.bound, solution.command),)),
+        (robot, method, *_), policy, flow, seed = question
+        return dict(
+            layout=robot.layout,
+            damage=robot.damage,
+            target=target,
+            scale=self._scale,
+            method=method.name,
+            checkpoint=self.checkpoint,
+            policy=policy,
+            flow=flow,
+            seed=seed,
+            unknown_fins=method.unknown_fins,
+            later=Answered(question, values, solution),
         )
-        return {
-            **{"target": target, "layout": robot.layout, "damage": robot.damage},
-            **{"scale": self._scale, "method": self.method, "checkpoint": self.checkpoint, "policy": policy},
-            **{"flow": flow, "seed": seed, "unknown_fins": method.unknown_fins, "later": later},
-        }
 
     def _ready_for(self, result: Allocation) -> Ready:
         """The robot as it was when it was asked."""
@@ -369,15 +408,8 @@ class Allocator:
         robot, choice = usable(self._layout, damage), self._choice
         layout = robot.healthy if axes is None else replace(robot.healthy, axes=axes)
         method = choice.kind(layout, choice.settings, self._scale, choice.weights)
-        return Ready(robot, method, plant_of(robot.layout))
+        free = None if layout.commanded.all() else ~layout.commanded
+        return Ready(robot, method, plant_of(robot.layout), free)
 
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
-
-
-def _among_all(make: Callable[[], Candidates] | None, robot: Usable) -> Candidates | None:
-    """Candidates of the healthy actuators, put among all."""
-    if make is None:
-        return None
-    own = make()
-    return own if len(robot.damage.lost) == 0 else replace(own, command=robot.among_all(own.command))

@@ -107,14 +107,18 @@ class Method(ABC):
         """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, that
         of the moment at which the slowest actuator will have followed, among those of the next K ticks (K,
         6); after the last, the last. A command held for a period is late by half of it besides."""
-        period_s = vars(self.settings).get("period_s")
-        if period_s is None:
+        if self._late is None:
             return target
-        late = following_delay(self.layout) / period_s + 0.5
-        before = min(int(late), len(reference))
-        after = min(before + 1, len(reference))
-        expected = np.concatenate([target[None], reference])
-        return np.asarray(expected[before] + (late - int(late)) * (expected[after] - expected[before]))
+        late, last = int(self._late), len(reference)
+        before = reference[min(late, last) - 1] if late and last else target
+        after = reference[min(late + 1, last) - 1] if last else target
+        return np.asarray(before + (self._late - late) * (after - before))
+
+    @cached_property
+    def _late(self) -> float | None:
+        """By how many ticks commands are late; None where the time between ticks is no setting."""
+        period_s = vars(self.settings).get("period_s")
+        return None if period_s is None else following_delay(self.layout) / period_s + 0.5
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""
@@ -132,7 +136,7 @@ class Method(ABC):
             return self
         other = copy(self)
         other.plant = plant
-        for name in vars(self):
+        for name in list(vars(other)):
             if isinstance(getattr(type(self), name, None), cached_property):
                 del other.__dict__[name]
         return other

@@ -25,16 +25,11 @@ BEYOND = 1e-6
 
 
 def answer_notes(
-    layout: Layout,
-    method: Method,
-    checkpoint: str | None,
-    flow: Array | None,
-    target: Array,
-    own: tuple[str, ...] = (),
+    layout: Layout, method: Method, flow: Array | None, target: Array, own: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
     """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of `fin_notes`, those
-    of the method's `own`, what is asked of axes that nothing drives or that do not count, and fins that the
-    networks of a checkpoint do not know."""
+    of the method's `own`, what is asked of axes that nothing drives or that do not count, and fins that its
+    networks do not know."""
     notes = fin_notes(layout, flow) + own
     wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
     named = axes_in(wanted)
@@ -44,13 +39,13 @@ def answer_notes(
     if left := [axis for axis in named if axis not in layout.axes]:
         its = f"layout {layout.name} does not command {' or '.join(left)} (axes)"
         notes = (*notes, f"{its}: what is asked of it does not count")
-    if not method.unknown_fins or method.fin_model is None:
+    model, weights = method.fin_model, method.weights
+    if not method.unknown_fins or model is None or weights is None:
         return notes
-    model = method.fin_model
     values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
     return (
         f"the method does not know these fins: {', '.join(method.unknown_fins)}; checkpoint "
-        f"{checkpoint!r} takes them for fins of model {model.type!r} ({', '.join(values)}): trust the "
+        f"{weights.name!r} takes them for fins of model {model.type!r} ({', '.join(values)}): trust the "
         "plant's error or train a surrogate for them",
         *notes,
     )

@@ -1,5 +1,6 @@
 """Checks of a question: wrenches, previous commands, flow, failed and damaged actuators."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -20,6 +21,8 @@ MAX_WRENCH = 1e6
 MAX_FLOW = 100.0
 """Largest magnitude of a component of the flow [m/s, rad/s]."""
 
+FEW = 100
+"""Numbers that are checked in the interpreter."""
 
 Axes = tuple[Axis, ...]
 """Axes that a question asks for."""
@@ -50,8 +53,10 @@ def damage_of(damage: Damage | None, lost: Sequence[str], failed: Sequence[str])
         known = damage
     else:
         raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
+    if not len(lost) and not len(failed):
+        return known
     more = [name for names in (lost, failed) if len(names) for name in lost_names(names)]
-    return replace(known, lost=[*known.lost, *more]) if more else known
+    return replace(known, lost=[*known.lost, *more])
 
 
 def usable(layout: Layout, damage: Damage) -> Usable:
@@ -75,6 +80,12 @@ def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> 
         raise CommandError(f"{name}: expected {expected}, got {values!r:.100}") from error
 
 
+def _size(array: Array) -> float:
+    """A bound of the sizes of some numbers, NaN where one of them is and none is infinite; of few numbers
+    found in less time than numpy's calls take."""
+    return math.hypot(*array.ravel().tolist()) if array.size <= FEW else float(np.abs(array).max())
+
+
 def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
     """One wrench (6,) or many (N, 6) as float64, NaN for an axis that does not count, or a `CommandError`
     that says what is wrong with what is called `name`. Arrays of many are not copied."""
@@ -82,8 +93,7 @@ def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> 
     array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
-    if (np.abs(array) > MAX_WRENCH).any():
-        bad = np.abs(array) > MAX_WRENCH
+    if not _size(array) <= MAX_WRENCH and (bad := np.abs(array) > MAX_WRENCH).any():
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(
@@ -92,9 +102,17 @@ def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> 
     return array
 
 
+def check_reference(reference: ArrayLike) -> Array:
+    """Expected wrenches (K, 6), 0 for an axis that does not count; errors as of `check_wrenches`."""
+    array = check_wrenches(reference, single=False, name="reference")
+    return array if _size(array) >= 0.0 else np.nan_to_num(array)
+
+
 def axes_of(layout: Layout, wrench: Array) -> Axes | None:
     """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands. Raises
     CommandError: there is none."""
+    if _size(wrench) >= 0.0:  # no NaN
+        return None
     counts = layout.commanded & ~np.isnan(wrench)
     if (counts == layout.commanded).all():
         return None
@@ -150,7 +168,7 @@ def check_seed(seed: object) -> None:
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
     """The previous command (n, 3), in which failed actuators may hold NaN."""
     array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
-    if np.isinf(array).any():
+    if not _size(array) < math.inf and np.isinf(array).any():
         raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
     if array.shape != (layout.n, 3):
         raise CommandError(

@@ -111,7 +111,7 @@ class Core:
                 vectors[None, :6],
                 vectors[None, 12:18],
                 vectors[18:19],
-                self._flags[1:2] != 0,
+                self._flags[1:2].astype(bool),
                 self._command.copy(),
                 bool(self._flags[3]),
             )

@@ -55,7 +55,7 @@ FORMATS: dict[str, Callable[[Any], str]] = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table."""
+    """A column of a table: which key of its rows it shows, under which title, and how."""
 
     key: str
     title: str
@@ -70,7 +70,7 @@ class Column:
 
     @property
     def is_number(self) -> bool:
-        """Whether it stands to the right."""
+        """Whether its cells stand to the right, as numbers do."""
         return self.format not in ("text", "code")
 
 
@@ -82,7 +82,8 @@ class Table:
     rows: Sequence[Row]
 
     def cell(self, row: Row, column: Column) -> str:
-        """A cell's text, its interval in brackets."""
+        """The text of a row's cell, its interval in brackets behind it; empty where the row has no such
+        key."""
         show = FORMATS[column.format]
         value, ends = row.get(column.key), row.get(column.interval or "")
         if value is None:
@@ -96,7 +97,7 @@ Block = str | Table  # a string is Markdown
 
 
 def to_markdown(*blocks: Block) -> str:
-    """The text of a page."""
+    """Blocks as the Markdown of a page, tables with pipes; rows that are ours in bold."""
     return "\n\n".join(block if isinstance(block, str) else _text_table(block) for block in blocks) + "\n"
 
 

@@ -33,7 +33,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Experiment:
-    """A question, and how it is answered."""
+    """A question, what is run to answer it, and the columns of its rows."""
 
     name: str  # of the verb and of the report's section
     question: str  # one sentence, in Markdown, which is the help of the verb, too
@@ -65,8 +65,8 @@ class Experiment:
         return {name: each.replace(annotation=types[name]) for name, each in parameters.items()}
 
     def check(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """All options: those chosen, and the defaults of the others. DataError: an unknown option, or a
-        number out of range."""
+        """All options: those chosen, and the defaults of the others. Raises DataError: an unknown option, or
+        a number out of range."""
         options = self.options()
         if unknown := [name for name in chosen if name not in options]:
             raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
@@ -97,7 +97,8 @@ class Experiment:
         return shlex.join(words)
 
     def each_row(self, **chosen: Any) -> Iterator[Row]:
-        """Run it, row by row; options as in `check`. A number that is not finite becomes None."""
+        """Run it, row by row; options as in `check`. A number that is not finite becomes None. Raises
+        DataError: as `check`, and options that the run itself refuses; AllocationError: an unknown method."""
         yield from map(_finite, self.run(**self.check(chosen)))
 
     def rows(self, **chosen: Any) -> list[Row]:
@@ -111,16 +112,16 @@ class Experiment:
         return Table(self.columns, [*ours, *printed])
 
     def words(self) -> list[Block]:
-        """Heading and question."""
+        """Blocks of heading and question, which stand before the results."""
         return [f"## {self.name.capitalize()}", self.question]
 
     def results(self, rows: Sequence[Row]) -> list[Block]:
-        """Table and note."""
+        """Blocks of the table of rows and of the note on how to read it."""
         return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
-    """Refuse unknown names before the work. DataError: one of the names is not known."""
+    """Refuse unknown names before the work. Raises DataError: one of the names is not known."""
     if unknown := [name for name in names if name not in known]:
         raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
 
@@ -155,7 +156,7 @@ def item_type(kind: Any) -> tuple[Any, bool]:
 
 
 def load_experiment(name: str) -> Experiment:
-    """The experiment of that name; `DataError` for an unknown one."""
+    """The experiment of that name. Raises DataError: there is none."""
     if name not in EXPERIMENTS:
         raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
     value = import_module(f"finlab.evaluation.experiments.{name}").experiment

@@ -56,11 +56,12 @@ class MethodSpec:
     choice: methods.MethodChoice
 
     def on(self, layout: Layout) -> Allocator:
-        """Its allocator for a robot."""
+        """The allocator of the method for a robot. Raises AllocationError: the method does not take it."""
         return Allocator.of_choice(layout, self.choice)
 
     def with_settings(self, **changes: Any) -> "MethodSpec":
-        """The same method with those of some settings changed that it knows."""
+        """The same method with those of some settings changed that it knows. Raises AllocationError: a value
+        that it may not have."""
         kind = self.choice.kind
         known = {name: value for name, value in changes.items() if name in kind.option_names()}
         settings = methods.checked_settings(kind, {**vars(self.choice.settings), **known})
@@ -97,8 +98,8 @@ def load_method_spec(
 
 
 def own_method(name: str) -> type[Method]:
-    """The method of a function, given as `module:function` or `file.py:function`. DataError: there is no
-    such function, or one of its parameters is none of `KNOWN`."""
+    """The method of a function, given as `module:function` or `file.py:function`. Raises DataError: there
+    is no such function, or one of its parameters is none of `KNOWN`."""
     function = own_function(name)
     try:
         wanted = inspect.signature(function).parameters
@@ -144,7 +145,7 @@ class _OwnMethod(Method):
 
 
 def own_function(name: str) -> Callable[..., Any]:
-    """Returns the function of `module:function` or `file.py:function`; a DataError where there is none."""
+    """Returns the function of `module:function` or `file.py:function`. Raises DataError: there is none."""
     place, _, attribute = name.rpartition(":")
     try:
         if place.endswith(".py"):

@@ -69,7 +69,8 @@ def temperature_picture(rows: Sequence[Row]) -> Figure:
 
 
 def candidates_picture(rows: Sequence[Row]) -> Figure:
-    """Effort over error of raw and refined candidates (the paper's figure A, right)."""
+    """Effort over error of raw and refined candidates (the paper's figure A, right). Raises DataError: no row
+    has any."""
     figure, axes = _axes("Candidates before and after their refinement")
     marks = {"raw": (COLORS[0], 7, 0.35), "refined": (COLORS[1], 22, 0.9)}
     points = [each for row in rows for each in row.get("points", ())]
@@ -122,9 +123,6 @@ def _axes(title: str) -> tuple[Figure, Axes]:
     axes.set_axisbelow(True)
     return figure, axes
 
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STYLES = ("-", "--", ":", "-.")
 """Of the lines of one color, which the first word of a name has."""

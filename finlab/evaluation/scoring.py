@@ -67,7 +67,7 @@ def paper_sigma() -> Array:
 
 
 def joined(parts: Sequence[Columns]) -> Columns:
-    """Columns one after the other."""
+    """Columns of parts one after the other: arrays (N_1 + N_2 + ...,) by name."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

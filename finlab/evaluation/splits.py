@@ -49,7 +49,7 @@ NOISE = 0.03  # standard deviation of each component of a force, as a share of i
 
 
 class Case(NamedTuple):
-    """One layout with its targets."""
+    """One layout with targets that its healthy fins can deliver, and what errors on it are divided by."""
 
     layout: Layout  # all fins, failed ones included
     targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
@@ -59,7 +59,7 @@ class Case(NamedTuple):
 
     @property
     def healthy(self) -> Layout:
-        """The fins that work."""
+        """The layout without the fins that have failed."""
         return self.layout.without(self.failed)
 
 

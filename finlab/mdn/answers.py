@@ -70,7 +70,7 @@ def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
 
 
 class Steps(NamedTuple):
-    """How long proposals are followed."""
+    """How many steps proposals are followed, in forces and then in commands."""
 
     descent: int = 8
     """Quadratic problems in force space."""
@@ -98,7 +98,7 @@ class Answers(NamedTuple):
     """Number of the proposal that each came from (N, P), or `OTHER` or `NOW`."""
 
     def before(self, other: "Answers") -> "Answers":
-        """These answers, then others."""
+        """These P answers to each target, then Q others to the same: (N, P + Q, ...)."""
         return Answers._make(np.concatenate(both, axis=1) for both in zip(self, other, strict=True))
 
 

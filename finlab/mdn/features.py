@@ -78,7 +78,7 @@ VECTORS = (6, 8, 12, 15)
 
 
 def robot_view(problem: EffortProblem) -> RobotView:
-    """What the network sees of one robot."""
+    """What the network sees of one robot, whatever the target; see the table above."""
     fins, n = problem.fins, len(problem.fins.maximum)
     full = fins.half >= np.pi
     evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice

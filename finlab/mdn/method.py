@@ -55,7 +55,7 @@ class Found(NamedTuple):
 
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
-    """What the proposals for a single target are called."""
+    """What the proposals for a single target are called: the components they come from, from 1."""
     return tuple([f"component {k + 1}" for k in proposal.component[0]])
 
 
@@ -86,7 +86,7 @@ class Mdn(Method):
                     reached = self._in_motion(target, reached, previous)
             return Solution(
                 self.robot.commands.feasible(reached.answers.command[:, 0]),
-                candidates=lambda: self._candidates(reached.answers, names_of(reached.proposal)),
+                candidates=lambda: self._judged(target, *self._refined(reached)),
                 samples=lambda: self._judged(target, *self._cheapest(reached.proposal)),
             )
         command = np.empty((len(target), self.layout.n, 3))
@@ -169,14 +169,10 @@ class Mdn(Method):
                 reached = other.before(reached)
         return free._replace(answers=reached)
 
-    def _candidates(self, answers: Answers, names: tuple[str, ...]) -> Candidates:
-        """The refined answers to a single target, and the components they come from."""
-        command, wrench, error, _, origin = (values[0] for values in answers)
-        command = self.robot.commands.feasible(command)
-        source = tuple(names[k] if k >= 0 else STARTS[k] for k in origin.tolist())
-        return Candidates(
-            command, wrench * self.sigma, USUAL_SHARE * error, *costs(self.layout, command), source
-        )
+    def _refined(self, reached: Found) -> tuple[Array, tuple[str, ...]]:
+        """The refined commands (P, n, 3) for a single target, and the components they come from."""
+        names, origin = names_of(reached.proposal), reached.answers.origin[0].tolist()
+        return reached.answers.command[0], tuple(names[k] if k >= 0 else STARTS[k] for k in origin)
 
     def _cheapest(self, proposal: Proposal) -> tuple[Array, tuple[str, ...]]:
         """The cheapest commands (K, n, 3) with the forces proposed for a single target, and their names."""

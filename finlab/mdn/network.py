@@ -23,7 +23,7 @@ LOG_STD = (-2.0, 2.0)
 
 @dataclass(frozen=True)
 class ForceNetworkConfig:
-    """Sizes of the network."""
+    """The network of method `mdn`: its sizes, the arrays that follow from them, and what it gives."""
 
     features: ClassVar[str] = "forces"
     """What it is fed, by its name in files."""
@@ -43,7 +43,7 @@ class ForceNetworkConfig:
     """Number M of mixture components."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
         width, m = self.width, self.n_components
         shapes = linear_shapes("enter", NODE_SIZE, width) | norm_shapes("norm", width)

@@ -102,7 +102,7 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
 
 
 def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
-    """Write a checkpoint folder, and answer what is in it; a `DataError` where it cannot be written."""
+    """Write a checkpoint folder, and return what is in it. Raises DataError: it cannot be written."""
     make_folder(folder)
     for name, content in checkpoint_files(weights).items():
         write_whole(folder / name, content, DataError)
@@ -110,7 +110,8 @@ def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
 
 
 def read_normalization(folder: Path) -> Normalization:
-    """Only the wrench statistics of a checkpoint, for methods that need no network."""
+    """Only the wrench statistics of a checkpoint, for methods that need no network. Raises CheckpointError:
+    as `parse_checkpoint`."""
     config = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,))
     try:
         return Normalization.parse(config.get("normalization"))
@@ -119,7 +120,8 @@ def read_normalization(folder: Path) -> Normalization:
 
 
 def network_features(folder: Path) -> str | None:
-    """What the network of a checkpoint is fed, such as "raw" of the paper's; None where it holds none."""
+    """What the network of a checkpoint is fed, such as "raw" of the paper's; None where it holds none. Raises
+    CheckpointError: as `parse_checkpoint`."""
     network = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,)).get("network")
     return str(network.get("features")) if isinstance(network, dict) else None
 
@@ -128,7 +130,7 @@ def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
     """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
 
     A bare name is never looked up in the current folder, so that a folder called `default` there does
-    not take the shipped one's place; write `./default` for it.
+    not take the shipped one's place; write `./default` for it. Raises CheckpointError: there is neither.
     """
     path = Path(checkpoint)
     if path.name == str(checkpoint) and (str(checkpoint) in shipped_checkpoints() or not path.is_dir()):

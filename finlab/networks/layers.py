@@ -4,6 +4,7 @@ A network is a function of its weights, a mapping from PyTorch's names to arrays
 inputs. On a robot the weights are numpy arrays in single precision and no tensor library is needed.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -23,12 +24,12 @@ LEAK = 0.2
 
 def linear(w: Weights, name: str, x: Values) -> Values:
     """Features (..., out) of features (..., in); a layer without a bias has none to add."""
-    weight = w[f"{name}.weight"]
+    xp, weight, bias = library_of(x), w[f"{name}.weight"], w.get(f"{name}.bias")
+    if xp is not np:
+        return xp.nn.functional.linear(x, weight, bias)
     # One product of two matrices is much faster than numpy's loop over stacked small ones.
     y = x.reshape(-1, x.shape[-1]) @ weight.T
-    if f"{name}.bias" in w:
-        y = y + w[f"{name}.bias"]
-    return y.reshape(*x.shape[:-1], weight.shape[0])
+    return (y if bias is None else y + bias).reshape(*x.shape[:-1], weight.shape[0])
 
 
 def layer_norm(w: Weights, name: str, x: Values) -> Values:
@@ -47,30 +48,49 @@ def layer_norm(w: Weights, name: str, x: Values) -> Values:
 
 
 def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
-    """Two linear layers with a rectifier between them."""
+    """Two linear layers with a rectifier between them: features (..., width) of the same."""
     hidden = linear(w, up, x)
     return linear(w, down, np.maximum(hidden, 0) if library_of(x) is np else hidden.relu())
 
 
-def graph_attention(w: Weights, name: str, x: Values, pairs: Values | None = None) -> Values:
-    """A GATv2 layer on complete graphs with self loops: features (B, n, width) of the same; heads are
-    concatenated. Features of pairs (B, n, n, F), where there are any, count in what is scored, and what is
-    scored is then the message, too."""
+def graph_attention(
+    w: Weights, name: str, x: Values, pairs: Values | None = None, mask: Values | None = None
+) -> Values:
+    """A GATv2 layer (Brody, Alon, Yahav, ICLR 2022) on complete graphs with self loops: features
+    (B, n, width) of the same; heads are concatenated. Features of pairs (B, n, n, F), where there are any,
+    count in what is scored, and what is scored is then the message, too. No node listens to one where `mask`
+    (B, n) is False."""
     xp, vectors = library_of(x), w[f"{name}.attention"]
     source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
     seen = source[:, None] if pairs is None else linear(w, f"{name}.pair", pairs) + source[:, None]
     hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)
     hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
-    weight = softmax(xp.einsum("...hc,hc->...h", hidden, vectors), 2)
+    score = xp.einsum("...hc,hc->...h", hidden, vectors)
+    weight = softmax(score if mask is None else xp.where(mask[:, None, :, None], score, -math.inf), 2)
     if pairs is not None:
         return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
     message = source.reshape(*source.shape[:2], *vectors.shape)
     return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
 
 
+def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
+    """Scaled dot-product attention of a Transformer (Vaswani et al., 2017): features (B, n, width) of the
+    same; `mask` as in `graph_attention`."""
+    width = x.shape[-1]
+    packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
+    qkv = linear(packed, "in", x)
+    parts = (qkv[..., k * width : (k + 1) * width] for k in range(3))
+    q, k, v = (part.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2) for part in parts)
+    score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
+    if mask is not None:
+        score = library_of(score).where(mask[:, None, None], score, -math.inf)
+    return linear(w, f"{name}.out_proj", (softmax(score) @ v).swapaxes(1, 2).reshape(x.shape))
+
+
 def leaky_relu(x: Values) -> Values:
-    """x above zero, a fifth of it below."""
-    return library_of(x).maximum(x, LEAK * x)
+    """x above zero, `LEAK` times x below."""
+    xp = library_of(x)
+    return np.maximum(x, LEAK * x) if xp is np else xp.nn.functional.leaky_relu(x, LEAK)
 
 
 def elu(x: Values) -> Values:

@@ -31,7 +31,8 @@ class Normalization(NamedTuple):
 
     @classmethod
     def parse(cls, values: Any) -> Normalization:
-        """The statistics under the keys `mean` and `std`; a `ValueError` where there are none."""
+        """The statistics under the keys `mean` and `std`. Raises ValueError: there are no such six
+        numbers."""
         try:
             mean, std = (np.asarray(values[name], dtype=np.float64) for name in cls._fields)
         except (KeyError, TypeError, ValueError):
@@ -42,13 +43,15 @@ class Normalization(NamedTuple):
 
 
 def to_normalized(command: Values, lower: Values, upper: Values) -> Values:
-    """Commands (..., 3) between limits (..., 3) to [-1, 1]; a range of no width maps to 0."""
+    """Normalized coordinates (..., 3) in [-1, 1] of commands (..., 3) [rad, Hz, rad] between limits (..., 3);
+    a range of no width maps to 0."""
     half = 0.5 * (upper - lower)
     return (command - lower - half) / half.clip(1e-9)
 
 
 def to_command(x: Values, lower: Values, upper: Values) -> Values:
-    """Inverse of `to_normalized`; not clamped."""
+    """Commands (..., 3) of normalized coordinates (..., 3) between limits (..., 3), the inverse of
+    `to_normalized`; not clamped."""
     half = 0.5 * (upper - lower)
     return lower + half + x * half
 
@@ -63,7 +66,7 @@ class Sizes(Protocol):
     """The checkpoint with such a network that is shipped."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         ...
 
 
@@ -72,7 +75,7 @@ Kind = TypeVar("Kind", bound=Sizes)
 
 @dataclass(frozen=True)
 class TrainedWeights:
-    """The contents of a checkpoint."""
+    """The contents of a checkpoint: networks, their sizes, how they were made, and what they normalize by."""
 
     name: str
     normalization: Normalization
@@ -99,7 +102,8 @@ class TrainedWeights:
         return single_precision(self.network)
 
     def network_of(self, kind: type[Kind]) -> Kind:
-        """The sizes of the network; a `CheckpointError` where there is none, or one of another kind."""
+        """The sizes of the network. Raises CheckpointError: there is none, one of another kind, or a damaged
+        one."""
         known = self.network_sizes or {}
         if (known.get("features"), known.get("joint")) != (kind.features, kind.joint):
             has = f"a network that is fed {known.get('features')!r:.40}" if known else "no network"
@@ -121,7 +125,8 @@ def sizes_for_file(sizes: Sizes) -> dict[str, Any]:
 
 
 def check_state(state: State, shapes: Shapes) -> None:
-    """Raise a `ValueError` unless a network has exactly these arrays."""
+    """Refuse a network without exactly these arrays. Raises ValueError: one is missing, unknown or of another
+    shape."""
     if wrong := sorted(set(shapes) ^ set(state)):
         raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
     for name, shape in shapes.items():
@@ -130,7 +135,8 @@ def check_state(state: State, shapes: Shapes) -> None:
 
 
 def check_arrays(state: State) -> None:
-    """Raise a `ValueError` unless all arrays are of float32 and of sane size."""
+    """Refuse arrays that no training leaves. Raises ValueError: one is not of float32, or a weight is NaN or
+    beyond `LARGEST_WEIGHT`."""
     for name, array in state.items():
         if array.dtype != np.float32:
             raise ValueError(f"{name:.80}: expected float32, got {array.dtype}")
@@ -139,7 +145,8 @@ def check_arrays(state: State) -> None:
 
 
 def check_sizes(*sizes: object, heads: tuple[int, int] = (1, 1)) -> None:
-    """Raise a `ValueError` unless all are whole numbers in range, and `heads` a width and a divisor of it."""
+    """Refuse sizes that no network has. Raises ValueError: one is no whole number from 1 to `LARGEST_SIZE`,
+    or of `heads`, a width and a number of heads, the second does not divide the first."""
     for size in sizes:
         if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= LARGEST_SIZE:
             raise ValueError(f"expected whole numbers from 1 to {LARGEST_SIZE} as sizes, got {size!r:.40}")
@@ -148,10 +155,10 @@ def check_sizes(*sizes: object, heads: tuple[int, int] = (1, 1)) -> None:
 
 
 def linear_shapes(name: str, n_in: int, n_out: int) -> Shapes:
-    """The shapes of a linear layer."""
+    """The shapes of a linear layer: weight (n_out, n_in) and bias (n_out,), by name."""
     return {f"{name}.weight": (n_out, n_in), f"{name}.bias": (n_out,)}
 
 
 def norm_shapes(name: str, width: int) -> Shapes:
-    """The shapes of a layer normalization."""
+    """The shapes of a layer normalization: weight and bias (width,), by name."""
     return {f"{name}.weight": (width,), f"{name}.bias": (width,)}

@@ -3,9 +3,9 @@
 Where each of its equations stands:
 
 (1) the flapping theta(t): `finlab/vehicle/fin_motion.py`, `FinMotion.angle`
-(2) the mixture p(u_i | s_i): `network.py`, `Mixture`; what leads to it in torch: `training/modules.py`
+(2) the mixture p(u_i | s_i): `network.py`, `Mixture`, and what leads to it, `NetworkConfig`
 (3) its weights at a temperature T: `network.py`, `Mixture.sample`
-(4) forces, torques and wrench of the surrogate: `surrogate.py`; in torch `training/modules.py`, `Surrogate`
+(4) forces, torques and wrench of the surrogate: `surrogate.py`; in torch `training/modules.py`
 (5) L_phys, (6) L_guide: `training/modules.py`, `physics` and `guidance`
 (7) L = L_imit + beta L_guide + lambda L_ent: `training/train.py`, weights in `training/recipes.py`
 (8) J_norm, and J = J_norm + gamma J_en: `pipeline.py`, `Paper._score`

@@ -36,7 +36,7 @@ LOG_STD_BOUND = 3.0
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the paper's network."""
+    """The paper's network: its sizes, the arrays that follow from them, and what it gives with these."""
 
     features: ClassVar[str] = "raw"
     joint: ClassVar[bool] = False
@@ -52,7 +52,7 @@ class NetworkConfig:
     """Number M of mixture components."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
         width, m = self.width, self.n_components
         shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)
@@ -75,25 +75,33 @@ class NetworkConfig:
             | linear_shapes("weight", width, m)
         )
 
-    def __call__(self, w: Weights, x: Values, target: Values) -> "Mixture":
+    def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
         """The mixtures that a network with these weights gives for node features (B, n, 10) and normalized,
-        centred targets (B, 6)."""
+        centred targets (B, 6); where robots have fewer than n fins, `mask` (B, n) is True where there is
+        one."""
+        return self.mixture(w, self.encoded(w, x, target, mask))
+
+    def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:
+        """What the encoding phase makes of them: features (B, n, width) of each fin."""
         xp = library_of(x)
         hidden = layers.linear(w, "enter", x)
         for name in self._named("graph", self.graph_layers):
-            hidden = hidden + layers.elu(layers.graph_attention(w, name, hidden))
+            hidden = hidden + layers.elu(layers.graph_attention(w, name, hidden, mask=mask))
         wrench = layers.linear(w, "wrench", target)[:, None]
         wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
         hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
         for name in self._named("transformer.layers", self.transformer_layers):
             seen = layers.layer_norm(w, f"{name}.norm1", hidden)
-            hidden = hidden + self_attention(w, f"{name}.self_attn", self.heads, seen)
+            hidden = hidden + layers.self_attention(w, f"{name}.self_attn", self.heads, seen, mask)
             seen = layers.layer_norm(w, f"{name}.norm2", hidden)
             hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", seen)
-        hidden = layers.layer_norm(w, "norm", hidden)
+        return layers.layer_norm(w, "norm", hidden)
+
+    def mixture(self, w: Weights, hidden: Values) -> "Mixture":
+        """The mixtures of fins with features (B, n, width)."""
         raw, logits = (layers.linear(w, end, hidden) for end in ("head", "weight"))
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
-        return Mixture(logits, raw[..., :3], LOG_STD_BOUND * xp.tanh(0.5 * raw[..., 3:]))
+        return Mixture(logits, raw[..., :3], LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:]))
 
     @staticmethod
     def _named(kind: str, count: int) -> list[str]:
@@ -134,15 +142,3 @@ class Mixture(NamedTuple):
         choice = (uniform[..., None] > cumulative).sum(-1)[..., None]
         mean, log_std = (layers.take(part, choice, 2) for part in (self.mean, self.log_std))
         return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)
-
-
-def self_attention(w: Weights, name: str, heads: int, x: Values) -> Values:
-    """Scaled dot-product attention of a Transformer: features (B, n, width) of the same."""
-    width = x.shape[-1]
-    packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
-    qkv = layers.linear(packed, "in", x)
-    parts = (qkv[..., k * width : (k + 1) * width] for k in range(3))
-    q, k, v = (part.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2) for part in parts)
-    score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
-    weight = layers.softmax(score)
-    return layers.linear(w, f"{name}.out_proj", (weight @ v).swapaxes(1, 2).reshape(x.shape))

@@ -27,13 +27,13 @@ BLOCK = 64
 
 @dataclass(frozen=True)
 class SurrogateConfig:
-    """Sizes of the surrogate."""
+    """Sizes of the surrogate's perceptron, and the arrays that follow from them."""
 
     hidden: tuple[int, ...] = (512, 128)
     """Widths of the hidden layers; the first is printed, the second is not."""
 
     def shapes(self) -> trained.Shapes:
-        """Shape of each array; a `ValueError` where there is no surrogate of these sizes."""
+        """Shape of each array by name. Raises ValueError: there is no surrogate of these sizes."""
         trained.check_sizes(*self.hidden)
         shapes: trained.Shapes = {}
         for name, (n_in, n_out) in zip(self.layers(), pairwise([RAW_SIZE + 3, *self.hidden, 3]), strict=True):
@@ -47,7 +47,8 @@ class SurrogateConfig:
 
     @classmethod
     def of(cls, weights: trained.TrainedWeights) -> "SurrogateConfig":
-        """The sizes of the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
+        """The sizes of the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a damaged
+        one."""
         sizes = weights.surrogate_sizes
         if sizes is None:
             raise CheckpointError(f"checkpoint {weights.name!r} holds no surrogate; `paper` does")
@@ -65,7 +66,8 @@ class LayoutSurrogate:
     """A surrogate (Eq. 4) on one layout of n fins, with the gradient of its forces; in single precision."""
 
     def __init__(self, layout: Layout, weights: trained.TrainedWeights) -> None:
-        """Take over the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
+        """Take over the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a damaged
+        one."""
         self.config = SurrogateConfig.of(weights)
         self._w = layers.single_precision(weights.surrogate)
         place = layout.position, layout.mounting_angle, layout.lower, layout.upper

@@ -1,14 +1,12 @@
 """Device and processes of a training: those of torchrun, and a pool for the parts of its data."""
 
-import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor, distributed, nn
-from torch.nn.parallel import DistributedDataParallel
 
 from finlab.errors import CommandError
 
@@ -26,9 +24,13 @@ class Workplace:
         rows = size // self.world
         return slice(self.rank * rows, (self.rank + 1) * rows)
 
-    def shared(self, module: nn.Module) -> nn.Module:
-        """A module whose gradients are averaged over all processes."""
-        return DistributedDataParallel(module) if self.world > 1 else module
+    def average(self, weights: Iterable[Tensor]) -> None:
+        """Average the gradients of weights over all processes; every process must ask."""
+        if self.world > 1:
+            gradients = [weight.grad for weight in weights if weight.grad is not None]
+            together = nn.utils.parameters_to_vector(gradients)
+            distributed.all_reduce(together)
+            nn.utils.vector_to_parameters(together / self.world, gradients)
 
     def mean(self, value: Tensor) -> float:
         """The mean of a number over all processes; every process must ask."""
@@ -66,7 +68,6 @@ def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
     try:
         yield Workplace(device, rank, world)
     finally:
-        gc.collect()  # modules that are shared hold threads of the group, which must end before it
         distributed.destroy_process_group()
 
 

@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.networks.trained import State
+from finlab.networks.trained import Shapes, State
 from finlab.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
@@ -64,6 +64,33 @@ def seeded_generator(seed: int, stream: int, device: torch.device) -> torch.Gene
     """A generator whose numbers depend on seed and stream alone, unrelated between streams."""
     state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
     return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
+
+
+ZERO = ("in_proj_bias", "out_proj.bias")
+"""Ends of the names of arrays that start at zero, as in PyTorch's attention."""
+
+
+def first_weights(shapes: Shapes, seed: int, device: torch.device | None = None) -> Weights:
+    """Weights by name, by default on the processor, drawn as PyTorch draws those of its own layers (Glorot
+    and Bengio, 2010, for attention, uniform over one over the root of the inputs for linear layers); they
+    depend on the seed alone."""
+    generator = torch.Generator().manual_seed(seed)
+    drawn = {name: _drawn(name, shape, shapes, generator) for name, shape in shapes.items()}
+    return {name: values.to(device).requires_grad_() for name, values in drawn.items()}
+
+
+def _drawn(name: str, shape: tuple[int, ...], shapes: Shapes, generator: torch.Generator) -> Tensor:
+    layer, _, part = name.rpartition(".")
+    weight = shapes.get(f"{layer}.weight", ())
+    if len(weight) == 1:  # a normalization
+        return torch.ones(shape) if part == "weight" else torch.zeros(shape)
+    if name.endswith(ZERO) or (part == "bias" and not weight):
+        return torch.zeros(shape)
+    if part in ("attention", "in_proj_weight"):
+        bound = math.sqrt(6.0 / sum(shape))
+    else:
+        bound = 1.0 / math.sqrt(weight[1])
+    return (2.0 * torch.rand(shape, generator=generator) - 1.0) * bound
 
 
 class Training:
@@ -145,6 +172,7 @@ class Training:
         self.optimizer.zero_grad(set_to_none=True)
         terms = terms_of(step)
         terms["loss"].backward()
+        self.place.average(self.weights.values())
         nn.utils.clip_grad_norm_(self.weights.values(), CLIP)
         self.optimizer.step()
         # The average starts short and grows, so that early weights are soon forgotten.

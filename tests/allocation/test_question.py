@@ -77,6 +77,13 @@ def test_complex_numbers_are_no_wrench() -> None:
         question.check_wrenches([1j, 0, 0, 0, 0, 0], single=True)
 
 
+def test_expected_wrenches_ask_nothing_of_a_free_axis() -> None:
+    later = np.ones((30, 6))
+    np.testing.assert_array_equal(question.check_reference(later), later)
+    later[7, 2] = math.nan
+    np.testing.assert_array_equal(question.check_reference(later), np.where(np.isnan(later), 0.0, 1.0))
+
+
 @pytest.mark.parametrize("seed", [0, 1, np.int64(3)])
 def test_seeds_are_whole_numbers_from_0(seed: object) -> None:
     question.check_seed(seed)

@@ -14,5 +14,5 @@ def wrench_in_torch(weights: TrainedWeights, layout: Layout, command: torch.Tens
     parts = [torch.tensor(getattr(layout, name), dtype=command.dtype) for name in ROBOT[:-1]]
     parts = [part.expand(rows, *part.shape) for part in parts]
     batch = Batch(*parts, torch.ones(rows, n, dtype=torch.bool), command, torch.empty(rows, 6))
-    wrench: torch.Tensor = surrogate_of(weights).to(command.dtype)(command, batch)
+    wrench: torch.Tensor = surrogate_of(weights, dtype=command.dtype)(command, batch)
     return wrench

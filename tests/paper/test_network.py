@@ -1,6 +1,7 @@
-"""The paper's network against PyTorch Geometric, and in numpy against PyTorch's own layers."""
+"""The paper's network against PyTorch Geometric and PyTorch's own layers, and in numpy against itself."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from torch_geometric.nn import GATv2Conv
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.layers import graph_attention
+from finlab.networks.trained import State
 from finlab.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_features
-from finlab.paper.training.modules import AllocatorNetwork
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 B, N, M = 4, 3, 5
@@ -26,6 +27,10 @@ def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
 
 def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
     return {name: value.numpy() for name, value in weights.items()}
+
+
+def tensors(weights: State) -> dict[str, torch.Tensor]:
+    return {name: torch.tensor(value) for name, value in weights.items()}
 
 
 def random_robots() -> tuple[torch.Tensor, torch.Tensor]:
@@ -60,13 +65,31 @@ def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
     config = weights.network_of(NetworkConfig)
     x, target = random_robots()
     got = config(weights.network, x.numpy(), target.numpy())
-    module = AllocatorNetwork(config)
-    module.load_state_dict({name: torch.tensor(value) for name, value in weights.network.items()})
-    with torch.no_grad():
-        expected = module(x, target, torch.ones(x.shape[:2], dtype=torch.bool))
+    expected = config(tensors(weights.network), x, target, torch.ones(x.shape[:2], dtype=torch.bool))
     for a, b in zip(got, expected, strict=True):
         assert a.dtype == np.float32
         np.testing.assert_allclose(a, b.numpy(), atol=2e-3, rtol=1e-3)
+
+
+def test_transformer_is_that_of_pytorch() -> None:
+    """Without graph layers, of robots of 2 to 5 fins."""
+    config, (x, target) = replace(CONFIG, graph_layers=0), random_robots()
+    weights = random_weights()
+    mask = torch.arange(5) < torch.arange(12)[:, None] % 4 + 2
+    sizes = config.width, config.heads, config.feedforward
+    layer = torch.nn.TransformerEncoderLayer(*sizes, dropout=0.0, batch_first=True, norm_first=True)
+    reference = torch.nn.TransformerEncoder(layer, config.transformer_layers, enable_nested_tensor=False)
+    named = {name: value for name, value in weights.items() if name.startswith("transformer.")}
+    reference.load_state_dict({name.removeprefix("transformer."): value for name, value in named.items()})
+    linear, wrench = torch.nn.functional.linear, target[:, None].expand(-1, 5, -1)
+    parts = ("enter", x), ("wrench", wrench)
+    both = [linear(part, weights[f"{name}.weight"], weights[f"{name}.bias"]) for name, part in parts]
+    joined = linear(torch.cat(both, -1), weights["join.weight"], weights["join.bias"])
+    ends = weights["norm.weight"], weights["norm.bias"]
+    hidden = reference(joined, src_key_padding_mask=~mask)
+    expected = torch.nn.functional.layer_norm(hidden, (config.width,), *ends).detach()
+    found = config.encoded(weights, x, target, mask)
+    torch.testing.assert_close(found[mask], expected[mask], atol=1e-4, rtol=1e-4)
 
 
 def test_fins_may_come_in_any_order() -> None:

@@ -12,13 +12,13 @@ from finlab.assets import shipped_layouts
 from finlab.axes import is_full_turn
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.mdn.training.train_mdn import first_weights
 from finlab.networks.trained import Normalization, TrainedWeights, sizes_for_file, to_command, to_normalized
 from finlab.paper.network import NetworkConfig
 from finlab.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort
+from finlab.training.loop import first_weights
 from tests.any_robot import AnyRobot, normalized_error
 from tests.paper.asked_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of

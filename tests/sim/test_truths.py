@@ -1,8 +1,11 @@
 """What layouts do not say: a robot that is not built as drawn."""
 
+import math
+
 import numpy as np
 import pytest
 
+from finlab.errors import LayoutError
 from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout, load_layout
 from finlab.layout.effectiveness import own_effectiveness
@@ -37,3 +40,11 @@ def test_a_robot_built_askew_stays_afoot(robot: Layout) -> None:
     assert np.linalg.norm(loop.log.position[-1] - loop.log.reference[-1]) < 0.5
     given = loop.log.allocated - loop.log.delivered
     assert np.linalg.norm(given[60:].mean(axis=0)) > 0.01
+
+
+def test_what_makes_no_sense_is_refused(robot: Layout, analytic: AnyRobot) -> None:
+    for wrong in ({"damping": 0.0}, {"buoyancy": math.nan}):
+        with pytest.raises(LayoutError):
+            perturbed(robot, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(LayoutError, match="truth: expected the actuators of A"):
+        ClosedLoop(robot, analytic.on(robot), make_trajectory("circle"), truth=load_layout("pair"))

@@ -98,7 +98,7 @@ class FinCommand(
         "zero_direction": "zero_direction_rad",
     },
 ):
-    """What a fin is told."""
+    """The command of a fin, by name."""
 
     amplitude: float
     """Half amplitude [rad]."""

@@ -65,7 +65,7 @@ class GridLaw(FinLaw):
 
 
 class TableLaw(GridLaw):
-    """The law of one table."""
+    """The law of one table of measured or computed forces, with what is known beside them."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill,
 
 
 def make_law(spec: FinModelSpec) -> FinLaw:
-    """Returns the law of one fin model; a `DataError` where it is a table whose file is missing or wrong."""
+    """Returns the law of one fin model. Raises DataError: it is a table whose file is missing or wrong."""
     values: dict[str, Any] = spec.values()
     if spec.type == "table":
         return _table(values["path"], file_stamp(values["path"]))

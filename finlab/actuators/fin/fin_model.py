@@ -77,7 +77,7 @@ class Limits(Checked):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a fin model."""
+    """One number of a fin model: default, meaning, unit and range."""
 
     default: float
     """Its value where a layout file leaves it out."""

@@ -58,11 +58,11 @@ class FinTable(NamedTuple):
 
 
 class FinGroup(Group):
-    """The fins of a robot."""
+    """The fins of a robot as answers to prices: planes of forces, each compiled from its law."""
 
     def __init__(self, fins: Sequence[Any], effectiveness: Array) -> None:
-        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
-        a `DataError` where a table cannot be read, or a fin gives no thrust."""
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process.
+        Raises DataError: a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
         self._tables, self._effectiveness = tables, effectiveness
         self.responses = [

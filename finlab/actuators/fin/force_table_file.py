@@ -41,7 +41,7 @@ MAX_BYTES = 25_000_000
 
 
 class ForceTable(NamedTuple):
-    """What a file holds."""
+    """A grid of forces as a file holds it, in the fin's own frame."""
 
     axes: list[Array]
     """The grid's amplitudes [rad], frequencies [Hz] and zero directions [rad], rising."""

@@ -10,7 +10,8 @@ from finlab.arrays import Array, Values, library_of
 
 
 class Drag(PlanarLaw):
-    """T = 2 rho Cd S rc^2 (2 pi f)^2 (1 - cos 2A) with half amplitude A and frequency f."""
+    """T = 2 rho Cd S rc^2 (2 pi f)^2 (1 - cos 2A) with half amplitude A and frequency f: the law on board of
+    U-CAT."""
 
     def __init__(self, density: Any, drag_coefficient: Any, area: Any, lever: Any) -> None:
         """Takes water density [kg/m^3], drag coefficient, fin area [m^2] and lever to its centre [m]."""
@@ -58,7 +59,8 @@ def bessel_j1(x: Values) -> Values:
 
 
 class Lighthill(PlanarLaw):
-    """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water moved per metre of trailing edge."""
+    """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water moved per metre of trailing edge: the
+    mean thrust of a stiff plate that turns by A about one end, at rest (Lighthill, 1971)."""
 
     def __init__(self, density: Any, length: Any, width: Any) -> None:
         """Takes water density [kg/m^3], fin length from the shaft [m] and trailing-edge width [m]."""
@@ -80,7 +82,8 @@ class Lighthill(PlanarLaw):
 
 
 class Soft(PlanarLaw):
-    """T = k x^p / (1 + (x / x0)^q) (1 + e cos(phi - phi_e)) with x = A f, along phi + d."""
+    """T = k x^p / (1 + (x / x0)^q) (1 + e cos(phi - phi_e)) with x = A f, along phi + d: our form for soft
+    fins, whose thrust saturates and then falls."""
 
     def __init__(self, k: Any, p: Any, x0: Any, q: Any, e: Any, phi_e: Any, d: Any) -> None:
         """Takes thrust scale [N], exponents, saturation [rad Hz], unevenness, its angle and lean [rad]."""

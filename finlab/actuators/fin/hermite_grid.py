@@ -17,7 +17,7 @@ ROUNDING = 1e-12
 
 
 class Grid(NamedTuple):
-    """What is known of one fin."""
+    """Values on a grid of commands, of one fin."""
 
     axes: list[Array]
     """Amplitudes [rad], frequencies [Hz] and zero directions [rad], rising, two points or more each."""
@@ -109,7 +109,7 @@ class HermiteGrids:
 
 
 def closed_axes(grid: Grid) -> list[Array]:
-    """Returns the axes, a circle closed."""
+    """Returns the axes [rad, Hz, rad], that of a circle with its first direction again one turn later."""
     amplitude, frequency, direction = grid.axes
     return [amplitude, frequency, np.append(direction, direction[0] + TURN) if grid.periodic else direction]
 

@@ -74,7 +74,9 @@ class Dual(Method):
         return whole_of(self)
 
     def at(self, flow: Array | None) -> Self:
-        key = b"" if flow is None else flow.tobytes()
+        if flow is None:
+            return self
+        key = flow.tobytes()
         if self._last is not None and self._last[0] == key:
             return self._last[1]
         other = super().at(flow)
@@ -98,45 +100,38 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
-        return self._solve(targets, policy, previous, prices)
-
-    def _solve(
-        self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
-    ) -> Solution:
         if self.plant.interaction is not None:
             return settled(self, targets, policy, previous, prices)
         found = self.forces(targets, policy, self.begin(prices), previous)
-        self._reach_peaks(found, targets)
-        command, aim = self.exact(found, previous), targets if found.within.all() else found.aim
+        beyond = [] if found.within.all() else self._beyond(found, targets)
+        command, aim = self.exact(found, previous), found.aim if beyond else targets
         notes = {_ENDED} if found.ended else set()
         if policy.kind == "direction":
-            for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), found, command))
+            for row in beyond:
+                notes.add(self._kept_on_the_ray(targets[row], row, found, command))
+        if beyond:
+            notes |= self.not_held(targets[beyond])
         bound: Callable[[Array], Array] = partial(self.bound, aim, found.price, found.value)
-        notes |= self.not_held(targets[~found.within])
         return Solution(
             command, None if self.unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
         )
 
-    def _reach_peaks(self, found: Found, targets: Array) -> None:
-        """Meets targets (N, 6) that take the last share of a force, which tables leave out: steps by the laws
-        lead there from what is nearest."""
-        near = np.flatnonzero(~found.within & (self._missing(found.aim, targets) <= 10.0 * CLOSE))
-        if not len(near):
-            return
-        ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
-        met = ends.error <= NEARLY
-        rows = near[met]
-        found.command[rows], found.aim[rows] = ends.command[met], targets[rows]
-        found.value[rows], found.within[rows] = 0.0, True
+    def _beyond(self, found: Found, targets: Array) -> list[int]:
+        """Places of the targets (N, 6) out of reach. Those that take the last share of a force, which tables
+        leave out, are met first: steps by the laws lead there from what is nearest."""
+        near = np.flatnonzero(~found.within & (_sizes((found.aim - targets) / self.scale) <= 10.0 * CLOSE))
+        if len(near):
+            ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
+            met = ends.error <= NEARLY
+            rows = near[met]
+            found.command[rows], found.aim[rows] = ends.command[met], targets[rows]
+            found.value[rows], found.within[rows] = 0.0, True
+        return np.flatnonzero(~found.within).tolist()
 
     def begin(self, prices: Array | None) -> Array | None:
         """Prices (6,) [W/N, W/(N m)] in the robot's basis (6,)."""
-        robot, inner = self.compiled.robot, np.zeros(6)
-        if prices is None:
-            return None
-        inner[: robot.basis.shape[1]] = robot.basis.T @ (robot.scale * prices)
-        return inner
+        robot = self.compiled.robot
+        return None if prices is None else np.asarray(robot.rows.dot(robot.scale * prices))
 
     def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
@@ -204,7 +199,7 @@ class Dual(Method):
         bound = proved_power(self.compiled, wrench, price)
         power = self.plant.power(command).sum(axis=-1)
         if not self._measured:
-            bound = np.where(self._missing(wrench, aim) <= NEARLY, np.maximum(bound, value), bound)
+            bound = np.where(_sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, value), bound)
         elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)):
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
@@ -239,8 +234,10 @@ class Dual(Method):
     def exact(self, found: Found, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
         what may follow the `previous` ones (n, 3) comes."""
-        command = found.command
-        rough = np.flatnonzero(self.error(command, found.aim) > EXACT)
+        command, missing = found.command, self._missing(found.command, found.aim)
+        if (each := missing.ravel()).dot(each) <= EXACT**2:
+            return command
+        rough = np.flatnonzero(_sizes(missing) > EXACT)
         if not len(rough):
             return command
         if previous is not None:
@@ -272,8 +269,12 @@ class Dual(Method):
         return np.where(box.clipped(rested) == rested, rested, command)
 
     def error(self, command: Array, aim: Array) -> Array:
-        return self._missing(self.plant.wrench_of(self.plant.force(command)), aim)
+        return _sizes(self._missing(command, aim))
 
-    def _missing(self, wrench: Array, aim: Array) -> Array:
-        missing = (wrench - aim) / self.scale
-        return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
+    def _missing(self, command: Array, aim: Array) -> Array:
+        """What commands (N, n, 3) give beside wrenches (N, 6) that they are to give, normalized."""
+        return np.asarray(self.problem.wrench(command) - aim / self.scale)
+
+
+def _sizes(missing: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))

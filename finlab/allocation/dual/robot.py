@@ -67,6 +67,8 @@ class DualRobot:
         left, values, _ = np.linalg.svd((scaled / self.scale).T, full_matrices=False)
         self.basis = left[:, values > NOTHING * max(values[0], 1e-300)]
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
+        self.rows = np.pad(self.basis.T, ((0, 6 - self.basis.shape[1]), (0, 0)))
+        """The same (6, 6) as rows, zeros behind them."""
         self.block = self._block()
         """The numbers of finlab/core/core.h."""
         self.core = Core(self.block, len(responses))
@@ -90,13 +92,12 @@ class DualRobot:
         return float((cost - rest) / self.speed[i])
 
     def _block(self) -> Array:
-        rank, basis = self.basis.shape[1], np.zeros((6, 6))
-        basis[:, :rank] = self.basis
+        rank = self.basis.shape[1]
         matrix = np.zeros((len(self.responses), 2, 6))
         matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
         length = HEAD + EACH * len(self.responses) + len(self._tables)
         head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
-        parts: list[Any] = [head, self.scale, self.yardstick, self.beside, basis.ravel()]
+        parts: list[Any] = [head, self.scale, self.yardstick, self.beside, self.rows.T.ravel()]
         for i, (each, form, places) in enumerate(zip(self.responses, self._forms, self._places, strict=True)):
             ahead, back, gauge, law, beat = places
             low, high = self.ends[i]

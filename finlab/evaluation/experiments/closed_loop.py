@@ -5,8 +5,9 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,24 +29,34 @@ LOST_M = 1.0
 
 
 class Swim(NamedTuple):
-    """One robot along one path."""
+    """One robot along one path, allocated by a method, steered by a controller, with or without losses."""
 
     layout: Layout
     path: Trajectory
     method: str
     controller: str
-    seed: int
     lost: tuple[str, ...] = ()
     """Names of the actuators that are lost, announced."""
     lost_s: float = 0.0
     """When they are lost [s]."""
+    seed: int = 0
+    """Of the noise."""
 
 
-def swum(
-    methods: Mapping[str, MethodSpec], swims: Sequence[Swim], what: str, row_of: Callable[[RunLog], Row]
-) -> list[Row]:
-    """What `row_of` makes of each swim, in order, on the cluster where there is one."""
-    return list(map_parts(partial(_row, methods, row_of), swims, what, "swim"))
+Case = tuple[Any, ...]  # what a row is of
+
+
+def repeated(
+    methods: Mapping[str, MethodSpec],
+    cases: Sequence[tuple[Case, Swim]],
+    seeds: Sequence[int],
+    what: str,
+    row_of: Callable[[RunLog], Row],
+) -> list[tuple[Case, list[Row]]]:
+    """Each case with what `row_of` makes of its swim with each seed, on the cluster where there is one."""
+    swims = [swim._replace(seed=seed) for _, swim in cases for seed in seeds]
+    rows = map_parts(partial(_row, methods, row_of), swims, what, "swim")
+    return [(case, list(islice(rows, len(seeds)))) for case, _ in cases]
 
 
 def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: Swim) -> Row:
@@ -55,13 +66,14 @@ def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swi
 
 
 def absolute_error(position: Array, reference: Array) -> float:
-    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m]."""
+    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m], world
+    frame."""
     return float(np.sqrt(np.square(position - reference).sum(axis=-1).mean()))
 
 
 def relative_error(position: Array, reference: Array, delta: int) -> float:
-    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. DataError:
-    there are no two samples that far apart."""
+    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. Raises
+    DataError: there are no two samples that far apart."""
     if not 0 < delta < len(position):
         raise DataError(f"relative error: expected a step of 1 to {len(position) - 1} samples, got {delta}")
     error = position - reference
@@ -69,7 +81,8 @@ def relative_error(position: Array, reference: Array, delta: int) -> float:
 
 
 def depth_error(position: Array, reference: Array) -> float:
-    """Root mean square error of the depth [m]."""
+    """Root mean square error of the depth [m] of positions (N, 3) beside a reference (N, 3) [m], world
+    frame."""
     return float(np.sqrt(np.square(position[:, 2] - reference[:, 2]).mean()))
 
 
@@ -104,30 +117,31 @@ def power_row(log: RunLog) -> Row:
 def over_seeds(rows: Sequence[Row]) -> Row:
     """Mean of each number over runs, and under `<name>_std` its spread (0 for a single run)."""
     means: Row = {}
-    for key in rows[0]:
+    for key in [key for key, value in rows[0].items() if isinstance(value, float)]:
         values = np.array([row[key] for row in rows])
         means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
     return means
 
 
-def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]) -> list[Row]:
+def mean_rows(keys: Sequence[str], done: Iterable[tuple[Case, Sequence[Row]]]) -> list[Row]:
     """One row for each case, a value for each key, of the rows of its runs."""
     return [
-        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}
-        for case, rows in done.items()
+        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)} for case, rows in done
     ]
 
 
 def with_losses(
     layouts: Sequence[str], counts: Sequence[int]
-) -> list[tuple[Layout, int, tuple[str, ...] | None]]:
+) -> tuple[list[tuple[Layout, int, tuple[str, ...]]], list[tuple[Layout, int]]]:
     """For each file or shipped name and number of fins the first that may be lost so that the robot can be
-    steered; None where all are needed. Numbers that leave no fin are left out. Raises DataError: a negative
-    number."""
+    steered, and those robots and numbers of which all are needed. Numbers that leave no fin are left out.
+    Raises DataError: a negative number."""
     if min(counts) < 0:
         raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
     robots = [in_worker(load_layout, name) for name in layouts]
-    return [(each, n, steerable_loss(each, n)) for each in robots for n in counts if n < each.n]
+    cases = [(each, n, steerable_loss(each, n)) for each in robots for n in counts if n < each.n]
+    able = [(each, n, lost) for each, n, lost in cases if lost is not None]
+    return able, [(each, n) for each, n, lost in cases if lost is None]
 
 
 POWER = (

@@ -14,8 +14,8 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     Swim,
     follow_row,
-    over_seeds,
-    swum,
+    mean_rows,
+    repeated,
 )
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.files.worker import in_worker
@@ -37,13 +37,14 @@ class Fault:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Which fins are lost, and when, in words; `HEALTHY` where none is."""
         when = f" at {self.time_s:.0f} s" if self.time_s > 0 else ""
         return f"{' + '.join(self.fins)} lost{when}" if self.fins else HEALTHY
 
 
 def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
-    """Healthy, each fin, each pair, and each fin half-way."""
+    """The healthy robot, each fin and each pair lost from the start, and each fin at a time [s]; never
+    all."""
     names = layout.names
     lost = [((), 0.0), *(((name,), 0.0) for name in names)]
     lost += [(pair, 0.0) for pair in combinations(names, 2)] + [((name,), half_way_s) for name in names]
@@ -74,18 +75,17 @@ def run(
     """
     robot, path = in_worker(load_layout, layout), in_worker(make_trajectory, trajectory)
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
-    cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
-    done: dict[tuple[Fault, str], list[Row]] = {}
-    parts = list(product(cases, range(seed, seed + runs)))
-    swims = [Swim(robot, path, name, controller, k, fault.fins, fault.time_s) for (fault, name), k in parts]
-    for (case, _), row in zip(parts, swum(specs, swims, "faults", follow_row), strict=True):
-        done.setdefault(case, []).append(row)
-    rows: list[Row] = []
-    for (fault, name), errors_of in done.items():
-        row = {"fault": fault.label, "method": name, "runs": len(errors_of), **over_seeds(errors_of)}
-        row["over_healthy"] = row["ate"] / over_seeds(done[faults[0], name])["ate"]
+    cases = [
+        ((fault.label, name), Swim(robot, path, name, controller, fault.fins, fault.time_s))
+        for fault, name in product(faults, specs)
+        if fault.controllable
+    ]
+    done = repeated(specs, cases, range(seed, seed + runs), "faults", follow_row)
+    rows = mean_rows(("fault", "method"), done)
+    healthy = {row["method"]: row["ate"] for row in rows if row["fault"] == HEALTHY}
+    for row, (_, errors_of) in zip(rows, done, strict=True):
+        row["over_healthy"] = row["ate"] / healthy[row["method"]]
         row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
-        rows.append(row)
     return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
 
 

@@ -76,7 +76,7 @@ class HardDay:
     jets_known: bool = False
 
     def path(self) -> Trajectory:
-        """What is followed."""
+        """The trajectory that is followed, in the world frame."""
         return make_trajectory(self.trajectory, self.duration_s, self.scale)
 
     def cases(self) -> list[Case]:

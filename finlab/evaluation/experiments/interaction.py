@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from copy import copy
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -88,11 +88,11 @@ def _models(
     judge: Judge, layouts: int, steps: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
 ) -> dict[str, Model]:
     from finlab.fit.interaction.surrogate_form import trained_surrogate
-    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
 
     samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
     if network is None:
-        train(samples, folder, Recipe(steps=steps), seed)
+        train(samples, folder, recipe(steps), seed)
     file = network or str(folder / WEIGHTS_FILE)
     node = trained_surrogate(samples, seed)
     models: dict[str, Model] = {
@@ -104,26 +104,16 @@ def _models(
         "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
     }
     for count in own:
-        models[f"ridge, {count} own samples"] = partial(_ridge, count)
+        models[f"ridge, {count} own samples"] = partial(Ridge, count)
     return models | {"oracle": lambda own: Learned(file).of(places_of(own.layout))}
-
-
-def _ridge(count: int, samples: Samples) -> "Ridge":
-    return Ridge(_some(samples, count))
 
 
 def _some(samples: Samples, count: int) -> Samples:
     return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
 
 
-class _Case(NamedTuple):
-    error: float
-    power: float
-    expected: float
-
-
 def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str) -> Row:
-    each = []
+    each = list[tuple[float, float, float]]()
     for layout, wrenches, samples in progress(cases, "robot", name):
         scale = yardstick(layout)
         method = Dual(layout, DualSettings(), scale)
@@ -137,7 +127,7 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
         force = body_force(method.plant.force(command), layout.frames)
         deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
         watts = method.plant.power(command).sum(axis=1)
-        each += [_Case(*case) for case in zip(*(map(_size, (missed, deviation))), watts, strict=True)]
+        each += zip(*(np.linalg.norm(part, axis=-1) for part in (missed, deviation)), watts, strict=True)
     error, expected, power = (np.array(column) for column in zip(*each, strict=True))
     known = float(np.sqrt((expected**2).mean()))
     return {
@@ -148,10 +138,6 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
         "expected_over_true": known / float(np.sqrt((error**2).mean())) if known else None,
         "power_mean": float(power.mean()),
     }
-
-
-def _size(rows: Array) -> Array:
-    return np.asarray(np.linalg.norm(rows, axis=-1))
 
 
 def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
@@ -200,8 +186,9 @@ class Ridge(_ByDifferences):
     """What the laws leave of own samples, by ridge regression on forces, their sizes and products of these,
     with the penalty that leaves least of samples left out one by one."""
 
-    def __init__(self, samples: Samples) -> None:
-        force, left, scale = left_by_laws(samples)
+    def __init__(self, count: int, samples: Samples) -> None:
+        """Takes how many of the samples count, and the samples."""
+        force, left, scale = left_by_laws(_some(samples, count))
         unit = float(np.abs(force).max())
 
         def features(force: Array) -> Array:

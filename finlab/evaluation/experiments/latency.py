@@ -48,7 +48,8 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each robot, call and method that takes such a robot.
+    """One row for each robot, call and method that takes such a robot. Raises DataError: a robot or a reach
+    that is none.
 
     Args:
         robots: fins-N or thrusters-N, random ones of so many.

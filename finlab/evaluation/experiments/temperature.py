@@ -1,16 +1,14 @@
 """The paper's figure A: what the temperature of the draw does to the candidates of its network."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
+from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.plots import temperature_picture
 from finlab.evaluation.scoring import mean_interval, paper_sigma
 from finlab.evaluation.splits import make_split
@@ -30,7 +28,7 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each temperature, before any refinement.
+    """One row for each temperature, before any refinement. Raises DataError: a temperature of 0 or less.
 
     Args:
         temperatures: of the draw, above 0.
@@ -46,16 +44,15 @@ def run(
     cases = make_split(split, layouts, targets, seed)
     rows: list[Row] = []
     for temperature in temperatures:
-        settings = PaperSettings(n_candidates=candidates, temperature=temperature, refinement="none")
-        choice = replace(choose_method("paper", checkpoint), settings=settings)
+        options = {"n_candidates": candidates, "temperature": temperature, "refinement": "none"}
+        method = MethodSpec("paper", choose_method("paper", checkpoint, **options))
         best, spread, group = [], [], []
         for k, case in enumerate(progress(cases, "layout", f"T = {temperature:g}")):
-            allocator = Allocator.of_choice(case.healthy, choice)
             for target in case.targets:
-                samples = allocator.allocate(target, seed=seed).samples
+                samples = method.on(case.healthy).allocate(target, seed=seed).samples
                 assert samples is not None
                 error = np.linalg.norm((samples.wrench - target) / paper_sigma(), axis=-1)
-                best.append((error**2 + settings.gamma * samples.effort).min())
+                best.append((error**2 + PaperSettings.gamma * samples.effort).min())
                 spread.append(diversity(samples.command, case.healthy))
                 group.append(k)
         rows.append(

@@ -14,10 +14,11 @@ from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
     POWER,
+    Case,
     Swim,
     follow_row,
     mean_rows,
-    swum,
+    repeated,
     with_losses,
 )
 from finlab.evaluation.method_specs import load_method_specs
@@ -58,27 +59,20 @@ def run(
     """
     check_names("controllers", controllers, CONTROLLERS)
     path, specs = in_worker(make_trajectory, trajectory), load_method_specs(methods, checkpoint)
-    cases = with_losses(layouts, lost)
-    able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
-    parts = list(product(able, controllers, specs, range(seed, seed + runs)))
-    swims = [Swim(robot, path, name, law, k, fins) for (robot, _, fins), law, name, k in parts]
-    done: dict[tuple[str, int, str, str], list[Row]] = {}
-    shown: dict[tuple[str, int, str, str], Row] = {}
-    every: dict[tuple[str, int, str, str], list[Row]] = {}
-    errors = swum(specs, swims, "trajectory", _with_path if paths else follow_row)
-    for ((robot, count, _), law, name, _), row in zip(parts, errors, strict=True):
-        case = robot.name, count, law, name
-        shown.setdefault(case, {key: row.pop(key) for key in ("path",) if key in row})
-        done.setdefault(case, []).append(row)
-        every.setdefault(("all", *case[1:]), []).append(row)
-    keys = "layout", "lost", "controller", "method"
-    rows = [row | shown[case] for row, case in zip(mean_rows(keys, done), done, strict=True)]
-    hopeless: list[Row] = [
-        {"layout": robot.name, "lost": count, "method": "cannot be steered"}
-        for robot, count, fins in cases
-        if fins is None
+    able, needed = with_losses(layouts, lost)
+    cases = [
+        ((robot.name, count, law, name), Swim(robot, path, name, law, fins))
+        for (robot, count, fins), law, name in product(able, controllers, specs)
     ]
-    return [*rows, *hopeless, *mean_rows(keys, dict(sorted(every.items(), key=lambda each: each[0][1])))]
+    row_of = _with_path if paths else follow_row
+    done = repeated(specs, cases, range(seed, seed + runs), "trajectory", row_of)
+    keys, every = ("layout", "lost", "controller", "method"), dict[Case, list[Row]]()
+    rows = mean_rows(keys, done)
+    for row, (case, errors) in zip(rows, done, strict=True):
+        row |= {"path": errors[0]["path"]} if paths else {}
+        every.setdefault(("all", *case[1:]), []).extend(errors)
+    rows += [{"layout": robot.name, "lost": n, "method": "cannot be steered"} for robot, n in needed]
+    return rows + mean_rows(keys, sorted(every.items(), key=lambda each: each[0][1]))
 
 
 def _with_path(log: RunLog) -> Row:

@@ -32,6 +32,7 @@ def run(
     seed: int = 0,
 ) -> list[Row]:
     """One row for each layout, number of lost fins, speed, controller and method, and one over all speeds.
+    Raises DataError: a duration of no more than `SETTLED_S`, or over an hour.
 
     Args:
         layouts: names or files.
@@ -47,21 +48,18 @@ def run(
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
     check_names("controllers", controllers, CONTROLLERS)
     specs = load_method_specs(methods, checkpoint)
-    cases = closed_loop.with_losses(layouts, lost)
-    able = [(robot, count, fins) for robot, count, fins in cases if fins is not None]
-    parts = list(product(able, SPEEDS, controllers, specs, range(seed, seed + runs)))
-    swims = [
-        closed_loop.Swim(robot, straight(duration, speed), name, law, k, fins)
-        for (robot, _, fins), speed, law, name, k in parts
+    paths = [(speed, straight(duration, speed)) for speed in SPEEDS]
+    able, _ = closed_loop.with_losses(layouts, lost)
+    cases = [
+        ((robot.name, count, speed, law, name), closed_loop.Swim(robot, path, name, law, fins))
+        for (robot, count, fins), (speed, path), law, name in product(able, paths, controllers, specs)
     ]
-    done: dict[tuple[str, int, float | None, str, str], list[Row]] = {}
-    for ((robot, count, _), speed, law, name, _), row in zip(
-        parts, closed_loop.swum(specs, swims, "velocity", _row), strict=True
-    ):
-        for shown in (speed, None):
-            done.setdefault((robot.name, count, shown, law, name), []).append(row)
+    done: dict[closed_loop.Case, list[Row]] = {}
+    for case, errors in closed_loop.repeated(specs, cases, range(seed, seed + runs), "velocity", _row):
+        for shown in (case, (*case[:2], None, *case[3:])):
+            done.setdefault(shown, []).extend(errors)
     order = sorted(done, key=lambda case: (case[:2], case[2] is None))
-    rows = closed_loop.mean_rows(KEYS, {case: done[case] for case in order})
+    rows = closed_loop.mean_rows(KEYS, [(case, done[case]) for case in order])
     base = {case[:4]: row["inertial_w"] for case, row in zip(order, rows, strict=True) if case[4] == BASELINE}
     for case, row in zip(order, rows, strict=True) if base else ():
         row["over_baseline"] = row["inertial_w"] / base[case[:4]]

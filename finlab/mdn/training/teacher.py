@@ -59,7 +59,8 @@ class Ways(NamedTuple):
 
 
 def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
-    """What descents find for normalized targets (N, 6)."""
+    """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES` ways
+    each."""
     rows, maximum = len(target), problem.fins.maximum
     n = len(maximum)
     # A start's small forces are as good as at rest, so few or many fins work.
@@ -165,7 +166,7 @@ class Batch(NamedTuple):
 
 
 class Answers:
-    """Everything in some files, in memory."""
+    """All robots, targets and ways of some files, in memory; batches are drawn from them."""
 
     def __init__(self, paths: list[Path]) -> None:
         parts: dict[int, list[dict[str, AnyArray]]] = {}

@@ -27,9 +27,9 @@ from finlab.networks.checkpoint import (
     resolve_checkpoint,
     write_checkpoint,
 )
-from finlab.networks.trained import Shapes, State, TrainedWeights, sizes_for_file
+from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.training.device import Workplace
-from finlab.training.loop import STATE_FILE, LoopSettings, Terms, Training
+from finlab.training.loop import STATE_FILE, LoopSettings, Terms, Training, first_weights
 from finlab.whole_file import make_folder, sweep_parts
 
 
@@ -61,32 +61,6 @@ RECIPES = {
     ),
 }
 """Name -> recipe of `finlab train mdn`."""
-
-
-ZERO = ("in_proj_bias", "out_proj.bias")
-"""Ends of the names of arrays that start at zero, as in PyTorch's attention."""
-
-
-def first_weights(shapes: Shapes, seed: int) -> dict[str, Tensor]:
-    """Weights by name, drawn as PyTorch draws those of its own layers (Glorot and Bengio for attention,
-    uniform over one over the root of the inputs for linear layers); they depend on the seed alone."""
-    generator = torch.Generator().manual_seed(seed)
-    drawn = {name: _drawn(name, shape, shapes, generator) for name, shape in shapes.items()}
-    return {name: values.requires_grad_() for name, values in drawn.items()}
-
-
-def _drawn(name: str, shape: tuple[int, ...], shapes: Shapes, generator: torch.Generator) -> Tensor:
-    layer, _, part = name.rpartition(".")
-    weight = shapes.get(f"{layer}.weight", ())
-    if len(weight) == 1:  # a normalization
-        return torch.ones(shape) if part == "weight" else torch.zeros(shape)
-    if name.endswith(ZERO) or (part == "bias" and not weight):
-        return torch.zeros(shape)
-    if part in ("attention", "in_proj_weight"):
-        bound = math.sqrt(6.0 / sum(shape))
-    else:
-        bound = 1.0 / math.sqrt(weight[1])
-    return (2.0 * torch.rand(shape, generator=generator) - 1.0) * bound
 
 
 TRAIN_SEED = 140_000
@@ -153,7 +127,7 @@ def answers_in(folder: Path, settings: AnswerSettings, seed: int, until: float =
 def make_terms(
     net: Callable[..., ForceMixture], files: list[Path], training: MdnTraining, seed: int
 ) -> Terms:
-    """The loss terms of a step."""
+    """The loss terms of a step, and of the held-out first file: functions of step and seed."""
     held_out, learned = Answers(files[:1]), Answers(files[1:])
     rows = [
         held_out.draw(np.random.default_rng([TRAIN_SEED, k]), training.batch_size) for k in range(HELD_OUT)

@@ -37,7 +37,7 @@ class AllocatorTraining(PaperLoop):
     """Weight lambda; not printed."""
 
     def beta(self, step: int) -> float:
-        """Weight of the guidance in a step."""
+        """Weight beta of the guidance in a step: it rises linearly over `ramp`, then stays."""
         ramp = min(1.0, step / max(1.0, self.ramp * self.steps))
         return self.guidance_start + ramp * (self.guidance - self.guidance_start)
 
@@ -81,7 +81,7 @@ RECIPES = {
 
 
 def recipe(preset: str) -> PaperRecipe:
-    """A recipe by its name; a `DataError` names those there are."""
+    """A recipe by its name. Raises DataError: there is none of that name."""
     if preset not in RECIPES:
         raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r:.40}")
     return RECIPES[preset]
@@ -119,7 +119,7 @@ products in bfloat16 where the device is faster with it. Of inference: see `Pape
 
 
 def write_card(folder: Path, weights: TrainedWeights) -> None:
-    """Write the model card of a checkpoint of the paper's kind."""
+    """Write the model card of a checkpoint of the paper's kind. Raises DataError: it cannot be written."""
     parts = [*weights.training.items(), ("network", weights.network_sizes)]
     parts += [("surrogate sizes", weights.surrogate_sizes), *weights.metrics.items()]
     rows = [row for name, part in parts for row in _rows(name, part)]

@@ -89,7 +89,7 @@ def generate(folder: Path, settings: DataSettings) -> None:
 
 
 def drawn_part(settings: DataSettings, number: int) -> bytes:
-    """The file of part `number`."""
+    """The content of the file of part `number`: the arrays `FIELDS` as npz."""
     first = number * settings.together
     some = range(first, min(first + settings.together, settings.layouts))
     robots = [samples_of(settings, k) for k in some]
@@ -121,12 +121,14 @@ def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
 
 
 def part_file(folder: Path, number: int) -> Path:
-    """The file of part `number`."""
+    """Where part `number` lies in the folder of a data set."""
     return folder / f"part-{number:05d}.npz"
 
 
 def read_part(path: Path) -> dict[str, AnyArray]:
-    """The arrays of a part by name; a `DataError` where it is missing or damaged."""
+    """The arrays of a part by name, R layouts, then commands (R, C, n, 3) and wrenches (R, C, 6) [N, N m].
+
+    Raises DataError: it is missing or damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in FIELDS}
@@ -135,7 +137,7 @@ def read_part(path: Path) -> dict[str, AnyArray]:
 
 
 def about(folder: Path) -> dict[str, Any]:
-    """What `data.json` says: settings and normalization; a `DataError` where there is none."""
+    """What `data.json` says: settings and normalization. Raises DataError: there is none."""
     path = folder / DATA_FILE
     text = decoded(read_file(path, 1_000_000, "a data set's file", DataError), str(path), "JSON", DataError)
     about = parse_json(text, str(path), DataError)
@@ -173,7 +175,7 @@ class DataSet:
     """A data set in the memory of a device, and its batches."""
 
     def __init__(self, folder: Path, device: torch.device) -> None:
-        """Read a data set; a `DataError` where it is missing, unfinished or damaged."""
+        """Read a data set. Raises DataError: it is missing, unfinished or damaged."""
         said = about(folder)
         try:
             self.settings: dict[str, Any] = said["settings"]
@@ -194,7 +196,7 @@ class DataSet:
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
         """Some rows of batch number `step` of `size` samples, a function of step and seed: random commands
         of one layout (paper, surrogate pretraining), a new one in each step, or of all, reordered in each
-        epoch."""
+        epoch. Raises DataError: there are fewer samples than a batch has."""
         count = self.layouts if one_layout else self.layouts * self.commands
         if not one_layout and size > count:
             raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")

@@ -3,11 +3,12 @@ own, then the network with the surrogate frozen."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec
@@ -15,11 +16,10 @@ from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint, writ
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training import modules
-from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
 from finlab.paper.training.recipes import PaperLoop, recipe, write_card
 from finlab.paper.training.samples import N_FINS, Batch, DataSet, DataSettings, fresh_batch, generate
 from finlab.training.device import Workplace, workplace
-from finlab.training.loop import Terms, Training, seeded_generator
+from finlab.training.loop import Terms, Training, Weights, first_weights, seeded_generator
 
 NOISE_SEED = 1_000_000
 """Added to the seed of the noise, so that it is unrelated to the order of the data."""
@@ -59,7 +59,7 @@ class Bench:
         return self.samples.batch(step, settings.batch_size, self.seed, settings.one_layout, self.rows)
 
     def noise(self, step: int) -> tuple[Tensor, Tensor]:
-        """The share of the noise of `guidance`."""
+        """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1, 3)."""
         device, shape = self.place.device, (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
@@ -76,13 +76,14 @@ def train_surrogate(options: Options) -> TrainedWeights:
     CommandError: there is no such device."""
     made = recipe(options.preset)
 
-    def terms_of(network: nn.Module, bench: Bench) -> Terms:
+    def terms_of(weights: Weights, bench: Bench) -> Terms:
         (std,) = bench.tensors(bench.samples.normalization.std)
+        wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
 
         def terms(step: int) -> dict[str, Tensor]:
             batch = bench.batch(step)
             with bench.place.autocast():
-                return {"loss": modules.physics(network, batch, std).mean()}
+                return {"loss": modules.physics(wrench, batch, std).mean()}
 
         return terms
 
@@ -99,8 +100,8 @@ def train_surrogate(options: Options) -> TrainedWeights:
         error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
         return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
 
-    module = Surrogate, made.surrogate
-    return _train("surrogate", options, made.surrogate_training, module, terms_of, checkpoint)
+    begin = partial(modules.surrogate_weights, made.surrogate)
+    return _train("surrogate", options, made.surrogate_training, begin, terms_of, checkpoint)
 
 
 def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
@@ -109,22 +110,25 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
     Without other data that in the surrogate's folder is learned from, if there is any. Raises
     CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in `train_surrogate`."""
     made, base = recipe(options.preset), read_checkpoint(resolve_checkpoint(surrogate))
-    settings = made.allocator_training
+    settings, network = made.allocator_training, made.network
     surrogate_of(base)  # reports what is missing before data are made
     if options.data is None and (surrogate / "data").is_dir():
         options = replace(options, data=surrogate / "data")
 
-    def terms_of(network: nn.Module, bench: Bench) -> Terms:
+    def terms_of(weights: Weights, bench: Bench) -> Terms:
         if bench.samples.settings["fin_model"] != base.fin_model:
             raise DataError(f"{options.data}: its wrenches are of another fin model than the surrogate's")
         mean, std = bench.tensors(*base.normalization)
-        frozen = surrogate_of(base).to(bench.place.device)
+        frozen = surrogate_of(base, device=bench.place.device)
         ramp = replace(settings, steps=bench.settings.steps)
 
         def terms(step: int) -> dict[str, Tensor]:
             batch = bench.batch(step)
             with bench.place.autocast():
-                mixture = network(features(batch), (batch.wrench - mean) / std, batch.mask)
+                wanted = (batch.wrench - mean) / std
+                hidden = network.encoded(weights, modules.features(batch), wanted, batch.mask)
+            mixture = network.mixture(weights, hidden.float())
+            with bench.place.autocast():
                 guide = modules.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
             imitate = modules.imitation(mixture, batch).mean()
             entropy = modules.negative_entropy(mixture, batch.mask).mean()
@@ -134,31 +138,29 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
         return terms
 
     def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
-        return replace(base, network_sizes=sizes_for_file(made.network), network=state)
+        return replace(base, network_sizes=sizes_for_file(network), network=state)
 
-    module = AllocatorNetwork, made.network
-    return _train("allocator", options, settings, module, terms_of, checkpoint, base.sha256)
+    begin = partial(first_weights, network.shapes())
+    return _train("allocator", options, settings, begin, terms_of, checkpoint, base.sha256)
 
 
 def _train(
     verb: str,
     options: Options,
     settings: PaperLoop,
-    module_of: tuple[Callable[[Any], nn.Module], Any],
-    terms_of: Callable[[nn.Module, Bench], Terms],
+    begin: Callable[[int, torch.device], Weights],
+    terms_of: Callable[[Weights, Bench], Terms],
     checkpoint: Callable[[DataSet, State], TrainedWeights],
     surrogate: str = "",
 ) -> TrainedWeights:
-    """Train a module and write the checkpoints that are made of its weights."""
+    """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
     settings, output = replace(settings, steps=options.steps or settings.steps), options.output
     with workplace(options.device, settings.batch_size) as place:
         if options.data is None and place.rank == 0:
             generate(output / "data", recipe(options.preset).data)
         place.wait()
         samples = DataSet(options.data or output / "data", place.device)
-        torch.manual_seed(options.seed)
-        kind, sizes = module_of
-        module = kind(sizes).to(place.device)
+        weights = begin(options.seed, place.device)
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
 
@@ -168,16 +170,17 @@ def _train(
             made = replace(made, name=output.name, preset=options.preset, training=history)
             write_card(output, write_checkpoint(output, made))
 
-        training = Training(dict(module.named_parameters()), settings, output, identity, place)
+        training = Training(weights, settings, output, identity, place)
         if options.resume:
             training.resume()
         bench = Bench(place, samples, settings, options.seed)
-        training.run(terms_of(place.shared(module), bench), save)
+        training.run(terms_of(weights, bench), save)
         return read_checkpoint(output)
 
 
-def surrogate_of(weights: TrainedWeights) -> Surrogate:
-    """The surrogate of a checkpoint, frozen; a `CheckpointError` where it holds none."""
-    module = Surrogate(SurrogateConfig.of(weights))
-    module.load_state_dict({name: torch.tensor(value) for name, value in weights.surrogate.items()})
-    return module.requires_grad_(False)
+def surrogate_of(weights: TrainedWeights, **of_tensors: Any) -> modules.WrenchOf:
+    """The surrogate of a checkpoint, frozen, with options of `torch.tensor` for its weights. Raises
+    CheckpointError: it holds none."""
+    config = SurrogateConfig.of(weights)
+    tensors = {name: torch.tensor(value, **of_tensors) for name, value in weights.surrogate.items()}
+    return partial(modules.surrogate_wrench, config, tensors)

@@ -13,10 +13,11 @@ import torch
 from finlab.mdn.network import ForceNetworkConfig
 from finlab.mdn.training import train_mdn as mdn_training
 from finlab.mdn.training.teacher import Answers, read_answers, write_answers
-from finlab.mdn.training.train_mdn import RECIPES, first_weights, losses, train_mdn
+from finlab.mdn.training.train_mdn import RECIPES, losses, train_mdn
 from finlab.networks.checkpoint import read_checkpoint, write_checkpoint
 from finlab.networks.trained import TrainedWeights
 from finlab.training import loop
+from finlab.training.loop import first_weights
 
 SMOKE = RECIPES["smoke"]
 

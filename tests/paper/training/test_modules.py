@@ -1,4 +1,4 @@
-"""The networks on PyTorch's layers: robots of 2 to 5 fins in one batch, against each alone in numpy."""
+"""The networks in torch: robots of 2 to 5 fins in one batch, against each alone in numpy; the losses."""
 
 import math
 
@@ -7,12 +7,14 @@ import pytest
 import torch
 
 from finlab.layout import Layout, random_layout
-from finlab.networks.trained import Normalization, TrainedWeights, check_state
+from finlab.networks.trained import Normalization, TrainedWeights
 from finlab.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig
 from finlab.paper.training import modules
 from finlab.paper.training.recipes import RECIPES
 from finlab.paper.training.samples import N_FINS, Batch, DataSettings, fresh_batch
+from finlab.training.loop import first_weights
+from tests.torch_weights import arrays_of
 
 SIZES = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 HIDDEN = SurrogateConfig(hidden=(24, 16))
@@ -42,44 +44,33 @@ def padded(robots: list[Layout], fill: float) -> Batch:
     return Batch(*(torch.from_numpy(a if a.dtype == bool else a.astype(np.float32)) for a in arrays))
 
 
-def moved(module: torch.nn.Module) -> torch.nn.Module:
-    """The module with weights of which none is zero or one, which would hide one that is misplaced."""
-    draw = torch.Generator().manual_seed(2)
-    with torch.no_grad():
-        for parameter in module.parameters():
-            parameter += 0.1 * torch.randn(parameter.shape, generator=draw)
-    return module
-
-
-def arrays(module: torch.nn.Module) -> dict[str, np.ndarray]:
-    return {name: value.numpy() for name, value in module.state_dict().items()}
+def weights_of(sizes: NetworkConfig | SurrogateConfig) -> dict[str, torch.Tensor]:
+    """Weights of which none is zero or one, which would hide one that is misplaced."""
+    draw, first = torch.Generator().manual_seed(2), first_weights(sizes.shapes(), 0)
+    return {name: value + 0.1 * torch.randn(value.shape, generator=draw) for name, value in first.items()}
 
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    module, batch = moved(modules.AllocatorNetwork(SIZES)), padded(robots, fill)
-    check_state(arrays(module), SIZES.shapes())
-    with torch.no_grad():
-        together = module(modules.features(batch), batch.wrench, batch.mask)
+    weights, batch = weights_of(SIZES), padded(robots, fill)
+    together = SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
     for row, layout in enumerate(robots):
         x = raw_features(*(getattr(layout, name) for name in PLACE)).astype(np.float32)[None]
-        alone = SIZES(arrays(module), x, batch.wrench[row : row + 1].numpy())
+        alone = SIZES(arrays_of(weights), x, batch.wrench[row : row + 1].numpy())
         for got, expected in zip(together, alone, strict=True):
-            np.testing.assert_allclose(got[row, : layout.n], expected[0], atol=1e-5)
+            np.testing.assert_allclose(got[row, : layout.n].detach(), expected[0], atol=1e-5)
 
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    module, batch = moved(modules.Surrogate(HIDDEN)), padded(robots, fill)
-    check_state(arrays(module), HIDDEN.shapes())
+    tensors, batch = weights_of(HIDDEN), padded(robots, fill)
     weights = TrainedWeights(
         "one",
         Normalization(np.zeros(6), np.ones(6)),
         surrogate_sizes={"kind": "mlp", "hidden": list(HIDDEN.hidden)},
-        surrogate=arrays(module),
+        surrogate=arrays_of(tensors),
     )
-    with torch.no_grad():
-        together = module(batch.command, batch)
+    together = modules.surrogate_wrench(HIDDEN, tensors, batch.command, batch).detach()
     for row, layout in enumerate(robots):
         command = batch.command[row, : layout.n].numpy()
         np.testing.assert_allclose(
@@ -88,9 +79,9 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 
 def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> None:
-    batch, module = padded(robots, 7.0), modules.AllocatorNetwork(SIZES)
+    batch, weights = padded(robots, 7.0), weights_of(SIZES)
     x = modules.features(batch).requires_grad_()
-    mixture = module(x, batch.wrench, batch.mask)
+    mixture = SIZES(weights, x, batch.wrench, batch.mask)
     sum(
         (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum() for part in mixture
     ).backward()
