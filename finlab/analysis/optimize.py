@@ -23,7 +23,7 @@ from finlab.layout import Layout
 
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
-DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
+DRAWS, RANK = 64, 16  # random vectors, of which at most so many times the starts are ranked
 SHARES = (1.0, 0.5, 0.25)  # of the way from the present vector to a random one
 STARTS, FEWEST, MOST = 2800, 4, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
@@ -212,7 +212,9 @@ class _Search:
         if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
-        ways = [way - moves.start for way in (drawn, moves.mirrored(drawn))]
+        mirrored = moves.mirrored(drawn)
+        both = [drawn] if np.array_equal(drawn, mirrored) else [drawn, mirrored]
+        ways = [way - moves.start for way in both]
         count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
         most, best = -(-count // (len(SHARES) * len(ways))), list[Array]()
         for share, way in product(SHARES, ways):
