@@ -63,7 +63,8 @@ class Bounds:
 
 
 def azimuth(part: Actuator) -> float:
-    """The angle [rad] that `Bounds.mounting_angle` is about, as it is now."""
+    """Returns the angle [rad] that `Bounds.mounting_angle` is about, as it is now: 0 of an actuator without a
+    mounting angle."""
     return (getattr(part, "mounting_angle", None) or 0.0) + 0.0
 
 
@@ -192,6 +193,19 @@ class Moves:
         follows = self._twin >= 0
         position[:, self._twin[follows]] = numbers[:, follows, :3] * MIRROR
         return position
+
+    def mirrored(self, vectors: Array) -> Array:
+        """Returns vectors (P, D) in which one of each two actuators that are each other's mirror image now
+        follows the other, as far as its bounds let it."""
+        numbers = self._numbers(vectors)
+        for first, second in mirror_pairs(self.layout):
+            if first in self.leaders and second in self.leaders:
+                one, other = self.leaders.index(first), self.leaders.index(second)
+                i, j = self._lead[one], self._lead[other]
+                way = np.sign(self.layout.frames[i, 0] * MIRROR @ self.layout.frames[j, 0])
+                image = (numbers[:, one, 3:] - [self._angle[i], 0.0]) * [-1.0, way] + [self._angle[j], 0.0]
+                numbers[:, other] = np.concatenate([numbers[:, one, :3] * MIRROR, image], axis=-1)
+        return np.clip(numbers.reshape(len(vectors), -1)[:, self._free], self.lower, self.upper)
 
     def on_grid(self, vectors: Array) -> Array:
         """Returns vectors (P, D) whose numbers are multiples of their steps, within bounds."""

@@ -31,7 +31,7 @@ class NullSpace:
     """What can be added to the forces of one answer without any change of the wrench that it gives."""
 
     def __init__(self, answer: Allocation) -> None:
-        """Takes an answer of any method to one wrench; of what it leaves out nothing moves."""
+        """Takes an answer of any method to one wrench; its failed actuators have no part in any direction."""
         self._alive: NDArray[np.bool_] = np.array([name not in answer.failed for name in answer.names])
         layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
         counts = np.isfinite(answer.target)

@@ -23,7 +23,7 @@ from finlab.layout import Layout
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
 DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
-STARTS, FEWEST, MOST = 2800, 2, 20  # climbs, times the square of the free numbers; at least and at most
+STARTS, FEWEST, MOST = 2800, 3, 20  # climbs, times the square of the free numbers; at least and at most
 FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
 LITTLE = 1e-4  # share of the goal that a climb has to gain to count
 FINALISTS = 3  # of so many climbs the best one goes on
@@ -204,17 +204,21 @@ class _Search:
                 self._note(*climb.rounded(self._moves))
 
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
-        """The present vector and the best of some random ones, of those that keep all rules."""
+        """The present vector and the best of some random ones, as they are and as symmetric as the robot is
+        now, of those that keep all rules."""
         moves, random = self._moves, np.random.default_rng(seed)
         if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
-        nearer = [moves.start + share * (drawn - moves.start) for share in (1.0, 0.5, 0.25)]
-        kept = [some[self._rules.broken(some) <= 0.0] for some in nearer]
+        mirrored = moves.mirrored(drawn)
+        ways = [drawn] if np.array_equal(drawn, mirrored) else [drawn, mirrored]
         count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
-        drawn = np.concatenate(kept)[: RANK * count]
-        for k in np.argsort(-hill.guess(drawn), kind="stable")[:count]:
-            yield hill.look(drawn[k])
+        most = -(-count // len(ways))
+        for way in ways:
+            nearer = [moves.start + share * (way - moves.start) for share in (1.0, 0.5, 0.25)]
+            kept = np.concatenate([some[self._rules.broken(some) <= 0.0] for some in nearer])[: RANK * most]
+            for k in np.argsort(-hill.guess(kept), kind="stable")[:most]:
+                yield hill.look(kept[k])
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Whether the search has to stop."""

@@ -118,14 +118,11 @@ class Directions:
             ends = found.normal
         ends = ends / np.linalg.norm(ends, axis=-1, keepdims=True)
         distance = rows.farthest(ends)[0]
-        kept: list[int] = []
-        for k in np.argsort(distance, kind="stable"):
-            same = [j for j in kept if robot[j] == robot[k]]
-            if not same or (ends[same] @ ends[k]).max() < ALIKE:
-                kept.append(int(k))
-            if len(kept) == KEPT:
-                break
-        faces = _Faces(robot[kept], rows.take(np.array(kept)), ends[kept], distance[kept], found.force[kept])
+        alike = (ends @ ends.T >= ALIKE) & (robot[:, None] == robot)
+        order = np.argsort(distance, kind="stable")
+        # Of faces that are alike the nearest counts.
+        kept = order[np.tril(alike[np.ix_(order, order)], -1).sum(axis=1) == 0][:KEPT]
+        faces = _Faces(robot[kept], rows.take(kept), ends[kept], distance[kept], found.force[kept])
         return Look(vector, float(distance[kept[0]]), faces)
 
     def slopes(self, look: Look) -> tuple[Array, Array]:

@@ -151,24 +151,26 @@ def solid_of(hull: Surface) -> HullSolid:
 
 
 def displaced(layout: Layout) -> float:
-    """Water in the hull's place [kg]."""
+    """Returns the mass of the water in the hull's place [kg]. Raises FinlabError: the hull encloses
+    nothing."""
     return water_density(layout) * solid_of(hull_of(layout)).volume
 
 
 def lift_of(body: Body) -> float:
-    """The buoyant force [N]; that of a neutral robot where none is given."""
+    """Returns the buoyant force [N]: the weight where none is given, 0 where no mass is known either."""
     return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
 
 
 def contradicts(layout: Layout) -> bool:
-    """Whether the body's mass is known, and its buoyancy is not that of the hull."""
+    """Says whether the body's mass is known, and its buoyancy differs by more than a tenth from that of the
+    hull. Raises FinlabError: the hull encloses nothing."""
     body, water = layout.body or Body(), displaced(layout)
     return body.mass_kg is not None and abs(lift_of(body) / GRAVITY - water) > DOUBTFUL * water
 
 
 def estimated(layout: Layout) -> Layout:
-    """The layout with what its hull says of the body; a mass that is known stays. Raises FinlabError: the
-    hull encloses nothing."""
+    """Returns the layout with what its hull says of the body, to four digits; a mass that is known stays.
+    Raises FinlabError: the hull encloses nothing."""
     solid, density, body = solid_of(hull_of(layout)), water_density(layout), layout.body or Body()
     mass = body.mass_kg if body.mass_kg is not None else _rounded(density * solid.volume)
     changed = replace(

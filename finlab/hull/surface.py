@@ -123,7 +123,7 @@ class Surface:
         return Surface("mesh", (x, y, z), center, moved, (path, scale), report)
 
     def coarse(self) -> "Surface":
-        """About the same one with few triangles, for questions that are asked thousands of times."""
+        """Returns about the same one with at most 400 triangles, for questions asked thousands of times."""
         return replace(self, mesh=simplified(self.mesh, COARSE_FACES))
 
     @cached_property
@@ -134,18 +134,18 @@ class Surface:
         return corners[good], normal
 
     def nearest(self, point: Array) -> tuple[Array, Array]:
-        """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
+        """Returns the point (3,) [m] of the surface nearest to `point` (3,) [m], and the outward unit normal
+        (3,) there; on an edge the mean of those around it."""
         corners, outward = self._triangles
         nearest = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
         gap = np.linalg.norm(nearest - point, axis=1)
         best = int(np.argmin(gap))
-        # On an edge several triangles are as near; their mean is what a hand would call the normal there.
         normal = outward[gap < gap[best] + 1e-6].sum(axis=0)
         size = float(np.linalg.norm(normal))
         return np.asarray(nearest[best]), outward[best] if size < 1e-9 else normal / size
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points (..., 3) lie inside.
+        """Returns which of the points (..., 3) [m], body frame, lie inside (...,).
 
         Of a shape, which is convex, those behind all triangles; of a mesh those around which the triangles
         fill the whole sphere, by solid angles after Van Oosterom and Strackee (1983).
@@ -166,7 +166,7 @@ class Surface:
         return abs(2.0 * float(np.arctan2(volume, scale).sum()))
 
     def anchor(self, point: Array) -> Array:
-        """Where a strut from a point (3,) meets the surface; the point itself if inside."""
+        """Returns where a strut from a point (3,) meets the surface (3,) [m]; the point itself if inside."""
         return _anchor(self, tuple(np.asarray(point).tolist())).copy()
 
 
@@ -178,7 +178,8 @@ def _anchor(surface: Surface, place: tuple[float, ...]) -> Array:
 
 
 def hull_of(layout: Layout) -> Surface:
-    """The hull that the layout describes, or one that fits between its actuators."""
+    """Returns the hull that the layout describes, body frame [m], or one that fits between its actuators
+    where it describes none, or names a mesh file that cannot be read."""
     described = layout.body.hull if layout.body is not None else None
     if described is not None and described.mesh is not None:
         x, y, z = described.center_m

@@ -79,7 +79,8 @@ class Damage:
         return {kind: known[name] for kind, known in self.partly.items() if name in known}
 
     def with_fault(self, name: str, kind: str, value: Any) -> "Damage":
-        """Returns it with another fault of an actuator; None mends that fault. What is stuck does not run."""
+        """Returns it with another fault of an actuator, with a value as of that field (of `lost` any); None
+        mends that fault. What is stuck does not run. Errors are as on construction."""
         if kind == "lost":
             others = tuple(other for other in self.lost if other != name)
             return replace(self, lost=others if value is None else (*others, name))
@@ -122,8 +123,8 @@ class Damage:
         stuck: Sequence[str] = (),
         running: Sequence[str] = (),
     ) -> "Damage":
-        """Damage from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`. Raises
-        AllocationError: a text that says something else."""
+        """Returns damage from texts, angles in degrees: `bow=0.5` for a share, `bow=20` for an angle,
+        `bow=0.3,1.0,20` for a command. Raises AllocationError: a text that says something else."""
         kept = _named("running", running, 3).items()
         return cls(
             lost,
@@ -134,9 +135,9 @@ class Damage:
         )
 
     def applied_to(self, layout: Layout) -> Layout:
-        """The layout with the limits that are left; the lost ones are still there. Raises LayoutError: there
-        is no actuator of a name, or one whose law is a table is torn; AllocationError: its kind cannot be
-        damaged so."""
+        """Returns the layout with the limits that are left; the lost ones are still there. Raises
+        LayoutError: there is no actuator of a name, or one whose law is a table is torn; AllocationError: its
+        kind cannot be damaged so."""
         return _applied(self, layout) if self.partly else layout
 
 

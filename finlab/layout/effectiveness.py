@@ -79,8 +79,7 @@ def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:
 
     Args:
         fin_force: broadcast with the effectiveness.
-        effectiveness: wrench per newton of each fin (..., n, 3, 6), from `force_effectiveness` of
-            `finlab.layout.effectiveness`.
+        effectiveness: wrench per newton of each fin (..., n, 3, 6), from `force_effectiveness`.
     """
     n = fin_force.shape[-2]
     flat = effectiveness.reshape(*effectiveness.shape[:-3], 3 * n, 6)

@@ -231,8 +231,8 @@ class Layout(Checked):
         return self.actuators[self.index(name)]
 
     def with_part(self, part: Actuator, name: str = "") -> "Layout":
-        """Returns the layout with another actuator in the place of the one of that name, by default its
-        own."""
+        """Returns the layout with another actuator in the place of the one of that name, by default its own.
+        Raises LayoutError: there is none, or the new name is another one's."""
         i = self.index(name or part.name)
         return replace(self, actuators=(*self.actuators[:i], part, *self.actuators[i + 1 :]))
 
@@ -248,7 +248,8 @@ class Layout(Checked):
         return replace(self, actuators=left)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
-        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`."""
+        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`; errors
+        as for `with_part`, and those of the fields."""
         return self.with_part(replace(self.part(name), **changes), name)
 
 

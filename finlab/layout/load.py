@@ -66,11 +66,8 @@ def is_graph(data: Any) -> bool:
 
 
 def layout_in_graph(data: Any) -> dict[str, Any]:
-    """Returns the plain values of the layout file that a graph file holds.
-
-    Raises:
-        LayoutError: a part of the graph is missing, unknown or not what it has to be.
-    """
+    """Returns the plain values of the layout file that a graph file holds. Raises LayoutError: a part of the
+    graph is missing, unknown or not what it has to be."""
     graph = checked(data, Graph)
     names = [node.get("id") for node in graph.nodes]
     if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
@@ -118,11 +115,9 @@ def robot_bytes(robot: Robot) -> bytes:
 
 
 def robot_of(files: Files, source: str) -> Robot:
-    """Returns the robot among the files of a bundle, a folder or archive at the path `source`.
-
-    Raises:
-        LayoutError: it holds no layout, or one that names a force table outside the bundle.
-    """
+    """Returns the robot among the files of a bundle, a folder or archive at the path `source`. Raises
+    LayoutError: it holds no layout, or one that names a force table or a network outside the bundle, or its
+    self-test has commands for another number of actuators."""
     place, folder = f"{source}/{ROBOT}", Path(os.path.abspath(source))
     values = parse_json(decoded(files[ROBOT], place, "JSON", LayoutError), place, LayoutError)
     robot = checked(values, Robot, source=place)
@@ -158,15 +153,15 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     is shipped; write `./A` for a file called `A` there. Relative paths inside a layout file (a force table, a
     hull mesh) are taken from the file's own folder.
 
-    Raises:
-        LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
-        DataError: the bundle cannot be read, or was changed.
+    Raises LayoutError: the file cannot be read or is not a valid layout; the message names file and key;
+    DataError: the bundle cannot be read, or was changed.
     """
     return layout_and_failed(layout)[0]
 
 
 def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
-    """A layout as `load_layout` opens it, and the actuators that a bundle marks as failed."""
+    """Returns a layout as `load_layout` opens it, with its errors, and the names of the actuators that a
+    bundle marks as failed; none of a file."""
     file = layout_path(layout)
     source = str(layout)
     if is_bundle(file):
@@ -179,11 +174,8 @@ def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str
 def layout_in(
     text: str, suffix: str, source: str, folder: Path | None = None, *, may_open: bool = True
 ) -> Layout:
-    """The layout in the text of a file whose name ends in `suffix`; the rest as for `parse_layout`.
-
-    Raises:
-        LayoutError: it is no JSON or YAML, or no layout.
-    """
+    """Returns the layout in the text of a file whose name ends in `suffix`; the rest as for `parse_layout`.
+    Raises LayoutError: it is no JSON or YAML, or no layout."""
     parse = parse_json if suffix.lower() == ".json" else parse_yaml
     data = parse(text, source, LayoutError)
     if is_graph(data):
@@ -193,11 +185,8 @@ def layout_in(
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:
-    """The path that a user means: text may be the name of a shipped layout, a `Path` is always a path.
-
-    Raises:
-        LayoutError: there is neither a shipped layout nor anything else of this name.
-    """
+    """Returns the path that a user means: text may be the name of a shipped layout, a `Path` is always a
+    path. Raises LayoutError: there is neither a shipped layout nor anything else of this name."""
     if not isinstance(layout, str):
         return Path(layout)
     shipped = shipped_layouts()

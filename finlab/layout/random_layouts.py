@@ -227,14 +227,15 @@ def random_shaft_fin(rng: np.random.Generator, name: str, size: float) -> Fin:
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number whose logarithm is uniform."""
+    """Returns a number whose logarithm is uniform between those of two numbers above 0."""
     return math.exp(rng.uniform(math.log(low), math.log(high)))
 
 
 def random_fin_model(
     rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
 ) -> FinModelSpec:
-    """A fin with random numbers, of one kind or of each equally often."""
+    """Returns a fin model with random numbers, of one kind (a key of `families`) or of each equally often;
+    numbers that its family does not name stay as they are by default."""
     kind = kind or str(rng.choice(list(families)))
     drawn = {
         name: log_uniform(rng, *ends) if name in LOGARITHMIC else float(rng.uniform(*ends))
@@ -278,8 +279,8 @@ def _law(rng: np.random.Generator) -> PowerLaw:
 
 
 def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], list[FinKind]]:
-    """`count` fins with nominal limits, and as many with limits drawn as in split `limits`; half of the soft
-    ones push alike in all directions. Few, since compiling one takes as long as many answers."""
+    """Returns `count` fins with nominal limits, and as many with limits drawn as in split `limits`; half of
+    the soft ones push alike in all directions. Few, since compiling one takes as long as many answers."""
     models = [random_fin_model(rng, None, WIDE) for _ in range(2 * count)]
     for k, model in enumerate(models):
         if model.type == "soft" and rng.random() < 0.5:
@@ -290,7 +291,7 @@ def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], l
 
 
 def random_fin_robot(rng: np.random.Generator, kinds: tuple[list[FinKind], list[FinKind]], n: int) -> Layout:
-    """Draw a robot of n fins to learn from; none is one that is evaluated.
+    """Returns a robot of n fins to learn from, of `random_kinds`; none is one that is evaluated.
 
     Fins are of one kind or each of its own, half of the robots have limits of their own, and a third are
     symmetric, where fins are equals and only chance can tell them apart.

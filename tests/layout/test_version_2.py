@@ -25,17 +25,10 @@ from finlab.layout import (
 from finlab.layout.damage import Damage
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
+from tests.layout.test_other_actuators import AZIMUTH, RUDDER, THRUSTER, TILT
 from tools.schemas import PACKAGE
 
-LAW = {"type": "power_law", "forward": 0.997, "reverse": 1.449, "exponent": 1.5}
-THRUSTER = {
-    "type": "thruster",
-    "position_m": [0, 0.2, 0],
-    "axis": [0, 0, 1],
-    "force_n": [-39.91, 51.44],
-    "model": LAW,
-}
-PUSH = {"force_n": [0, 30], "model": {"type": "power_law", "forward": 1.0}}
+LIFT = {**THRUSTER, "axis": [0, 0, 1], "torque_per_newton_m": 0.0}
 GOOD = {
     "format": "finlab-layout",
     "version": 2,
@@ -43,34 +36,10 @@ GOOD = {
     "actuators": [
         {"name": "side", "type": "fin", "position_m": [0.2, -0.1, 0], "mounting_angle_deg": -60.0},
         {"name": "tail", "type": "fin", "position_m": [-0.4, 0, 0], "shaft": [0, 0, 1], "zero": [1, 0, 0]},
-        {"name": "lift", **THRUSTER},
-        {
-            "name": "pod",
-            "type": "azimuth",
-            "position_m": [-0.3, 0, -0.1],
-            "turn_axis": [0, 0, 1],
-            "zero": [1, 0, 0],
-            **PUSH,
-        },
-        {
-            "name": "nose",
-            "type": "tilt",
-            "position_m": [0.3, 0, 0],
-            "turn_axis": [0, 1, 0],
-            "zero": [0, 0, 1],
-            "arc_deg": [-30, 30],
-            **PUSH,
-        },
-        {
-            "name": "rudder",
-            "type": "rudder",
-            "position_m": [-0.6, 0, 0],
-            "shaft": [0, 0, 1],
-            "zero": [1, 0, 0],
-            "area_m2": 0.01,
-            "aspect_ratio": 2.2,
-            "deflection_deg": [-25, 25],
-        },
+        LIFT,
+        {**AZIMUTH, "name": "pod"},
+        {**TILT, "name": "nose"},
+        RUDDER,
     ],
 }
 
@@ -99,7 +68,7 @@ def test_all_types_are_read_and_written(tmp_path):
     assert layout.names == ("side", "tail", "lift", "pod", "nose", "rudder")
     assert layout.lower.shape == layout.upper.shape == layout.position.shape == (6, 3)
     assert layout.upper[2].tolist() == [51.44, 0.0, 0.0]
-    assert layout.upper[4].tolist() == [math.radians(30), 30.0, 0.0]
+    assert layout.upper[4].tolist() == [math.radians(30), 20.0, 0.0]
     written = layout_to_dict(layout)
     assert written["version"] == 2 and parse_layout(json.loads(json.dumps(written))) == layout
     jsonschema.validate(GOOD, json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
@@ -169,11 +138,7 @@ def test_the_effectiveness_is_force_and_lever():
 BAD = [
     ("actuators[2].name", edited(2, name="tail"), "'tail' is already the name of actuator 2"),
     ("actuators", {**GOOD, "actuators": []}, "a list of 1 to 64 values, got 0"),
-    (
-        "actuators",
-        {**GOOD, "actuators": [{**THRUSTER, "name": f"t{i}"} for i in range(65)]},
-        "values, got 65",
-    ),
+    ("actuators", {**GOOD, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]}, "values, got 65"),
     ("fins", {**GOOD, "fins": []}, "unknown key"),
     ("actuators", {**GOOD, "version": 1}, "unknown key"),
     ("version", {**GOOD, "version": 3}, "reads version 1 and 2, got 3"),
@@ -193,7 +158,7 @@ BAD = [
     ("actuators[2].axis", edited(2, axis=[0, 1, 1]), "a unit vector, got one of length 1.41421"),
     ("actuators[2].axis", edited(2, axis=...), "required key is missing"),
     ("actuators[2].force_n", edited(2, force_n=[3, 2]), ""),
-    ("actuators[2].model.exponent", edited(2, model={**LAW, "exponent": 1.0}), "must lie within"),
+    ("actuators[2].model.exponent", edited(2, model={**LIFT["model"], "exponent": 1.0}), "must lie within"),
     ("actuators[3].turn_axis", edited(3, turn_axis=[0, 0, 2]), ""),
     ("actuators[5].deflection_deg", edited(5, deflection_deg=[25, -25]), "25 and -25"),
 ]
@@ -236,7 +201,7 @@ def test_damage_leaves_the_other_actuators_as_they_are():
     health = Damage(weak={"side": 0.5, "lift": 0.5, "pod": 0.5}, stuck={"nose": 0.1})
     damaged = health.applied_to(layout)
     assert damaged.names == layout.names
-    assert damaged.upper[[0, 2, 3], [0, 0, 1]].tolist() == [0.3, 25.72, 15.0]
+    assert damaged.upper[[0, 2, 3], [0, 0, 1]].tolist() == [0.3, 25.72, 10.0]
     assert damaged.lower[2, 0] == pytest.approx(-19.955)
     assert (damaged.lower[4, 0], damaged.upper[4, 0]) == (0.1, 0.1)
     assert (damaged.actuators[1], damaged.actuators[5]) == (layout.actuators[1], layout.actuators[5])
