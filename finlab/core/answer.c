@@ -184,7 +184,6 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
     if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_CLOSEST && !are_within(policy->weight, 6, 1)) return FL_BAD_ARGUMENT;
-    if (policy->policy == FL_PRIORITY && sizeof(real) < sizeof(double)) return FL_NEEDS_DOUBLE;
   }
   for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
     if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 typedef fl_real real;
+typedef fl_wide wide;
 #ifdef FL_SINGLE
 #define R(x) x##f
 #define SQRT sqrtf
@@ -20,8 +21,8 @@ typedef fl_real real;
 #define ENOUGH R(1e-4) /* the same where Newton's method stands still for IDLE steps; commands make up for it */
 #define IDLE 6
 #define ROUNDING R(1e-6)
-#define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
-#define STALLED R(2e-5) /* the same where planes across misses, by rounding, bound a ray no further */
+#define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
+#define CLOSE_BY 1e-9 /* distance, on the yardstick, up to which a point is the nearest one */
 #define SAME R(1e-4) /* misses of a policy that differ by less are the same */
 #define TINY R(1e-30)
 #else
@@ -37,9 +38,9 @@ typedef fl_real real;
 #define TOLERANCE 1e-10
 #define ENOUGH TOLERANCE
 #define IDLE MOST_STEPS
+#define EXACT 1e-8
 #define ROUNDING 1e-12
-#define CLOSE_BY NOTHING
-#define STALLED R(1.0)
+#define CLOSE_BY 1e-9
 #define SAME NEARLY
 #define TINY 1e-300
 #endif
@@ -129,9 +130,10 @@ void on_ray(const real *block, fl_work *work, const real *wrench, real found, re
 
 /* nearest.c */
 void weigh(const real *block, fl_work *work, const real *weight);
-void nearest_point(const real *block, const fl_work *work, const real *target, real close, real apart, fl_mixture *m);
-real farthest_along(const real *block, const fl_work *work, const real *from, const real *ray, real least, real most,
-                    real close, fl_mixture *m, real *plane);
+void point_of(const real *block, const fl_work *work, real force[][2], wide *point);
+wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
+wide farthest_along(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
+                    wide close, fl_mixture *m, wide *plane);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 
 /* law.c */
@@ -140,7 +142,6 @@ void command_for(const real *block, int i, const fl_box *box, const real *force,
 void reach_of(const real *block, int i, const fl_box *box, real *limits);
 
 /* command.c */
-#define EXACT R(1e-8)
 #define TICK_STEPS 5
 void all_limits(const real *block, fl_box *box);
 void tick_limits(const real *block, const real *previous, fl_box *box);

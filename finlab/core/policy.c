@@ -6,14 +6,15 @@
    all lies in none. */
 #include "inner.h"
 
-#define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
+#define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
-#define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
+#define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                     real force[][2]) {
   const fl_head *h = HEAD(block);
-  real weight[6], target[6];
+  real weight[6];
+  wide target[6];
   for (int k = 0; k < 6; k++) {
     weight[k] = MAX(policy->weight[k], CLOSE) / h->yard[k];
     target[k] = weight[k] * wrench[k];
@@ -26,7 +27,8 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
 
 static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], begin[6], ray[6], all[6], plane[6], size, rest;
+  real target[6], weight[6], all[6], size, rest;
+  wide begin[6], ray[6], plane[6];
   for (int k = 0; k < 6; k++) {
     weight[k] = 1 / h->yard[k];
     all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
@@ -49,40 +51,38 @@ static real size_in(const unsigned char *group, const real *missing) {
 /* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
 static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      real force[][2]) {
-  const fl_head *h = HEAD(block);
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
-  real aim[6];
-  int any = 0;
-  memcpy(aim, wrench, sizeof aim);
+  wide wanted[6], aim[6], got[6]; /* on the yardstick */
+  for (int k = 0; k < 6; k++) wanted[k] = aim[k] = (wide)wrench[k] / (wide)HEAD(block)->yard[k];
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
     const unsigned char *group = policy->group[g];
-    real weight[6], target[6], got[6], missing[6], missed = 0;
-    for (int k = 0; k < 6; k++) weight[k] = (HELD * held[k] + group[k]) / h->yard[k];
+    real weight[6];
+    wide target[6], missed, far;
+    for (int k = 0; k < 6; k++) weight[k] = (real)(HELD * held[k] + group[k]) / HEAD(block)->yard[k];
     weigh(block, work, weight);
-    for (int round = 0; round < (any ? ROUNDS : 1); round++) {
-      m->done = 0;
-      for (int p = 0; p < m->count; p++) { /* the points so far, in the axes of this group */
-        wrench_of(block, m->force[p], m->point[p]);
-        for (int k = 0; k < 6; k++) m->point[p][k] *= weight[k];
+    m->done = 0; /* the points so far, in the axes of this group: */
+    for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
+    for (int round = 0;; round++) {
+      for (int k = 0; k < 6; k++) target[k] = (HELD * held[k] + group[k]) * aim[k];
+      far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m), missed = 0;
+      for (int k = 0; k < 6; k++) {
+        if (!group[k]) continue;
+        got[k] = aim[k] + m->miss[k] / (HELD * held[k] + 1);
+        missed += (wanted[k] - got[k]) * (wanted[k] - got[k]);
       }
-      for (int k = 0; k < 6; k++) target[k] = aim[k] * weight[k];
-      nearest_point(block, work, target, CLOSE_BY * (any ? HELD : 1), 0, m);
-      mixed_force(block, m, force);
-      wrench_of(block, force, got);
-      for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k];
-      missed = size_in(group, missing);
-      if (missed <= PULL || dot(m->miss, m->miss, 6) <= 4 * PULL * PULL) break;
+      missed = sqrt(missed);
+      if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
       for (int k = 0; k < 6; k++)
-        if (group[k]) aim[k] = got[k] + PULL / missed * (wrench[k] - got[k]);
+        if (group[k]) aim[k] = got[k] + PULL / missed * (wanted[k] - got[k]);
     }
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
       if (group[k] && missed > NEARLY) aim[k] = got[k];
     }
-    any = 1;
   }
+  mixed_force(block, m, force);
 }
 
 static real rounded(real value) { return FLOOR(value / SAME + R(0.5)) * SAME; }
