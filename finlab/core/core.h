@@ -147,8 +147,8 @@ typedef struct {
   int placed;                /* 1 where the commands are those of a search, for foils */
 } fl_answer;
 
-/* Error codes; 0 is none. FL_PRIORITY needs double precision. */
-enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT, FL_NEEDS_DOUBLE };
+/* Error codes; 0 is none. */
+enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
 
 int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */

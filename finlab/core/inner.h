@@ -23,7 +23,6 @@ typedef fl_wide wide;
 #define ROUNDING R(1e-6)
 #define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
 #define CLOSE_BY 1e-9 /* distance, on the yardstick, up to which a point is the nearest one */
-#define SAME R(1e-4) /* misses of a policy that differ by less are the same */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -41,7 +40,6 @@ typedef fl_wide wide;
 #define EXACT 1e-8
 #define ROUNDING 1e-12
 #define CLOSE_BY 1e-9
-#define SAME NEARLY
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
@@ -94,9 +92,8 @@ void set_up(const real *block, int i, fl_set *set);
 void freeze(const real *block, int i, fl_set *set, const real *force);
 real cost_at(const real *block, int i, real force);
 reply reply_of(const real *block, int i, const fl_set *set, const real *price);
-void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force);
+void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force, real *ways);
 real drag_of(const real *block, int i, real force);
-void along_of(const real *block, int i, const fl_set *set, const real *price, real *ahead, real *back);
 int undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
 /* newton.c */
@@ -129,6 +126,8 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
 void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
 
 /* nearest.c */
+wide product(const wide *a, const wide *b, int n);
+void add(wide *to, wide times, const wide *other);
 void weigh(const real *block, fl_work *work, const real *weight);
 void point_of(const real *block, const fl_work *work, real force[][2], wide *point);
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);

@@ -29,14 +29,14 @@ static void best_corner(const real *polygon, const real *price, real *force) {
     if (dot(price, at, 2) > most) most = dot(price, at, 2), force[0] = at[0], force[1] = at[1];
 }
 
-static wide product(const wide *a, const wide *b, int n) {
+wide product(const wide *a, const wide *b, int n) {
   wide sum = 0;
   for (int k = 0; k < n; k++) sum += a[k] * b[k];
   return sum;
 }
 
 /* Adds a vector (6,) so many times. */
-static void add(wide *to, wide times, const wide *other) {
+void add(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
 
@@ -53,11 +53,11 @@ static void farthest(const real *block, const fl_work *work, const wide *normal,
   real price[6], (*force)[2] = m->force[m->count];
   for (int k = 0; k < 6; k++) price[k] = (real)normal[k];
   for (int i = 0; i < COUNT(block); i++) {
-    real own[2] = {dot(work->column[i][0], price, 6), dot(work->column[i][1], price, 6)};
+    real own[2] = {dot(work->column[i][0], price, 6), dot(work->column[i][1], price, 6)}, ways[2];
     if (work->corners[i] > 0)
       best_corner(block + work->corners[i], own, force[i]);
     else
-      farthest_of(block, i, work->set + i, own, force[i]);
+      farthest_of(block, i, work->set + i, own, force[i], ways);
   }
   point_of(block, work, force, m->point[m->count]);
 }

@@ -18,15 +18,6 @@ void to_basis(const real *block, const real *wrench, real *target) {
   }
 }
 
-/* Prices in the basis of those of the wrench. */
-void price_in_basis(const real *block, const real *price, real *inner) {
-  const fl_head *h = HEAD(block);
-  for (int j = 0; j < RANGE(block); j++) {
-    inner[j] = 0;
-    for (int k = 0; k < 6; k++) inner[j] += h->basis[k][j] * h->scale[k] * price[k];
-  }
-}
-
 /* How much of a scaled wrench lies beside the range, and its size. */
 real beside_range(const real *block, const real *wrench, const real *target, real *size) {
   const fl_head *h = HEAD(block);

@@ -10,25 +10,30 @@
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
-static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                    real force[][2]) {
-  const fl_head *h = HEAD(block);
+static wide size_in(const unsigned char *group, const wide *missing) {
+  wide sum = 0;
+  for (int k = 0; k < 6; k++) sum += group[k] ? missing[k] * missing[k] : 0;
+  return sqrt(sum);
+}
+
+static real rounded(wide value) { return (real)(floor(value / NEARLY + 0.5) * NEARLY); }
+
+static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
   real weight[6];
   wide target[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = MAX(policy->weight[k], CLOSE) / h->yard[k];
+    weight[k] = MAX(policy->weight[k], CLOSE) / HEAD(block)->yard[k];
     target[k] = weight[k] * wrench[k];
   }
   weigh(block, work, weight);
   work->mixture.count = 0;
-  nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
-  mixed_force(block, &work->mixture, force);
+  score[0] = (real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
 }
 
-static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
+static void direction(const real *block, fl_work *work, const real *wrench, real *score) {
   const fl_head *h = HEAD(block);
   real target[6], weight[6], all[6], size, rest;
-  wide begin[6], ray[6], plane[6];
+  wide begin[6], ray[6], plane[6], share;
   for (int k = 0; k < 6; k++) {
     weight[k] = 1 / h->yard[k];
     all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
@@ -38,22 +43,17 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
     ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
   weigh(block, work, weight);
-  farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
-  mixed_force(block, &work->mixture, force);
-}
-
-static real size_in(const unsigned char *group, const real *missing) {
-  real sum = 0;
-  for (int k = 0; k < 6; k++) sum += group[k] ? missing[k] * missing[k] : 0;
-  return SQRT(sum);
+  share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
+  wide *miss = work->mixture.miss, more = product(miss, ray, 6) / MAX(product(ray, ray, 6), 1e-300);
+  add(miss, -more, ray);
+  score[0] = rounded(sqrt(product(miss, miss, 6))), score[1] = (real)(1 - share - more);
 }
 
 /* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
-static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                     real force[][2]) {
+static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
-  wide wanted[6], aim[6], got[6]; /* on the yardstick */
+  wide wanted[6], aim[6], missing[6] = {0}; /* on the yardstick */
   for (int k = 0; k < 6; k++) wanted[k] = aim[k] = (wide)wrench[k] / (wide)HEAD(block)->yard[k];
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
@@ -66,51 +66,33 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
     for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
     for (int round = 0;; round++) {
       for (int k = 0; k < 6; k++) target[k] = (HELD * held[k] + group[k]) * aim[k];
-      far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m), missed = 0;
-      for (int k = 0; k < 6; k++) {
-        if (!group[k]) continue;
-        got[k] = aim[k] + m->miss[k] / (HELD * held[k] + 1);
-        missed += (wanted[k] - got[k]) * (wanted[k] - got[k]);
-      }
-      missed = sqrt(missed);
+      far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m);
+      for (int k = 0; k < 6; k++)
+        if (group[k]) missing[k] = wanted[k] - aim[k] - m->miss[k] / (HELD * held[k] + 1);
+      missed = size_in(group, missing);
       if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
       for (int k = 0; k < 6; k++)
-        if (group[k]) aim[k] = got[k] + PULL / missed * (wanted[k] - got[k]);
+        if (group[k]) aim[k] = wanted[k] - (1 - PULL / missed) * missing[k];
     }
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
-      if (group[k] && missed > NEARLY) aim[k] = got[k];
+      if (group[k] && missed > NEARLY) aim[k] = wanted[k] - missing[k];
     }
+    score[g] = rounded(missed);
   }
-  mixed_force(block, m, force);
 }
-
-static real rounded(real value) { return FLOOR(value / SAME + R(0.5)) * SAME; }
 
 /* Serves a policy within the sets of a part; how badly, the first number counting most. */
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real force[][2],
                   real *score) {
-  const fl_head *h = HEAD(block);
-  real got[6], missing[6], along[6], left;
-  if (policy->policy == FL_DIRECTION)
-    direction(block, work, wrench, force);
-  else if (policy->policy == FL_PRIORITY)
-    priority(block, work, wrench, policy, force);
-  else
-    closest(block, work, wrench, policy, force);
-  wrench_of(block, force, got);
   memset(score, 0, FL_SCORES * sizeof *score);
-  for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = (wrench[k] + h->beside[k]) / h->yard[k];
-  if (policy->policy == FL_PRIORITY)
-    for (int g = 0; g < policy->groups; g++) score[g] = rounded(size_in(policy->group[g], missing));
-  else if (policy->policy == FL_DIRECTION) {
-    left = dot(missing, along, 6) / MAX(dot(along, along, 6), TINY);
-    for (int k = 0; k < 6; k++) missing[k] -= left * along[k];
-    score[0] = rounded(SQRT(dot(missing, missing, 6))), score[1] = left;
-  } else {
-    for (int k = 0; k < 6; k++) missing[k] *= MAX(policy->weight[k], CLOSE);
-    score[0] = SQRT(dot(missing, missing, 6));
-  }
+  if (policy->policy == FL_DIRECTION)
+    direction(block, work, wrench, score);
+  else if (policy->policy == FL_PRIORITY)
+    priority(block, work, wrench, policy, score);
+  else
+    closest(block, work, wrench, policy, score);
+  mixed_force(block, &work->mixture, force);
 }
 
 static int is_less(const real *a, const real *b) {
@@ -154,7 +136,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     memcpy(out->inner, work->now->price, sizeof out->inner);
     if (met) {
       memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
-      if (work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
+      if (work->now->size > TOLERANCE && work->now->size <= AT_RIM) wrench_of(block, out->force, out->aim);
       return;
     }
   }

@@ -28,8 +28,8 @@ SAMPLES = 24
 """Questions of a self-test."""
 ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
-NOT_ABOARD = "jets.c", "turns.c", "reach.c"
-"""Files of the core for robots with `interaction`, and for what a layout can do."""
+NOT_ABOARD = "jets.c", "turns.c", "reach.c", "for_python.c"
+"""Files of the core for robots with `interaction`, and for what a layout can do and prices prove."""
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
