@@ -36,7 +36,7 @@ static void draw_tangent(const real *block, int i, const fl_box *box, real angle
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
-static real cost_of(const real *block, real command[][3], real force[][2]) {
+real cost_of(const real *block, real command[][3], real force[][2]) {
   real cost = 0, own[3];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -123,8 +123,7 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
       size *= R(0.25);
     if (FABS(gain) <= CHEAPER * cost) break;
   }
-  memcpy(work->set, before, sizeof before);
-  sums_of(block, work);
+  take_sets(block, work, before);
   return cost;
 }
 
@@ -177,8 +176,7 @@ void place_starts(const real *block, fl_work *work, const real *target, real *be
     }
   if (*best <= enough) return;
   first_price(block, work, target, price, &ridge);
-  work->now = work->state;
-  look(block, work, target, price, work->state);
+  stand_at(block, work, target, price);
   place(block, work, target, best);
 }
 
@@ -202,7 +200,7 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
   if (!(status == FL_MET && are_sure(block, work))) {
     if (!least_power(block, work, target, status, &bound)) return 0;
     if (status != FL_MET) { /* prices at the commands may prove more */
-      look(block, work, target, work->near, work->state);
+      stand_at(block, work, target, work->near);
       if (work->state->value > value) memcpy(out->inner, work->near, sizeof out->inner);
     }
   }

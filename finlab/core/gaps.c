@@ -223,14 +223,11 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   memcpy(price, work->now->price, sizeof price);
   if (work->drags) {
     place_starts(block, work, target, &best);
-    look(block, work, target, price, work->state);
-    work->now = work->state;
+    stand_at(block, work, target, price);
   }
   dive(block, work, target, status, &best);
-  memcpy(work->set, work->kept, sizeof work->kept);
-  sums_of(block, work);
-  look(block, work, target, price, work->state);
-  work->now = work->state;
+  take_sets(block, work, work->kept);
+  stand_at(block, work, target, price);
   for (status = root;;) {
     fl_state *s = work->now;
     real own = s->value;
@@ -254,8 +251,7 @@ int least_power(const real *block, fl_work *work, const real *target, int status
     take_side(block, work, node, -node->first);
     status = newton(block, work, target, node->price, STEPS_AT_KINK);
   }
-  memcpy(work->set, work->kept, sizeof work->kept);
-  sums_of(block, work);
+  take_sets(block, work, work->kept);
   *value = bound;
   return best < R(1e30);
 }

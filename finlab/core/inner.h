@@ -99,6 +99,8 @@ int undecided(const real *block, int i, const fl_set *set, const real *price, re
 /* newton.c */
 #define MOST_STEPS 200
 void sums_of(const real *block, fl_work *work);
+void take_sets(const real *block, fl_work *work, const fl_set *set);
+void stand_at(const real *block, fl_work *work, const real *target, const real *price);
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
@@ -120,6 +122,7 @@ fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
 /* drag.c */
+real cost_of(const real *block, real command[][3], real force[][2]);
 void place(const real *block, fl_work *work, const real *target, real *best);
 void place_starts(const real *block, fl_work *work, const real *target, real *best);
 int with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
@@ -127,6 +130,7 @@ void on_ray(const real *block, fl_work *work, const real *wrench, real found, re
 
 /* nearest.c */
 wide product(const wide *a, const wide *b, int n);
+wide length_of(const wide *a);
 void add(wide *to, wide times, const wide *other);
 void weigh(const real *block, fl_work *work, const real *weight);
 void point_of(const real *block, const fl_work *work, real force[][2], wide *point);

@@ -35,6 +35,8 @@ wide product(const wide *a, const wide *b, int n) {
   return sum;
 }
 
+wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+
 /* Adds a vector (6,) so many times. */
 void add(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
@@ -85,14 +87,14 @@ static void affine(fl_mixture *m, const wide *target, wide *share) {
     memcpy(q, m->point[j], sizeof rest);
     add(q, -1, m->point[0]);
     for (int i = 1; i < j; i++) m->r[i][j] = 0;
-    m->r[j][j] = size = sqrt(product(q, q, 6));
+    m->r[j][j] = size = length_of(q);
     for (int twice = 0; twice < 2 && !(twice && m->r[j][j] > 0.1 * size); twice++) {
       for (int i = 1; i < j; i++) {
         wide part = product(m->q[i], q, 6);
         m->r[i][j] += part;
         add(q, -part, m->q[i]);
       }
-      m->r[j][j] = sqrt(product(q, q, 6));
+      m->r[j][j] = length_of(q);
     }
     if (m->r[j][j] <= BARELY * size) m->r[j][j] = 0;
     wide over = m->r[j][j] > 0 ? 1 / m->r[j][j] : 0;
@@ -117,7 +119,7 @@ static void affine(fl_mixture *m, const wide *target, wide *share) {
 static void mix(fl_mixture *m, const wide *target) {
   wide wanted[FL_POINTS];
   while (m->count > 1) {
-    wide step = 1, sum = 0;
+    wide step = 1;
     int all = 1;
     affine(m, target, wanted);
     for (int k = 0; k < m->count; k++)
@@ -133,8 +135,6 @@ static void mix(fl_mixture *m, const wide *target) {
     m->share[least_share(m)] = 0;
     for (int k = m->count - 1; k >= 0; k--)
       if (m->share[k] <= BARELY) drop(m, k);
-    for (int k = 0; k < m->count; k++) sum += m->share[k];
-    for (int k = 0; k < m->count; k++) m->share[k] /= sum;
   }
   m->share[0] = 1;
 }
@@ -153,7 +153,7 @@ wide nearest_point(const real *block, const fl_work *work, const wide *target, w
     add(normal, 1, target);
     for (int p = 0; p < m->count; p++) add(normal, -m->share[p], m->point[p]);
     for (int j = 0; j < 6; j++) m->miss[j] = -normal[j];
-    wide size = sqrt(product(normal, normal, 6)), gain = 0;
+    wide size = length_of(normal), gain = 0;
     if (size <= close) return size;
     if (m->count == FL_POINTS) drop(m, least_share(m)); /* more than an affine basis */
     farthest(block, work, normal, m);
@@ -184,7 +184,7 @@ wide farthest_along(const real *block, const fl_work *work, const wide *from, co
     wide miss = nearest_point(block, work, target, close, 0.5, m);
     for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
     if (size == least || miss <= 2 * close || (size >= last && miss <= 1)) break;
-    last = size >= last ? size - miss / (2 * sqrt(product(ray, ray, 6))) : size;
+    last = size >= last ? size - miss / (2 * length_of(ray)) : size;
     size = last;
   }
   return size;

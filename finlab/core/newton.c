@@ -77,6 +77,11 @@ void sums_of(const real *block, fl_work *work) {
   }
 }
 
+void take_sets(const real *block, fl_work *work, const fl_set *set) {
+  memcpy(work->set, set, sizeof work->set);
+  sums_of(block, work);
+}
+
 /* What prices give for a target in the basis. */
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
   int n = COUNT(block), r = RANGE(block);
@@ -110,6 +115,12 @@ void look(const real *block, const fl_work *work, const real *target, const real
   }
   state->value = dot(price, target, r) - conjugate;
   state->size = SQRT(dot(state->residual, state->residual, r));
+}
+
+/* Has Newton's method be at prices. */
+void stand_at(const real *block, fl_work *work, const real *target, const real *price) {
+  work->now = work->state;
+  look(block, work, target, price, work->state);
 }
 
 /* Prices to begin with: those that come nearest to the marginal costs of the forces of quadratic costs,
@@ -162,8 +173,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   fl_state *s = work->state, *trial = work->state + 1;
   real first[6], step[6], next[6], ridge = NEARLY, growth = 2, most = work->most_cost * (1 + NOTHING) + NOTHING;
   if (!price) first_price(block, work, target, first, &ridge);
-  look(block, work, target, price ? price : first, s);
-  work->now = s;
+  stand_at(block, work, target, price ? price : first);
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
   for (int k = 0, idle = 0;; k++) {
     if (s->size <= work->enough) return FL_MET;

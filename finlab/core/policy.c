@@ -10,12 +10,6 @@
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
-static wide size_in(const unsigned char *group, const wide *missing) {
-  wide sum = 0;
-  for (int k = 0; k < 6; k++) sum += group[k] ? missing[k] * missing[k] : 0;
-  return sqrt(sum);
-}
-
 static real rounded(wide value) { return (real)(floor(value / NEARLY + 0.5) * NEARLY); }
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
@@ -46,20 +40,20 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
   wide *miss = work->mixture.miss, more = product(miss, ray, 6) / MAX(product(ray, ray, 6), 1e-300);
   add(miss, -more, ray);
-  score[0] = rounded(sqrt(product(miss, miss, 6))), score[1] = (real)(1 - share - more);
+  score[0] = rounded(length_of(miss)), score[1] = (real)(1 - share - more);
 }
 
 /* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
 static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
-  wide wanted[6], aim[6], missing[6] = {0}; /* on the yardstick */
+  wide wanted[6], aim[6]; /* on the yardstick */
   for (int k = 0; k < 6; k++) wanted[k] = aim[k] = (wide)wrench[k] / (wide)HEAD(block)->yard[k];
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
     const unsigned char *group = policy->group[g];
     real weight[6];
-    wide target[6], missed, far;
+    wide target[6], missing[6] = {0}, missed, far;
     for (int k = 0; k < 6; k++) weight[k] = (real)(HELD * held[k] + group[k]) / HEAD(block)->yard[k];
     weigh(block, work, weight);
     m->done = 0; /* the points so far, in the axes of this group: */
@@ -69,7 +63,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
       far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m);
       for (int k = 0; k < 6; k++)
         if (group[k]) missing[k] = wanted[k] - aim[k] - m->miss[k] / (HELD * held[k] + 1);
-      missed = size_in(group, missing);
+      missed = length_of(missing);
       if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
       for (int k = 0; k < 6; k++)
         if (group[k]) aim[k] = wanted[k] - (1 - PULL / missed) * missing[k];
@@ -148,21 +142,19 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
 static void better_side(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_node *node,
                         real force[][2], real *score) {
   real other[FL_MOST][2];
-  int side = nearer_side(block, node->cut, &node->before, node->force);
-  take_side(block, work, node, side);
-  serve(block, work, wrench, policy, force, score);
-  take_side(block, work, node, -side);
+  node->first = nearer_side(block, node->cut, &node->before, node->force);
+  take_side(block, work, node, -node->first);
   serve(block, work, wrench, policy, other, node->score);
-  node->first = side;
-  if (is_less(node->score, score)) {
-    real kept[FL_SCORES];
-    memcpy(kept, score, sizeof kept);
-    memcpy(score, node->score, sizeof kept);
-    memcpy(node->score, kept, sizeof kept);
-    memcpy(force, other, COUNT(block) * sizeof *other);
-    node->first = -side;
-  } else
-    take_side(block, work, node, side);
+  take_side(block, work, node, node->first);
+  serve(block, work, wrench, policy, force, score);
+  if (!is_less(node->score, score)) return;
+  for (int k = 0; k < FL_SCORES; k++) {
+    real kept = score[k];
+    score[k] = node->score[k], node->score[k] = kept;
+  }
+  memcpy(force, other, COUNT(block) * sizeof *other);
+  node->first = -node->first;
+  take_side(block, work, node, node->first);
 }
 
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
@@ -192,9 +184,8 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
     take_side(block, work, node, -node->first);
     serve(block, work, wrench, policy, own, score);
   }
-  memcpy(work->set, work->best_set, sizeof work->set);
+  take_sets(block, work, work->best_set);
   *share = 1 - best[1];
-  sums_of(block, work);
 }
 
 void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
@@ -209,8 +200,7 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
   cheapest(block, work, force, inside, wanted, policy->policy == FL_DIRECTION ? TOLERANCE : AT_RIM, out);
-  memcpy(work->set, work->kept, sizeof work->set);
-  sums_of(block, work);
+  take_sets(block, work, work->kept);
   if (!may_have_gaps(block, work, out->force)) return;
   to_basis(block, out->aim, target); /* another part of the sets may give it for less */
   int status = newton(block, work, target, 0, MOST_STEPS);
