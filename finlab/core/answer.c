@@ -190,23 +190,3 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
 }
-
-/* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands
-   (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
-int fl_answer_many(const real *block, fl_work *work, const real *wrench, int count, const fl_policy *policy,
-                   real *force, real *price, real *aim, real *value, real *command, unsigned char *within) {
-  int n = COUNT(block), ended = 0;
-  fl_question q = {{0}, policy, 0, 0};
-  fl_answer out;
-  for (int k = 0; k < count; k++) {
-    memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
-    int error = fl_answer_one(block, work, &q, &out);
-    if (error) return error;
-    memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
-    memcpy(price + 6 * k, out.price, sizeof out.price);
-    memcpy(aim + 6 * k, out.aim, sizeof out.aim);
-    memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
-    value[k] = out.value, within[k] = out.within, ended |= out.ended;
-  }
-  return ended ? -1 : 0;
-}

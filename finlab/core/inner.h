@@ -22,7 +22,6 @@ typedef fl_wide wide;
 #define IDLE 6
 #define ROUNDING R(1e-6)
 #define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
-#define CLOSE_BY 1e-9 /* distance, on the yardstick, up to which a point is the nearest one */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -39,11 +38,11 @@ typedef fl_wide wide;
 #define IDLE MOST_STEPS
 #define EXACT 1e-8
 #define ROUNDING 1e-12
-#define CLOSE_BY 1e-9
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
 #define NOTHING R(1e-9)
+#define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
 #define NEARLY R(1e-6)
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)

@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.core.calls import EACH, HEAD
 from finlab.precision import NOTHING
 
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 """Largest error of the grid of a law, over its largest value."""
 CELLS = 128
 """Cells of a table at most; of a foil's angles and lifts twice as many knots."""
