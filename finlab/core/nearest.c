@@ -6,7 +6,7 @@
    answer adds proves how far the point is from the nearest one. Sets with curved sides converge the same way. */
 #include "inner.h"
 
-#define BARELY 1e-12 /* rounding of shares and misses, which are in double precision always */
+#define BARELY ((wide)NEARLY * NEARLY) /* rounding of shares and misses, which are in double precision always */
 #define MOST_POINTS 400
 #define MOST_SHARES (5 * ROUNDS)
 

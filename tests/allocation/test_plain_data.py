@@ -66,7 +66,6 @@ NO_CHOICE = {
     "TINY",
     "LARGEST",
     "NONE",
-    "STALLED",
     "FL_MOST",
     "FL_VERSION",
     "FL_MAGIC",
