@@ -30,6 +30,7 @@ except ImportError:
 
 
 def solve(matrix: Array, right: Array) -> AnyArray:
-    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast."""
+    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast; NaN where one is
+    singular."""
     solution: AnyArray = _lapack.solve(matrix, right)
     return solution

@@ -25,7 +25,7 @@ def is_full_turn(arc: Any) -> Any:
 
 
 def wrapped(angle: ArrayLike) -> Array:
-    """Returns the same angles within [-pi, pi) [rad]."""
+    """Returns the same angles (...) within [-pi, pi) [rad]."""
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
 
 
@@ -100,7 +100,7 @@ DIGITS = 12
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:
-    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad]."""
+    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad], by Rodrigues' formula."""
     x, y, z = np.asarray(axis, dtype=np.float64)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)

@@ -52,7 +52,7 @@ def levenberg_marquardt(
     settled: float = 0.0,
     enough: float = 0.0,
 ) -> At:
-    """Lower the cost of R problems.
+    """Lower the cost of R problems (Levenberg, 1944; Marquardt, 1963), and return where they end.
 
     Args:
         at: where they begin.

@@ -1,7 +1,7 @@
 """Files that are either there whole or not at all, and folders for them."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -47,6 +47,20 @@ def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: 
         for part in parts:
             with suppress(OSError):
                 part.unlink()
+
+
+def write_folder(
+    folder: str | os.PathLike[str], files: Mapping[str, bytes], strangers: Iterable[Path], what: str
+) -> None:
+    """Write files by name into a folder, which is made, as `write_together` does. Raises DataError: one
+    cannot be written; or there are `strangers`, files that are no part of `what`, and nothing is written."""
+    path = Path(folder)
+    if odd := sorted(strangers):
+        name = odd[0].relative_to(path).as_posix()
+        raise DataError(f"{path}: holds {name!r:.60}, which is no part of {what}; name an empty folder")
+    for name in files:
+        make_folder((path / name).parent)
+    write_together({path / name: content for name, content in files.items()}, DataError, str(path))
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

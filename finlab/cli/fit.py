@@ -20,9 +20,9 @@ def fin(
 ) -> None:
     """Fit a fin to a load cell's measurements, and write it for layouts to name.
 
-    Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz); A is
-    half the stroke, phi the zero direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis,
-    z' up). Units may stand in the header, `A [deg]`, as may `stroke` for whole strokes in place of A.
+    Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P); A is half the stroke, phi the zero
+    direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis, z' up). Units may stand in
+    the header, `A [deg]`, as may `stroke` for whole strokes in place of A.
 
     Args:
         data: CSV files of one fin.

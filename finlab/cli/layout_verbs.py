@@ -15,8 +15,6 @@ from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
     from finlab.analysis import Improvement
-    from finlab.exchange import Exchange
-    from finlab.layout import Layout
 
 verbs = SubcommandApp()
 
@@ -94,19 +92,13 @@ def convert_layout(
         rows: what the rows of a matrix without labels are, where they may be both.
         model: which model of a description of several; the first with thrusters by default.
     """
-    from finlab.exchange import Exchange
+    from finlab.exchange import Exchange, convert
     from finlab.files.worker import in_worker
 
     exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
-    layout, exchange = in_worker(_converted, file, output, to, exchange)
-    notes = [f"- {printable(note)}" for note in exchange.notes]
-    print("\n".join([f"{output}: {layout.name} with {layout.counted}", *notes]))
-
-
-def _converted(file: str, output: Path, to: str | None, exchange: Exchange) -> tuple[Layout, Exchange]:
-    from finlab.exchange import convert
-
-    return convert(file, output, to, exchange), exchange
+    layout, notes = in_worker(convert, file, output, to, exchange)
+    lines = [f"{output}: {layout.name} with {layout.counted}", *(f"- {printable(note)}" for note in notes)]
+    print("\n".join(lines))
 
 
 @verbs.command

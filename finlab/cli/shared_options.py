@@ -41,7 +41,7 @@ def with_json_file(argv: Sequence[str]) -> list[str]:
 
 
 def check_json_file(path: Path | None, option: str = "json") -> None:
-    """Refuse a file that cannot be written before the work, not after it."""
+    """Refuse a file before the work, not after it. Raises DataError: it is in no folder, or is one."""
     if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
         raise DataError(f"{option}: expected a file in an existing folder, got {path}")
 
@@ -74,7 +74,7 @@ def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[s
 
 
 def check_positive(**counts: int | None) -> None:
-    """Refuse numbers below one, each under the name of its option."""
+    """Refuse counts, each under the name of its option. Raises CommandError: one is below 1."""
     for name, value in counts.items():
         if value is not None and value < 1:
             raise CommandError(f"{name.replace('_', '-')}: expected a number of at least 1, got {value}")

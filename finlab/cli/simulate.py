@@ -77,12 +77,13 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
     tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
     with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
         from finlab.evaluation.plots import check_picture, write_picture
+        from finlab.vehicle.righting import righting_words
 
         check_picture(options.plot)
         loop = _excitation(options) if options.excite else _swim(options)
-        overturns = None if options.excite else _overturns(loop)
-        if overturns is not None:
-            bar.write(f"finlab: {loop.layout.name}: {overturns}", file=sys.stderr)
+        held = options.excite or "Ty" in loop.controller.axes
+        if not held and (words := righting_words(loop.layout)) is not None:
+            bar.write(f"finlab: {loop.layout.name}: {words}", file=sys.stderr)
         seen = [(0.0, monitored(loop))]
         bar.reset(round(loop.task.duration_s, 1))
         bar.bar_format = "{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]"
@@ -152,13 +153,6 @@ def _world(options: Options) -> dict[str, Any]:
         "current": options.current,
         "seed": options.seed,
     }
-
-
-def _overturns(loop: ClosedLoop) -> str | None:
-    """From which speed on nothing rights a robot that does not dive by its pitch."""
-    from finlab.vehicle.righting import righting_words
-
-    return None if "Ty" in loop.controller.axes else righting_words(loop.layout)
 
 
 def summary(log: RunLog) -> str:

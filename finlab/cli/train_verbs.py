@@ -122,10 +122,10 @@ def interaction(
         resume: go on from the last state in the folder.
     """
     from finlab.fit.interaction.samples import read_samples
-    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
 
     check_positive(steps=steps, minutes=minutes)
-    error = train(read_samples(data), output, Recipe(steps=steps, minutes=minutes), seed, resume)
+    error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
     print(f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise included")
 
 

@@ -19,7 +19,6 @@ from msgspec import to_builtins
 
 import finlab
 from finlab import bundle_files
-from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
 from finlab.assets import NAME, shipped_checkpoints
@@ -39,7 +38,7 @@ from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_chec
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.network import POSITION_SCALE, SCALES
 from finlab.physics.objective import yardstick
-from finlab.whole_file import PART, write_together, write_whole
+from finlab.whole_file import PART, write_folder, write_whole
 
 
 @dataclass(frozen=True)
@@ -49,27 +48,19 @@ class Bundle:
     files: Mapping[str, bytes]  # contents by name
 
     def write(self, folder: str | os.PathLike[str]) -> None:
-        """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the
-        folder holds something else, or cannot be written."""
+        """Write the files into a folder, which is made; an earlier bundle there is replaced. Raises
+        DataError: the folder holds something else, or cannot be written."""
         path = Path(folder)
-        made = not path.exists()
+        made, present = not path.exists(), [file for file in path.rglob("*") if not file.is_dir()]
+        names = {file: file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)}
         try:
-            path.mkdir(parents=True, exist_ok=True)
-            present = [file for file in path.rglob("*") if not file.is_dir()]
-            left = [file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)]
-            if strangers := sorted(name for name in left if bundle_files.largest(name) < 0):
-                raise DataError(
-                    f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
-                )
-            for name in self.files:
-                (path / name).parent.mkdir(exist_ok=True)
             # The checksums come last: what a kill leaves is refused.
-            write_together({path / name: part for name, part in self.files.items()}, DataError, str(path))
-            for file in present:
-                if file.relative_to(path).as_posix() not in self.files:
-                    file.unlink()
+            odd = (file for file, name in names.items() if bundle_files.largest(name) < 0)
+            write_folder(path, self.files, odd, "a bundle")
+            for file in set(present) - {path / name for name in self.files}:
+                file.unlink()
         except OSError as error:
-            raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
+            raise DataError(f"{error.filename}: cannot be written: {error.strerror}") from None
         finally:
             if made and not (path / bundle_files.CHECKSUMS).exists():
                 rmtree(path, ignore_errors=True)
@@ -137,24 +128,23 @@ def _about(allocator: Allocator) -> bytes:
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose force tables, and the network of whose interaction, have the names that they have in a
     bundle, and their contents by name; `DataError`: one cannot be read, or is too large to travel."""
-    tables: dict[str, bytes] = {}
-    parts = []
-    for part in layout.actuators:
-        if path := part.reads:
-            content = table_bytes(path)
-            if len(content) > bundle_files.LARGEST_TABLE:
-                raise DataError(
-                    f"{path}: is larger than {bundle_files.LARGEST_TABLE:,} bytes, too large for a bundle"
-                )
-            tables[bundle_files.table_name(content)] = content
-            part = part.reading(bundle_files.table_name(content))
-        parts.append(part)
-    interaction = layout.interaction
-    if isinstance(interaction, Learned):
-        content = named_content(interaction.path, LARGEST_NETWORK, WHAT)
-        name = bundle_files.table_name(content, NETWORK_SUFFIX)
-        tables[name], interaction = content, Learned(name)
-    return replace(layout, actuators=tuple(parts), interaction=interaction), tables
+    names, contents, own = dict[str, str](), dict[str, bytes](), layout.interaction
+    table = bundle_files.LARGEST_TABLE, "a table of forces for a bundle"
+    for path in layout.files:
+        is_network = isinstance(own, Learned) and path == own.path
+        content = named_content(path, *((LARGEST_NETWORK, WHAT) if is_network else table))
+        names[path] = bundle_files.table_name(content, NETWORK_SUFFIX if is_network else ".csv")
+        contents[names[path]] = content
+    return renamed(layout, names), contents
+
+
+def renamed(layout: Layout, names: Mapping[str, str]) -> Layout:
+    """A layout whose tables and network have other names, or paths, by those that they have."""
+    parts = tuple(part.reading(names[part.reads]) if part.reads else part for part in layout.actuators)
+    own = layout.interaction
+    return replace(
+        layout, actuators=parts, interaction=Learned(names[own.path]) if isinstance(own, Learned) else own
+    )
 
 
 def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
@@ -212,7 +202,7 @@ def graph_text(layout: Layout) -> str:
 
 
 def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a graph file; an existing file is replaced whole. LayoutError: the name does not end in
+    """Writes a graph file; an existing file is replaced whole. Raises LayoutError: the name does not end in
     `.json`, or the file cannot be written."""
     if Path(path).suffix.lower() != ".json":
         raise LayoutError("expected the name of a file that ends in .json", source=str(path))

@@ -19,10 +19,10 @@ from finlab.allocation.policy import Policy
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned
-from finlab.errors import AllocationError, DataError
+from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.physics.objective import yardstick
-from finlab.whole_file import write_together
+from finlab.whole_file import write_folder
 
 SAMPLES = 24
 """Questions of a self-test."""
@@ -69,18 +69,10 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export are replaced. DataError: it
-    has other C files, or cannot be written."""
-    path = Path(folder)
-    try:
-        path.joinpath("examples").mkdir(parents=True, exist_ok=True)
-        if strangers := sorted(own.name for own in path.glob("*.[ch]") if own.name not in files):
-            raise DataError(
-                f"{path}: holds {strangers[0]!r:.60}, which is none of an export; name an empty folder"
-            )
-        write_together({path / name: content for name, content in files.items()}, DataError, str(path))
-    except OSError as error:
-        raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
+    """Writes the files into a folder, which is made; those of an earlier export are replaced. Raises
+    DataError: it has other C files, or cannot be written."""
+    strangers = (own for own in Path(folder).glob("*.[ch]") if own.name not in files)
+    write_folder(folder, files, strangers, "an export")
 
 
 def _sized(header: str, count: int) -> str:

@@ -79,7 +79,7 @@ def allocate(arguments: argparse.Namespace) -> int:
 
 
 def serve(arguments: argparse.Namespace) -> int:
-    """Answer requests until they end or a signal asks to stop."""
+    """Answer requests until they end or a signal asks to stop. Raises FinlabError: a stream is closed."""
     from finlab.deploy.transport import StandardStreams
 
     streams = StandardStreams()  # before the robot is loaded, so that no signal is missed

@@ -50,9 +50,9 @@ class DeployedRobot:
         return self.allocator.layout
 
     def allocate(self, wrench: ArrayLike, *, failed: Sequence[str] = (), **options: Any) -> Allocation:
-        """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`. What the bundle
-        names as failed stays failed, whatever `failed` adds. Raises DataError: the answer is no number, as a
-        broken bundle gives it."""
+        """Commands for a target (6,) [N, N m] in the body frame; arguments and errors as in
+        `finlab.Allocator.allocate`. What the bundle names as failed stays failed, whatever `failed` adds.
+        Raises DataError: the answer is no number, as a broken bundle gives it."""
         lost = (*self.failed, *(name for name in failed if name not in self.failed))
         answer = self.allocator.allocate(wrench, failed=lost, **options)
         works = [name not in lost for name in self.layout.names]
@@ -71,8 +71,8 @@ class DeployedRobot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
-    """The robot in a bundle, a folder or a zip archive. FinlabError: it is none, was changed, or cannot be
-    run."""
+    """The robot in a bundle, a folder or a zip archive. Raises FinlabError: it is none, was changed, or
+    cannot be run."""
     if not is_bundle(path) and str(path).endswith((".json", ".yaml", ".yml")) and os.path.exists(path):
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
     robot = parse_robot(read_bundle_files(path), str(path))
@@ -82,10 +82,8 @@ def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
 
 
 def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
-    """The robot in the contents of a bundle's files; see `load_robot`.
-
-    Force tables are read from the folder or archive `source` once they are needed.
-    """
+    """The robot in the contents of a bundle's files; errors as in `load_robot`. Force tables are read from
+    the folder or archive `source` once they are needed."""
     check_bundle_files(files, source)
     robot = robot_of(files, source)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
@@ -128,8 +126,8 @@ def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...
 
 
 def self_check(robot: DeployedRobot) -> list[Finding]:
-    """Ask what the bundle knows the answers of. DataError: the bundle has no self-tests, or a force table
-    cannot be read."""
+    """Ask what the bundle knows the answers of. Raises DataError: the bundle has no self-tests, or a force
+    table cannot be read."""
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
     layout, failed = robot.layout, robot.failed

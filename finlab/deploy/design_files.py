@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
+from finlab.deploy.bundle import renamed
 from finlab.errors import DataError, LayoutError
 from finlab.exchange import Exchange, read_robot
 from finlab.files.guarded import decoded, read_file, unpacked
@@ -36,14 +37,15 @@ def stored_table(content: bytes, folder: Path) -> FinModelSpec:
 
 
 def _kept(content: bytes, folder: Path, suffix: str) -> str:
-    path = folder / f"{hashlib.sha256(content).hexdigest()}{suffix}"
-    _keep(path, content)
+    path = make_folder(folder) / f"{hashlib.sha256(content).hexdigest()}{suffix}"
+    if not path.exists():
+        write_whole(path, content, DataError)
     return str(path)
 
 
 def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is where its
-    hull is drawn from a shape. DataError: the mesh cannot be read."""
+    hull is drawn from a shape. Raises DataError: the mesh cannot be read."""
     hull = None if layout.body is None else layout.body.hull
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
@@ -92,7 +94,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
 
 
 def read_design(source: str, content: bytes, folder: Path) -> Opened:
-    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file.
+    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file. Raises
     LayoutError: it is none of these, or something in it is wrong."""
     exchange = Exchange()
     text = decoded(content, source, A_DESIGN, LayoutError)
@@ -103,7 +105,7 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
     """The layout in the content of a file; what it names is taken to be in `folder`, and not looked at.
-    LayoutError: it is no text, or no layout."""
+    Raises LayoutError: it is no text, or no layout."""
     text = decoded(content, source, A_LAYOUT, LayoutError)
     return layout_in(text, Path(source).suffix, source, folder, may_open=False)
 
@@ -120,60 +122,38 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         """The path by which a file came that a layout names."""
         return path if path in parts else by_name.get(Path(path).name, path)
 
-    actuators, missing = [], []
-    for part in layout.actuators:
-        if path := part.reads:
-            path = came(path)
-            if path not in parts:
-                raise LayoutError(
-                    f"{part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come along; "
-                    "put the layout and its tables into one ZIP archive, and open that",
-                    source=source,
-                )
-            part = replace(part, model=stored_table(parts[path], folder / TABLE_FOLDER))
-        actuators.append(part)
-    interaction = layout.interaction
-    if isinstance(interaction, Learned):
-        path = came(interaction.path)
-        if path not in parts:
+    names: dict[str, str] = {}
+    for path in layout.files:
+        if (here := came(path)) not in parts:
             raise LayoutError(
-                f"names the learned interaction {Path(path).name!r:.60}, which did not come along; put both "
-                "into one ZIP archive, and open that",
+                f"names {Path(path).name!r:.60}, which did not come along; put the layout and its tables, or "
+                "its learned interaction, into one ZIP archive, and open that",
                 source=source,
             )
-        interaction = Learned(_kept(parts[path], folder / TABLE_FOLDER, NETWORK_SUFFIX))
-    body = layout.body
-    if body is not None and body.hull is not None and body.hull.mesh is not None:
-        mesh = came(body.hull.mesh)
-        if mesh in parts:
-            hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
-            body = replace(body, hull=hull)
-        else:
-            missing.append(Path(mesh).name[-60:])
-            body = replace(body, hull=None)
-    layout = replace(layout, actuators=tuple(actuators), body=body, interaction=interaction)
-    return Opened(layout, tuple(missing))
+        suffix = (
+            NETWORK_SUFFIX if isinstance(own := layout.interaction, Learned) and path == own.path else ".csv"
+        )
+        names[path] = _kept(parts[here], folder / TABLE_FOLDER, suffix)
+    layout, body = renamed(layout, names), layout.body
+    if body is None or body.hull is None or body.hull.mesh is None:
+        return Opened(layout)
+    mesh, hull = came(body.hull.mesh), None
+    if mesh in parts:
+        hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
+    missing = () if hull else (Path(mesh).name[-60:],)
+    return Opened(replace(layout, body=replace(body, hull=hull)), missing)
 
 
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
     """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
 
-    One of too many triangles is kept with fewer. FinlabError: it is no closed mesh, too large, or cannot be
-    kept."""
+    One of too many triangles is kept with fewer. Raises FinlabError: it is no closed mesh, too large, or
+    cannot be kept."""
     mesh, report = read_mesh(name, content, scale)
     if report.triangles > MAX_FACES:
         fewer = simplified(mesh, MAX_FACES)
         name, content = "hull.stl", stl_of(fewer._replace(vertices=fewer.vertices / scale))
-    digest = hashlib.sha256(content).hexdigest()[:16]
-    path = folder / HULL_FOLDER / f"{digest}{Path(name).suffix.lower()}"
-    _keep(path, content)
-    return str(path)
-
-
-def _keep(path: Path, content: bytes) -> None:
-    make_folder(path.parent)
-    if not path.exists():
-        write_whole(path, content, DataError)
+    return _kept(content, folder / HULL_FOLDER, Path(name).suffix.lower())
 
 
 def _largest(source: str, name: str) -> int:

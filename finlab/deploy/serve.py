@@ -58,7 +58,7 @@ class Request(Struct, forbid_unknown_fields=True):
 
 
 def parse_request(line: bytes) -> Request:
-    """A request, checked as far as the allocator does not check it itself. CommandError: it is no JSON
+    """A request, checked as far as the allocator does not check it itself. Raises CommandError: it is no JSON
     object of known keys, or its `id` is too long to be sent back."""
     if len(line) > MAX_LINE:
         raise CommandError(f"request: longer than {MAX_LINE} bytes")
@@ -80,8 +80,8 @@ class Server:
         self._failed: tuple[str, ...] = ()
 
     def run(self, transport: StandardStreams) -> None:
-        """Serve until the requests end or a signal asks to stop; then the fins rest. Unsent: answers are no
-        longer taken."""
+        """Serve until the requests end or a signal asks to stop; then the fins rest. Raises Unsent: answers
+        are no longer taken."""
         try:
             self._loop(transport)
         except EOFError:

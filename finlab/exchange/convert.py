@@ -43,8 +43,10 @@ UNKNOWN = (
 )
 
 
-def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange) -> Layout:
-    """Makes one file into another, and returns the layout that went through.
+def convert(
+    file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange
+) -> tuple[Layout, list[str]]:
+    """Makes one file into another, and returns the layout that went through, and the exchange's notes.
 
     `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
     the suffix of the output when None. Raises FinlabError: a file cannot be read or written, or the end
@@ -60,7 +62,7 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
         if layout.interaction is not None:
             exchange.note(f"What the actuators do to each other is left out: {form} has no place for it.")
         write_whole(output, WRITERS[form](layout, exchange, suffix))
-    return layout
+    return layout, exchange.notes
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:

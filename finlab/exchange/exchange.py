@@ -84,6 +84,6 @@ class Exchange:
 
 
 def vector(values: Array) -> Vector:
-    """Returns three plain numbers; rounding errors of 0 become 0."""
+    """Returns numbers (3,) as plain ones; rounding errors of 0 become 0."""
     x, y, z = (0.0 if abs(value) < 1e-15 else float(value) for value in values)
     return x, y, z

@@ -165,7 +165,8 @@ def listed(names: Iterable[str]) -> str:
 
 
 def numbers_in(values: Any) -> Array | None:
-    """Returns numbers, or text that stands for them, as an array; None where some are none."""
+    """Returns nested numbers, or text that stands for them, as an array of their shape; None where some are
+    no numbers, or as large as 1e9."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

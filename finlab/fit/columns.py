@@ -16,6 +16,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.csv_table import UNITS, CsvTable, read_table
 from finlab.files.guarded import read_file, unpacked
+from finlab.layout import Layout
 
 MOST_PACKED, MOST_UNPACKED = 10_000_000, 20_000_000
 """Largest workbook, and what is in it without its pictures [bytes]."""
@@ -168,7 +169,23 @@ def read_columns(
     return Columns(values, headers, bare, tuple(f"{Path(path).name} line {line}" for line in lines))
 
 
+def command_columns(layout: Layout) -> list[list[str]]:
+    """Returns for each actuator the columns of its command, `NAME.number`, such as `bow.force`."""
+    return [[f"{part.name}.{name}" for name, _ in part.NUMBERS] for part in layout.actuators]
+
+
+def commands_in(values: Mapping[str, Array], layout: Layout) -> Array:
+    """Returns the commands (N, n, 3) of N rows of such columns, in the units of the actuators' numbers: NaN
+    where an actuator has none, 0 for a number that it does not have."""
+    columns = command_columns(layout)
+    command = np.zeros((len(values[columns[0][0]]), layout.n, 3))
+    for i, own in enumerate(columns):
+        command[:, i, : len(own)] = np.stack([values[name] for name in own], axis=-1)
+        command[np.isnan(command[:, i, : len(own)]).all(axis=1), i] = np.nan
+    return command
+
+
 def together(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Returns the columns that all tables have, one table's rows after the other's, by name."""
+    """Returns the columns (n,) that all tables have, one table's rows after the other's, by name."""
     shared = [name for name in tables[0] if all(name in table for table in tables)]
     return {name: np.concatenate([table[name] for table in tables]) for name in shared}

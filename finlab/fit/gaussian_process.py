@@ -48,40 +48,32 @@ class ThrustKernel(NamedTuple):
 
     def covariance(self, inputs: Array, others: Array) -> Array:
         """Returns k (n, m) between inputs (n, 3) and others (m, 3)."""
-        return Pairs(inputs, others).covariance(self)[0]
+        return self.with_gradient(inputs, others)[0]
 
-    def variance(self, inputs: Array) -> Array:
-        """Returns the variances (n,) at inputs (n, 3)."""
-        return np.asarray((inputs[:, 0] * inputs[:, 1]) ** 2 * (self.even + self.uneven))
-
-
-class Pairs:
-    """Pairs of inputs (n, 3) and others (m, 3), which many kernels are asked about."""
-
-    def __init__(self, inputs: Array, others: Array) -> None:
-        self._grown = np.multiply.outer(inputs[:, 0] * inputs[:, 1], others[:, 0] * others[:, 1])
-        amplitude, frequency, turn = (inputs[:, None, k] - others[None, :, k] for k in range(3))
-        self._apart = amplitude**2, frequency**2, 2.0 * (1.0 - np.cos(turn))
-
-    def covariance(self, kernel: ThrustKernel) -> tuple[Array, Callable[[Array], Array]]:
+    def with_gradient(self, inputs: Array, others: Array) -> tuple[Array, Callable[[Array], Array]]:
         """Returns k (n, m), and a function from weights (n, m) to the derivatives (5,) of the sum of weights
         times k by the logarithms of the kernel's numbers."""
-        scales = kernel.amplitude, kernel.frequency, kernel.turn
-        a, f, phi = (apart / scale**2 for apart, scale in zip(self._apart, scales, strict=True))
+        apart = [np.subtract.outer(inputs[:, k], others[:, k]) for k in range(3)]
+        a, f = (apart[0] / self.amplitude) ** 2, (apart[1] / self.frequency) ** 2
+        phi = 2.0 * (1.0 - np.cos(apart[2])) / self.turn**2
         distance = np.sqrt(5.0 * (a + f))
-        bare = self._grown * np.exp(-distance)
+        bare = np.multiply.outer(inputs[:, 0] * inputs[:, 1], others[:, 0] * others[:, 1]) * np.exp(-distance)
         near = bare * (1.0 + distance + distance**2 / 3.0)
-        uneven = kernel.uneven * np.exp(-0.5 * phi)
-        share = kernel.even + uneven
+        uneven = self.uneven * np.exp(-0.5 * phi)
+        share = self.even + uneven
 
         def gradient(weights: Array) -> Array:
             by_near = weights * near
             by_distance = weights * bare * (1.0 + distance) * (5.0 / 3.0) * share
             by_uneven = by_near * uneven
-            sums = by_near.sum() * kernel.even, by_uneven.sum(), np.vdot(by_distance, a)
+            sums = by_near.sum() * self.even, by_uneven.sum(), np.vdot(by_distance, a)
             return np.array([*sums, np.vdot(by_distance, f), np.vdot(by_uneven, phi)])
 
         return near * share, gradient
+
+    def variance(self, inputs: Array) -> Array:
+        """Returns the variances (n,) at inputs (n, 3)."""
+        return np.asarray((inputs[:, 0] * inputs[:, 1]) ** 2 * (self.even + self.uneven))
 
 
 class GaussianProcess:
@@ -146,11 +138,11 @@ def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProc
     """The process whose numbers make up to `TUNED_ON` of the values most likely; where the variance of the
     noise is not known, it is one of them, and the same for all values."""
     few = np.linspace(0, len(values) - 1, min(len(values), TUNED_ON)).astype(int)
-    pairs, chosen = Pairs(inputs[few], inputs[few]), values[few]
+    places, chosen = inputs[few], values[few]
     known = None if variance is None else variance[few]
 
     def unlikely(logs: Array) -> tuple[float, Array]:
-        covariance, gradient = pairs.covariance(ThrustKernel(*np.exp(logs[:5])))
+        covariance, gradient = ThrustKernel(*np.exp(logs[:5])).with_gradient(places, places)
         noise = np.full(len(few), np.exp(logs[5])) if known is None else known
         lower = _factor(covariance, noise)
         weights = cho_solve((lower, True), chosen)

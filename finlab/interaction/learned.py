@@ -126,32 +126,30 @@ class LearnedInteraction(AtPlaces):
         return results
 
 
+def _layers(weights: Weights, name: str, features: AnyArray) -> list[AnyArray]:
+    """What each layer of the networks gives (MEMBERS, rows, width) for features (..., m), row by row."""
+    flat: list[Any] = [features.reshape(-1, features.shape[-1])]
+    for layer in range(LAYERS):
+        sums = flat[-1] @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"]
+        flat.append(sums if layer == LAYERS - 1 else np.tanh(sums))
+    return flat[1:]
+
+
 def numbers(weights: Weights, name: str, features: AnyArray) -> AnyArray:
     """Returns what the networks give (MEMBERS, ..., k) for features (..., m)."""
-    x: Any = features
-    flat = x.reshape(-1, x.shape[-1])
-    for layer in range(LAYERS):
-        flat = flat @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"]
-        if layer + 1 < LAYERS:
-            flat = np.tanh(flat)
-    return np.asarray(flat.reshape(MEMBERS, *x.shape[:-1], -1))
+    return _layers(weights, name, features)[-1].reshape(MEMBERS, *features.shape[:-1], -1)
 
 
 def numbers_and_slopes(weights: Weights, name: str, features: Array) -> tuple[Array, Array]:
     """Returns the mean (..., k) of the same over the networks, and its derivatives (..., k, m)."""
-    flat, bends = features.reshape(-1, features.shape[-1])[None], []
-    for layer in range(LAYERS - 1):
-        flat = np.tanh(flat @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"])
-        bends.append(1.0 - flat * flat)
-    last = weights[f"{name}.{LAYERS - 1}.weight"]
-    number = (flat @ last + weights[f"{name}.{LAYERS - 1}.bias"]).mean(axis=0)
-    slope = last.swapaxes(1, 2)[:, None]  # (MEMBERS, rows, k, width)
+    *hidden, last = _layers(weights, name, features)
+    slope = weights[f"{name}.{LAYERS - 1}.weight"].swapaxes(1, 2)[:, None]  # (MEMBERS, rows, k, width)
     for layer in reversed(range(LAYERS - 1)):
-        slope = slope * bends[layer][:, :, None, :]
+        slope = slope * (1.0 - hidden[layer] * hidden[layer])[:, :, None, :]
         rows, k = slope.shape[1], slope.shape[2]
         slope = slope.reshape(MEMBERS, rows * k, -1) @ weights[f"{name}.{layer}.weight"].swapaxes(1, 2)
         slope = slope.reshape(MEMBERS, rows, k, -1)
-    shape = features.shape[:-1]
+    number, shape = last.mean(axis=0), features.shape[:-1]
     return number.reshape(*shape, -1), slope.mean(axis=0).reshape(*shape, number.shape[-1], -1)
 
 

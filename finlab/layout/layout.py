@@ -102,14 +102,15 @@ class Layout(Checked):
         return replace(self, actuators=self.fins)
 
     @cached_property
-    def _files(self) -> tuple[str, ...]:
+    def files(self) -> tuple[str, ...]:
+        """Paths of the tables and of the network that its laws and its interaction read."""
         own = (self.interaction.path,) if isinstance(self.interaction, Learned) else ()
         return (*own, *(part.reads for part in self.actuators if part.reads))
 
     @property
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:
         """Time and size of each file that a law reads, for what is kept until one of them changes."""
-        return tuple(map(file_stamp, self._files)) if self._files else ()
+        return tuple(map(file_stamp, self.files)) if self.files else ()
 
     @property
     def is_of_fins(self) -> bool:

@@ -173,17 +173,9 @@ def keys(value: Any) -> Any:
 @pytest.mark.parametrize(
     "line",
     [
-        "eval wrench R",
-        "eval faults R",
-        "eval velocity --layouts R",
-        "eval trajectory --layouts R",
-        "app --layout R",
-    ]
-    + [
-        "eval faults --trajectory T",
-        "eval trajectory --trajectory T",
-        "simulate R",
-        "simulate A --trajectory T",
+        *("eval wrench R", "eval faults R", "eval velocity --layouts R", "eval trajectory --layouts R"),
+        *("eval faults --trajectory T", "eval trajectory --trajectory T", "simulate A --trajectory T"),
+        *("simulate R", "app --layout R"),
     ],
 )
 def test_named_files_are_read_in_the_process_with_limits(

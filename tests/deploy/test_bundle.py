@@ -47,6 +47,13 @@ def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
     return rest | {CHECKSUMS: checksums(rest)}
 
 
+def edited(bundle: Bundle, name: str, change: Callable[[dict[str, Any]], Any]) -> dict[str, bytes]:
+    """The files of a bundle after a change of one of JSON, resealed."""
+    document = json.loads(bundle.files[name])
+    change(document)
+    return resealed({**bundle.files, name: json.dumps(document).encode()})
+
+
 def test_folder_and_archive_hold_the_same_and_come_back(
     bundle: Bundle, shipped_allocator: AnyRobot, tmp_path: Path
 ) -> None:
@@ -136,11 +143,9 @@ def test_settings_travel(tmp_path: Path) -> None:
 def test_settings_no_robot_should_try_are_refused(
     change: dict[str, object], message: str, bundle: Bundle
 ) -> None:
-    document = json.loads(bundle.files[ABOUT])
-    place = document if set(change) & set(document) else document["settings"]
-    place.update(change)
+    files = edited(bundle, ABOUT, lambda d: (d if set(change) & set(d) else d["settings"]).update(change))
     with pytest.raises(FinlabError, match=message):
-        parse_robot(resealed({**bundle.files, ABOUT: json.dumps(document).encode()}))
+        parse_robot(files)
 
 
 def test_checksums_are_those_of_sha256sum(bundle: Bundle) -> None:
@@ -160,11 +165,9 @@ def test_a_changed_file_is_named(measured_bundle: Bundle) -> None:
 
 
 def test_other_networks_than_those_of_the_desk_are_refused(of_mdn: Bundle) -> None:
-    document = json.loads(of_mdn.files[ROBOT])
-    document["weights_sha256"] = "0" * 64
-    other = {**of_mdn.files, ROBOT: json.dumps(document).encode()}
+    other = edited(of_mdn, ROBOT, lambda d: d.update(weights_sha256="0" * 64))
     with pytest.raises(DataError, match="was made with other networks than this finlab's"):
-        parse_robot(resealed(other))
+        parse_robot(other)
 
 
 def test_force_tables_travel_and_answer_from_folder_and_archive(
@@ -196,10 +199,8 @@ def test_a_force_table_outside_the_bundle_is_refused(
     path: str, archive: bool, measured_bundle: Bundle, tmp_path: Path
 ) -> None:
     (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
-    document = json.loads(measured_bundle.files[ROBOT])
-    parts = document["layout"]
-    parts.get("fins", parts.get("actuators"))[2]["model"]["path"] = path
-    forged = Bundle(resealed({**measured_bundle.files, ROBOT: json.dumps(document).encode()}))
+    table = {"type": "table", "path": path}
+    forged = Bundle(edited(measured_bundle, ROBOT, lambda d: d["layout"]["fins"][2].update(model=table)))
     place = tmp_path / ("x.zip" if archive else "x")
     (forged.write_zip if archive else forged.write)(place)
     for read in (finlab.load_layout, load_robot):
@@ -221,17 +222,11 @@ def archive_of(path: Path, **files: bytes) -> Path:
         (lambda p: p, "robot.json is missing; a bundle is made by `finlab export"),
         (lambda p: archive_of(p / "a.zip", **{"../evil": b"x"}), "'../evil', which is no part of a bundle"),
         (lambda p: archive_of(p / "a.zip", **{ROBOT: bytes(1_000_001)}), "larger than 1,000,000 bytes"),
-        (
-            lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(501)}),
-            "holds more than 500 files",
-        ),
-        (
-            lambda p: archive_of(p / "a.zip", **{TABLES + "../" + "0" * 64 + ".csv": b""}),
-            "which is no part of a bundle",
-        ),
+        (lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(501)}), "than 500"),
+        (lambda p: archive_of(p / "a.zip", **{f"{TABLES}../{'0' * 64}.csv": b""}), "is no part of a bundle"),
     ],
     ids=["missing", "empty", "out of the archive", "zip bomb", "tables", "out of tables"],
-)
+)  # fmt: skip
 def test_what_is_no_bundle_is_refused(make: Callable[[Path], Path], message: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=message):
         load_robot(make(tmp_path))
@@ -309,7 +304,5 @@ def test_export_refuses_the_name_of_a_file(capsys: pytest.CaptureFixture[str]) -
 def test_a_robot_that_is_none_is_refused(
     change: Callable[[dict[str, Any]], None], message: str, bundle: Bundle
 ) -> None:
-    document = json.loads(bundle.files[ROBOT])
-    change(document)
     with pytest.raises(FinlabError, match=message):
-        parse_robot(resealed({**bundle.files, ROBOT: json.dumps(document).encode()}))
+        parse_robot(edited(bundle, ROBOT, change))

@@ -266,6 +266,15 @@ def streams() -> Iterator[StandardStreams]:
         signal.signal(number, handler)
 
 
+@pytest.fixture
+def requests(streams: StandardStreams) -> Iterator[int]:
+    """Where requests to the streams are written, whose answers nobody reads."""
+    source, end = os.pipe()
+    streams.open(source, os.open("/dev/null", os.O_WRONLY))
+    yield end
+    os.close(end)
+
+
 def text(line: Line | None) -> bytes:
     return b"" if line is None else line.text
 
@@ -291,15 +300,12 @@ def test_streams_keep_only_the_newest_request(streams: StandardStreams) -> None:
         streams.send(b"to nobody\n")
 
 
-def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams) -> None:
-    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
-    streams.open(source, sink)
+def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams, requests: int) -> None:
     for _ in range(100):
         os.write(requests, bytes(MAX_LINE))
     assert streams.newest(0.1) is None
     os.write(requests, b"\n")
     assert len(text(streams.newest(10.0))) == MAX_LINE + 1, "enough to refuse it"
-    os.close(requests)
 
 
 def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams) -> None:
@@ -319,14 +325,11 @@ def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams) -> 
     os.close(requests)
 
 
-def test_requests_that_nobody_takes_need_no_memory(streams: StandardStreams) -> None:
-    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
-    streams.open(source, sink)
+def test_requests_that_nobody_takes_need_no_memory(requests: int) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for _ in range(2_000):
         os.write(requests, b"x" * 60_000 + b"\n")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 30_000, "kB, of 120 MB"
-    os.close(requests)
 
 
 def test_a_signal_ends_waiting_and_sending(streams: StandardStreams, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -349,6 +352,15 @@ def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[byt
 def pipe(end: IO[bytes] | None) -> IO[bytes]:
     assert end is not None
     return end
+
+
+def answering(folder: Path, *options: str) -> subprocess.Popen[bytes]:
+    """A service that has answered a request."""
+    service = started(folder, *options, stdout=subprocess.PIPE)
+    pipe(service.stdin).write(LINE)
+    pipe(service.stdin).flush()
+    assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
+    return service
 
 
 def ended(service: subprocess.Popen[bytes]) -> tuple[list[str], str]:
@@ -382,10 +394,9 @@ def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> No
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("part", [b"", b'{"wrench": [1, '])
 def test_the_fins_rest_once_when_told_to_stop(number: signal.Signals, part: bytes, folder: Path) -> None:
-    service = started(folder, "--no-watchdog", stdout=subprocess.PIPE)
-    pipe(service.stdin).write(LINE + part)
+    service = answering(folder, "--no-watchdog")
+    pipe(service.stdin).write(part)
     pipe(service.stdin).flush()
-    assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
     service.send_signal(number)
     service.wait(60)
     assert ended(service) == (["neutral"], "") and service.returncode == 0
@@ -393,19 +404,13 @@ def test_the_fins_rest_once_when_told_to_stop(number: signal.Signals, part: byte
 
 @pytest.mark.parametrize(("part", "status"), [(b"", ["neutral"]), (b'{"wr', ["error", "neutral"])])
 def test_the_fins_rest_once_when_the_requests_end(part: bytes, status: list[str], folder: Path) -> None:
-    service = started(folder, stdout=subprocess.PIPE)
-    pipe(service.stdin).write(LINE)
-    pipe(service.stdin).flush()
-    assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
+    service = answering(folder)
     pipe(service.stdin).write(part)
     assert ended(service) == (status, "") and service.returncode == 0
 
 
 def test_a_reader_that_ends_is_noticed_at_the_next_answer(folder: Path) -> None:
-    service = started(folder, "--watchdog-s=0.2", stdout=subprocess.PIPE)
-    pipe(service.stdin).write(LINE)
-    pipe(service.stdin).flush()
-    pipe(service.stdout).readline()
+    service = answering(folder, "--watchdog-s=0.2")
     pipe(service.stdout).close()
     assert service.wait(60) == 2
     told = pipe(service.stderr).read().decode()

@@ -9,7 +9,7 @@ import pytest
 import finlab
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
-from finlab.errors import FinlabError, LayoutError
+from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
@@ -195,28 +195,6 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         LayoutError, match="layout A has no thruster, and A matrix has a place for these alone"
     ):
         written(finlab.load_layout("A"), tmp_path / "a.csv")
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.params", "1 1 CA_ROTOR0_PX 1 9", "CA_ROTOR_COUNT: expected 1 to 12 rotors, got 0"),
-        ("a.params", "CA_ROTOR_COUNT 1e400", "line 1: CA_ROTOR_COUNT is '1e400', expected a number"),
-        ("a.params", "CA_ROTOR_COUNT 1\nCA_ROTOR0_AZ 0", "CA_ROTOR0: has no direction"),
-        ("a.cpp", "add_motor", "has no rows of factors"),
-        ("a.cpp", "add_motor_raw_6dof(AP_MOTORS_MOT_1, 1, 0, 0, 0, 0, 0, 1);", "'motor1' has no force"),
-        ("a.cpp", "add_motor(1, 0, 0, 0, 1, 0, 0, 1);\n" * 2, "adds a motor twice, motor2; keep"),
-        ("a.yaml", "matrix: [[1], [2]]", "matrix: is 2 rows of 1 numbers, expected six"),
-        ("a.yaml", "limits: [[0, 1]]\nnames: [a, b]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits"),
-        ("a.csv", "\n".join([",".join("1" * 65)] * 6), "expected up to 64 columns, got 65"),
-        ("a.json", "[1", "is not valid JSON"),
-    ],
-)  # fmt: skip
-def test_refusals_name_the_file(name: str, content: str, message: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_text(content)
-    with pytest.raises(FinlabError, match=message) as caught:
-        read_any(str(tmp_path / name), Exchange())
-    assert str(caught.value).startswith(f"{tmp_path / name}: ")
 
 
 def test_lines_that_fit_nothing_take_no_time(tmp_path: Path) -> None:

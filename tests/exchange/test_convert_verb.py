@@ -1,15 +1,10 @@
 """`finlab layout convert`, and the way of a stranger's robot from its description to its own computer."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import finlab
-from finlab.allocation import Allocator
 from finlab.cli import main
 from finlab.deploy.command import main as runtime
 from tests.terminal import refused
@@ -38,26 +33,6 @@ def test_from_a_description_to_the_robot(
     assert runtime(["allocate", "rov", *asked]) == 0
     there = json.loads(capsys.readouterr().out)
     assert there["actuators"] == told["actuators"] and there["power"] == told["power"]
-
-
-def test_a_shipped_robot_of_thrusters_runs_in_the_runtime(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["export", "bluerov2_heavy", "-o", str(tmp_path / "rov.zip"), "--zip"]) == 0
-    capsys.readouterr()
-    assert runtime(["check", str(tmp_path / "rov.zip")]) == 0
-    capsys.readouterr()
-    assert runtime(["allocate", str(tmp_path / "rov.zip"), "--wrench", *map(str, WRENCH), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    desk = Allocator(finlab.load_layout("bluerov2_heavy")).allocate(WRENCH)
-    there = [part["force_n"] for part in told["actuators"]]
-    np.testing.assert_allclose(there, desk.command[:, 0], rtol=1e-12)
-    serve = [sys.executable, "-m", "finlab.deploy.command", "serve", str(tmp_path / "rov.zip")]
-    question = json.dumps({"id": 7, "wrench": WRENCH}) + "\n"
-    done = subprocess.run(serve, input=question, capture_output=True, text=True, timeout=60)
-    answer, rest = map(json.loads, done.stdout.splitlines())
-    assert (done.returncode, answer["id"], answer["actuators"]) == (0, 7, told["actuators"])
-    assert rest["status"] == "neutral" and all(part["force_n"] == 0.0 for part in rest["actuators"])
 
 
 def test_the_form_of_the_output_must_be_clear(tmp_path: Path) -> None:

@@ -40,32 +40,16 @@ def written(path: Path, columns: dict[str, Array]) -> Path:
 
 def workbook(path: Path, volts: tuple[float, ...], column: bool) -> Path:
     """Sheets of a maker: a page of words, then one table for each voltage, below a title."""
+    header = ["PWM (\u00b5s)", "RPM", "Power\n(W)", "Force (Kg f)", "Efficiency (g/W)", "Voltage (V)"]
     book = openpyxl.Workbook()
     book.active.append(["How this was measured", "in a tank"])
     for v in volts:
         sheet = book.create_sheet(f"T300 at {v:g} V")
         sheet.append(["Performance"])
-        sheet.append(
-            [
-                " PWM (\u00b5s)",
-                "RPM",
-                "Power\n(W)",
-                "Force (Kg f)",
-                *(["Voltage (V)"] * column),
-                "Efficiency (g/W)",
-            ]
-        )
+        sheet.append(header[: 5 + column])
         for p, n, w in zip(PWM, force(v), power(v), strict=True):
-            sheet.append(
-                [
-                    p,
-                    8.0 * abs(p - 1500.0),
-                    w,
-                    n / N_PER_KGF,
-                    *([v] * column),
-                    None if n == 0.0 else abs(n) / w,
-                ]
-            )
+            row = [p, 8.0 * abs(p - 1500.0), w, n / N_PER_KGF, None if n == 0.0 else abs(n) / w, v]
+            sheet.append(row[: 5 + column])
     book.save(path)
     return path
 
@@ -113,12 +97,8 @@ def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, sh
     with pytest.raises(DataError, match="measured at 12, 16 V"):
         fitted(path)
     np.testing.assert_allclose(fitted(path, volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3)
-    sagging = {
-        "PWM (us)": PWM,
-        "Force (N)": force(),
-        "Voltage (V)": 16.0 - power() / 130.0,
-        "Current (A)": power() / 15.0,
-    }
+    sagging = {"PWM (us)": PWM, "Force (N)": force()}
+    sagging |= {"Voltage (V)": 16.0 - power() / 130.0, "Current (A)": power() / 15.0}
     np.testing.assert_allclose(fitted(written(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from finlab.fit.gaussian_process import GaussianProcess, Pairs, ThrustKernel
+from finlab.fit.gaussian_process import GaussianProcess, ThrustKernel
 from tests.fit.cell import commands
 
 KERNEL = ThrustKernel(even=0.7, uneven=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
@@ -40,11 +40,11 @@ def test_repeated_commands_without_noise_are_bearable() -> None:
 
 
 def test_the_gradient_is_that_of_the_covariance() -> None:
-    pairs, weights = Pairs(FEW, FEW), np.random.default_rng(0).standard_normal((12, 12))
-    k, gradient = pairs.covariance(KERNEL)
+    weights = np.random.default_rng(0).standard_normal((12, 12))
+    k, gradient = KERNEL.with_gradient(FEW, FEW)
     np.testing.assert_allclose(np.diag(k), KERNEL.variance(FEW))
     differences = approx_fprime(
-        np.log(KERNEL), lambda logs: float(np.vdot(weights, pairs.covariance(ThrustKernel(*np.exp(logs)))[0]))
+        np.log(KERNEL), lambda logs: float(np.vdot(weights, ThrustKernel(*np.exp(logs)).covariance(FEW, FEW)))
     )
     np.testing.assert_allclose(gradient(weights), differences, atol=1e-6)
 

@@ -144,9 +144,3 @@ def test_answers_say_what_is_not_known(heavy: Allocator) -> None:
     assert any("open_water" in note for note in result.notes)
     assert result.expected_miss.max() > 0.1
     assert any("laws" in note and "jets" in note for note in result.notes)
-
-
-def test_no_interaction_no_change() -> None:
-    layout = finlab.load_layout("bluerov2_heavy")
-    plain, off = Allocator(layout), Allocator(replace(layout, interaction=None))
-    assert_allclose(plain.allocate(FAR).command, off.allocate(FAR).command, atol=0.0)

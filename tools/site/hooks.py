@@ -18,6 +18,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).parent))
 import blocks
 import reference
+from demo import demo_files
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 _shown: dict[str, blocks.Shown] = {}
@@ -39,6 +40,7 @@ def on_files(files: Files, config: Any) -> Files:
     made["app-jets.webp"] = picture.getvalue()  # a quarter of the bytes, for the first page
     font = package_files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf"
     made["math.ttf"] = font.read_bytes()
+    made |= {f"demo/{name}": content for name, content in demo_files().items()}
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
     _in_navigation(config.nav, list(made))

@@ -58,10 +58,9 @@ def file_stem(name: str) -> str:
 
 
 def has_files(layout: Layout) -> bool:
-    """Whether its file names others: tables of measured fins, or a hull's mesh."""
+    """Whether its file names others: tables of measured fins, a learned interaction, or a hull's mesh."""
     hull = None if layout.body is None else layout.body.hull
-    measured = any(fin.model.type == "table" for fin in layout.fins)
-    return measured or (hull is not None and hull.mesh is not None)
+    return bool(layout.files) or (hull is not None and hull.mesh is not None)
 
 
 def design_name(layout: Layout) -> str:

@@ -88,11 +88,11 @@ def _models(
     judge: Judge, layouts: int, steps: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
 ) -> dict[str, Model]:
     from finlab.fit.interaction.surrogate_form import trained_surrogate
-    from finlab.fit.interaction.train import WEIGHTS_FILE, Recipe, train
+    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
 
     samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
     if network is None:
-        train(samples, folder, Recipe(steps=steps), seed)
+        train(samples, folder, recipe(steps), seed)
     file = network or str(folder / WEIGHTS_FILE)
     node = trained_surrogate(samples, seed)
     models: dict[str, Model] = {

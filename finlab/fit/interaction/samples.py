@@ -10,6 +10,7 @@ its layout file of the same name.
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,8 +19,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import DataError
+from finlab.files.csv_table import TURNS
 from finlab.files.guarded import check_shapes, json_of, read_arrays
-from finlab.fit.columns import read_columns
+from finlab.fit.columns import command_columns, commands_in, read_columns
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.effectiveness import body_force
@@ -67,7 +69,7 @@ def left_by_laws(samples: Samples) -> Left:
 
 
 def with_jets(layout: Layout, command: Array, jets: Jets = JETS) -> Array:
-    """Returns wrenches by the formula of jets, with its usual constants; a `Judge`."""
+    """Returns wrenches (K, 6) [N, N m] of commands (K, n, 3) by the formula of jets; a `Judge`."""
     return Plant(replace(layout, interaction=jets)).wrench(command)
 
 
@@ -76,7 +78,7 @@ def drawn(
 ) -> list[Samples]:
     """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches
     with normal noise, a share of each axis' root mean square. They depend on the seed and the number
-    alone."""
+    alone. Raises DataError: the judge gives wrenches of another shape."""
     result = []
     for k in range(layouts):
         rng = np.random.default_rng([31_000, seed, k])
@@ -92,8 +94,6 @@ def drawn(
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:
     """Writes an NPZ file; a `DataError` where it cannot be written."""
-    from io import BytesIO
-
     n, most = max(one.layout.n for one in samples), max(len(one.command) for one in samples)
     command, wrench = np.full((len(samples), most, n, 3), np.nan), np.full((len(samples), most, 6), np.nan)
     for k, one in enumerate(samples):
@@ -108,7 +108,10 @@ def read_samples(path: Path) -> list[Samples]:
     """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do not fit
     the robots; LayoutError: a robot is none."""
     if path.is_dir():
-        return [_beside(table) for table in sorted(path.glob("*.csv"))] or _no_tables(path)
+        if tables := sorted(path.glob("*.csv")):
+            return [_beside(table) for table in tables]
+        expected = "expected for each robot a layout file and a CSV file of one name"
+        raise DataError(f"{path}: {expected}, got no CSV file")
     arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, WHAT)
     values = json_of(arrays["layouts"], f"{path}: layouts")
     if not isinstance(values, list) or not values:
@@ -139,20 +142,9 @@ def _beside(table: Path) -> Samples:
     raise DataError(f"{table}: expected a layout file of the same name beside it, such as {table.stem}.yaml")
 
 
-def _no_tables(path: Path) -> list[Samples]:
-    raise DataError(
-        f"{path}: expected for each robot a layout file and a CSV file of one name, got no CSV file"
-    )
-
-
 def read_table(layout: Layout, path: Path) -> Samples:
     """Returns the samples of one robot in a CSV file; errors as for `read_samples`."""
-    columns = [f"{part.name}.{name}" for part in layout.actuators for name, _ in part.NUMBERS]
-    wanted = [*columns, *AXES]
-    units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": float(np.pi / 180.0)}
+    wanted = [*sum(command_columns(layout), []), *AXES]
+    units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": TURNS["deg"]}
     table = read_columns(path, {name: name for name in wanted}, wanted, ", ".join(wanted), units).values
-    command = np.zeros((len(table["Fx"]), layout.n, 3))
-    for i, part in enumerate(layout.actuators):
-        for k, (name, _) in enumerate(part.NUMBERS):
-            command[:, i, k] = table[f"{part.name}.{name}"]
-    return Samples(layout, command, np.stack([table[axis] for axis in AXES], axis=-1))
+    return Samples(layout, commands_in(table, layout), np.stack([table[axis] for axis in AXES], axis=-1))

@@ -28,37 +28,35 @@ def trained_surrogate(
         nn.Sequential(nn.Linear(7, 64), nn.GELU()),
         nn.Linear(64, 12),
     )
-    most = max(one.layout.n for one in samples)
 
-    def rows(layout: Layout, force: Array, scale: Array, n: int) -> tuple[Array, Array]:
-        x = np.zeros((len(force), n, 7))
+    def rows(layout: Layout, force: Array, scale: Array, n: int) -> torch.Tensor:
+        """Features (K, n, 9): place, force and size, whether there is an actuator, and the unit of arms."""
+        x = np.zeros((len(force), n, 9))
         x[:, : layout.n, :3], x[:, : layout.n, 3:6] = layout.position / 0.3, force / scale[0]
-        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
-        return x, np.broadcast_to(np.arange(n) < layout.n, x.shape[:2])
+        x[:, : layout.n, 6], x[:, : layout.n, 7] = places_of(layout).diameter / 0.1, 1.0
+        x[..., 8] = scale[0] / scale[3]
+        return torch.tensor(x, dtype=torch.float32)
 
-    def wrench(x: torch.Tensor, mask: torch.Tensor, ratio: torch.Tensor) -> torch.Tensor:
-        share = net(x) * mask[..., None]
-        torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * ratio[:, None, None]
+    def wrench(x: torch.Tensor) -> torch.Tensor:
+        known, alive = x[..., :7], x[..., 7:8]
+        share = net(known) * alive
+        torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * x[..., 8:]
         total = torch.cat([share, torque], dim=-1).sum(dim=1)
-        pooled = (describe(x) * mask[..., None]).sum(dim=1) / mask.sum(dim=1, keepdim=True)
+        pooled = (describe(known) * alive).sum(dim=1) / alive.sum(dim=1)
         stretch, shift = affine(pooled).chunk(2, dim=-1)
         result: torch.Tensor = total * (1.0 + stretch) + shift
         return result
 
-    made = []
-    for one in samples:
-        force, missed, scale = left_by_laws(one)
-        x, mask = rows(one.layout, force, scale, most)
-        made.append((x, mask, np.full(len(x), scale[0] / scale[3]), missed))
-    known, alive, arm, left = (
-        torch.tensor(np.concatenate(part), dtype=torch.float32) for part in zip(*made, strict=True)
-    )
+    most, left = max(one.layout.n for one in samples), [left_by_laws(one) for one in samples]
+    pairs = zip(samples, left, strict=True)
+    known = torch.cat([rows(one.layout, own.force, own.scale, most) for one, own in pairs])
+    missed = torch.tensor(np.concatenate([own.missed for own in left]), dtype=torch.float32)
     weights = [*net.parameters(), *describe.parameters(), *affine.parameters()]
     optimizer = torch.optim.Adam(weights, lr=2e-3)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
     for _ in range(steps):
         some = torch.randint(len(known), (batch,))
-        loss = ((wrench(known[some], alive[some], arm[some]) - left[some]) ** 2).mean()
+        loss = ((wrench(known[some]) - missed[some]) ** 2).mean()
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
@@ -68,10 +66,8 @@ def trained_surrogate(
         scale = yardstick(layout)
 
         def function(force: Array) -> Array:
-            values = (*rows(layout, force, scale, layout.n), np.full(len(force), scale[0] / scale[3]))
             with torch.no_grad():
-                told = wrench(*(torch.tensor(part, dtype=torch.float32) for part in values))
-            return np.asarray(told.double().numpy() * scale)
+                return np.asarray(wrench(rows(layout, force, scale, layout.n)).double().numpy() * scale)
 
         return function
 

@@ -6,7 +6,6 @@ is two small networks on the rows of some samples.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,14 +35,10 @@ HELD_OUT = 0.1
 WEIGHTS_FILE = "interaction.safetensors"
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """How long, and how fast."""
-
-    steps: int = 1800
-    batch: int = 512
-    rate: float = 3e-3
-    minutes: float | None = None
+def recipe(steps: int = 1800, batch: int = 512, minutes: float | None = None) -> LoopSettings:
+    """Returns how long, and how fast: steps of so many samples, for at most so many minutes."""
+    seconds = None if minutes is None else 60.0 * minutes
+    return LoopSettings(steps, batch, 3e-3, warmup=100, ema=0.995, seconds=seconds)
 
 
 class Rows(NamedTuple):
@@ -125,7 +120,7 @@ def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[A
 
 
 def train(
-    samples: Sequence[Samples], folder: Path, recipe: Recipe, seed: int = 0, resume: bool = False
+    samples: Sequence[Samples], folder: Path, settings: LoopSettings, seed: int = 0, resume: bool = False
 ) -> float:
     """Trains three networks, writes their file, and log and state, into a folder, and returns the root mean
     square error on robots that were held out, on the yardstick."""
@@ -134,22 +129,20 @@ def train(
     held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT * len(samples)))])
     known, unknown = torch.nonzero(~held)[:, 0], torch.nonzero(held)[:, 0]
     weights = {name: value.requires_grad_() for name, value in first_weights(seed).items()}
-    seconds = None if recipe.minutes is None else 60.0 * recipe.minutes
-    settings = LoopSettings(recipe.steps, recipe.batch, recipe.rate, warmup=100, ema=0.995, seconds=seconds)
-    identity = {"recipe": str(recipe), "seed": seed, "samples": len(data.left)}
+    identity = {"recipe": str(settings), "seed": seed, "samples": len(data.left)}
 
     def terms_of(step: int) -> dict[str, Tensor]:
         total = torch.zeros(())
         for member in range(MEMBERS):
             draw = seeded_generator(seed, step * MEMBERS + member, torch.device("cpu"))
-            some = known[torch.randint(len(known), (recipe.batch,), generator=draw)]
+            some = known[torch.randint(len(known), (settings.batch_size,), generator=draw)]
             total = total + ((told(weights, member, data, some) - data.left[some]) ** 2).mean()
         return {"loss": total / MEMBERS}
 
     def save(shipped: State, made: dict[str, Any]) -> None:
         write_network(folder / WEIGHTS_FILE, shipped, 1.0)
 
-    with workplace("cpu", recipe.batch) as place:
+    with workplace("cpu", settings.batch_size) as place:
         run = Training(weights, settings, folder, identity, place)
         if resume:
             run.resume()

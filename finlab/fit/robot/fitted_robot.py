@@ -88,16 +88,6 @@ def leaned(layout: Layout, lean: Array) -> Layout:
     return replace(layout, actuators=tuple(part.turned(frame) for part, frame in pairs))
 
 
-def asked_more(layout: Layout, share: Array) -> Array:
-    """Returns factors (n, 3) of commands to a robot of shares (n,) of the layout's strengths, by which the
-    drives of the layout's thrusters and azimuths give what is to be given."""
-    factor = np.ones((layout.n, 3))
-    for i, part in enumerate(layout.actuators):
-        if part.THRUST is not None:
-            factor[i, part.THRUST] = 1.0 / share[i]
-    return factor
-
-
 def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
     """Returns how far each actuator's force may be from what was found: the mean over strength and lean, with
     the share of it that all strengths have together."""
@@ -217,5 +207,7 @@ class OnlineFit:
         words = ", ".join(f"{name} {own:.2f} +- {own * unsure:.2f}" for name, own, unsure in rows)
         turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)
         self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {words}{turned}")
-        self.factor = asked_more(self.layout, strength)
+        for i, part in enumerate(self.layout.actuators):
+            if part.THRUST is not None:
+                self.factor[i, part.THRUST] = 1.0 / strength[i]
         return replace(self.layout, actuators=learned(fit, fit.found("lean")))

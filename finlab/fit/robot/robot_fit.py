@@ -70,15 +70,15 @@ class RobotFit:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def part(self, name: str) -> Array | None:
-        """What was found of one block, in its own units; None where it is not used."""
+        """What was found of one block (k,), in its own units; None where it is not used."""
         return self.fitted.unknowns.part(name, self.fitted.vector)
 
     def found(self, name: str) -> Array:
-        """What was found of a block that every fit has, in its own units."""
+        """What was found of a block (k,) that every fit has, in its own units."""
         return self.fitted.unknowns.of(name, self.fitted.vector)
 
     def found_error(self, name: str) -> Array:
-        """Its standard errors."""
+        """Standard errors (k,) of `found`, in the same units."""
         return self.fitted.unknowns.of(name, self.error)
 
     def untold(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.csv_table import TURNS
 from finlab.files.guarded import check_shapes, json_of, read_arrays
-from finlab.fit.columns import MAX_BYTES, read_columns
+from finlab.fit.columns import MAX_BYTES, command_columns, commands_in, read_columns
 from finlab.layout import Fin, Layout
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion
@@ -151,7 +151,7 @@ def _check_duration(seconds: float, path: Path) -> None:
 
 
 def _csv(path: Path, layout: Layout) -> Swim:
-    commands = [f"{one.name}.{part}" for one in layout.actuators for part in dict(one.NUMBERS)]
+    commands = sum(command_columns(layout), [])
     names = {name: name for name in ("t", *CHANNELS, *commands)}
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
     expected = f"t, what was measured, and what was commanded, {', '.join(commands)}"
@@ -166,7 +166,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
             what = f"{said[0]:g} throughout" if len(said) else "empty"
             raise DataError(f"{path}: column {name} is {what}; is the sensor connected? leave the column out")
     measured = np.stack([read.values.get(name, np.full(n, np.nan)) for name in CHANNELS], axis=-1)
-    command = _rows(np.stack([read.values[name] for name in commands], axis=-1), layout)
+    command = commands_in(read.values, layout)
     _check_commands(command, places, layout)
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
@@ -183,21 +183,10 @@ def _check_time(time: Array, places: Sequence[str]) -> None:
         )
 
 
-def _rows(values: Array, layout: Layout) -> Array:
-    """Commands (n, actuators, 3) of values (n, columns); what an actuator does not have is 0."""
-    command, begin = np.zeros((len(values), layout.n, 3)), 0
-    for i, part in enumerate(layout.actuators):
-        own = values[:, begin : begin + len(part.NUMBERS)]
-        command[:, i, : own.shape[1]] = own
-        command[np.isnan(own).all(axis=1), i] = np.nan
-        begin += own.shape[1]
-    return command
-
-
 def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
     known = np.isfinite(command)
     for k, i in np.argwhere(known.any(axis=2) & ~known.all(axis=2)):
-        columns = ", ".join(f"{layout.names[i]}.{part}" for part in dict(layout.actuators[i].NUMBERS))
+        columns = ", ".join(command_columns(layout)[i])
         raise DataError(
             f"{places[k]}: of {columns} some are empty; fill all, or none for an actuator that was lost"
         )

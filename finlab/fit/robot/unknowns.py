@@ -95,10 +95,10 @@ class Unknowns:
         return self.of(name, vector) if name in self._where else None
 
     def of(self, name: str, vector: Array) -> Array:
-        """`part` of a block that every fit looks for."""
+        """The unknowns (..., k) of a block that every fit looks for, as `part` gives them."""
         where = self._where[name]
         return np.asarray(vector[..., where] * self.scale[where])
 
     def place(self, name: str) -> slice:
-        """Where a block stands."""
+        """Where a block stands in a vector (size,)."""
         return self._where[name]

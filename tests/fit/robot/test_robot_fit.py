@@ -123,19 +123,11 @@ def test_the_command_reads_a_csv_file(
     np.testing.assert_allclose(again.motion, replay(drawn, command)[:309], atol=1e-6)
     np.testing.assert_allclose(again.measured[:, 6:], measured[:309, 6:], atol=1e-6)
     np.testing.assert_allclose(wrapped(again.measured[:, 3:6] - measured[:309, 3:6]), 0.0, atol=1e-6)
-    arguments = [
-        "fit",
-        "robot",
-        "--no-other-law",
-        f"{tmp_path}/drawn.yaml",
-        f"{tmp_path}/swim.csv",
-        "-o",
-        f"{tmp_path}/found.json",
-    ]
-    assert main(arguments) == 0
+    arguments = ["fit", "robot", "--no-other-law", f"{tmp_path}/drawn.yaml", f"{tmp_path}/swim.csv", "-o"]
+    assert main([*arguments, f"{tmp_path}/found.json"]) == 0
     assert "strength of front_right" in capsys.readouterr().out
     assert load_layout(tmp_path / "found.json").names == drawn.names
-    assert main([*arguments[:-1], f"{tmp_path}/found.txt"]) == 2
+    assert main([*arguments, f"{tmp_path}/found.txt"]) == 2
     assert not (tmp_path / "found.txt").exists()
 
 
