@@ -128,9 +128,18 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
 void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
 
 /* nearest.c */
-wide product(const wide *a, const wide *b, int n);
-wide length_of(const wide *a);
-void add(wide *to, wide times, const wide *other);
+static inline wide product(const wide *a, const wide *b, int n) {
+  wide sum = 0;
+  for (int k = 0; k < n; k++) sum += a[k] * b[k];
+  return sum;
+}
+
+static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+
+/* Adds a vector (6,) so many times. */
+static inline void add(wide *to, wide times, const wide *other) {
+  for (int k = 0; k < 6; k++) to[k] += times * other[k];
+}
 void weigh(const real *block, fl_work *work, const real *weight);
 void point_of(const real *block, const fl_work *work, real force[][2], wide *point);
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);

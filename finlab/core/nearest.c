@@ -29,19 +29,6 @@ static void best_corner(const real *polygon, const real *price, real *force) {
     if (dot(price, at, 2) > most) most = dot(price, at, 2), force[0] = at[0], force[1] = at[1];
 }
 
-wide product(const wide *a, const wide *b, int n) {
-  wide sum = 0;
-  for (int k = 0; k < n; k++) sum += a[k] * b[k];
-  return sum;
-}
-
-wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
-
-/* Adds a vector (6,) so many times. */
-void add(wide *to, wide times, const wide *other) {
-  for (int k = 0; k < 6; k++) to[k] += times * other[k];
-}
-
 /* The point (6,), in weighted axes, that forces give. */
 void point_of(const real *block, const fl_work *work, real force[][2], wide *point) {
   for (int k = 0; k < 6; k++) point[k] = 0;
@@ -143,21 +130,23 @@ static void mix(fl_mixture *m, const wide *target) {
    distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. Where there is a miss,
    what is worth most across it follows the mixture's points. Returns the miss. */
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m) {
-  wide last = 1e300, normal[6];
+  wide last = 1e300, normal[6], way[6];
   if (m->count == 0) {
     farthest(block, work, target, m);
     m->count = 1, m->done = 0, m->share[0] = 1;
   }
   for (int k = 1;; k++) {
-    memset(normal, 0, sizeof normal);
-    add(normal, 1, target);
+    memcpy(normal, target, sizeof normal);
     for (int p = 0; p < m->count; p++) add(normal, -m->share[p], m->point[p]);
     for (int j = 0; j < 6; j++) m->miss[j] = -normal[j];
-    wide size = length_of(normal), gain = 0;
+    wide size = length_of(normal), gain;
     if (size <= close) return size;
     if (m->count == FL_POINTS) drop(m, least_share(m)); /* more than an affine basis */
     farthest(block, work, normal, m);
-    for (int j = 0; j < 6; j++) gain += m->miss[j] * (target[j] + m->miss[j] - m->point[m->count][j]);
+    memcpy(way, m->point[m->count], sizeof way);
+    add(way, -1, target);
+    add(way, 1, normal);
+    gain = product(way, normal, 6);
     if (gain <= MAX(close, apart * size) * size || size >= last * (1 - BARELY) || k == MOST_POINTS) return size;
     last = size;
     m->share[m->count++] = 0;
