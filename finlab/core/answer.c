@@ -184,61 +184,9 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
     if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_CLOSEST && !are_within(policy->weight, 6, 1)) return FL_BAD_ARGUMENT;
-    if (policy->policy == FL_PRIORITY && sizeof(real) < sizeof(double)) return FL_NEEDS_DOUBLE;
   }
   for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
     if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
-}
-
-/* The same for many wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands
-   (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
-int fl_answer_many(const real *block, fl_work *work, const real *wrench, int count, const fl_policy *policy,
-                   real *force, real *price, real *aim, real *value, real *command, unsigned char *within) {
-  int n = COUNT(block), ended = 0;
-  fl_question q = {{0}, policy, 0, 0};
-  fl_answer out;
-  for (int k = 0; k < count; k++) {
-    memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
-    int error = fl_answer_one(block, work, &q, &out);
-    if (error) return error;
-    memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
-    memcpy(price + 6 * k, out.price, sizeof out.price);
-    memcpy(aim + 6 * k, out.aim, sizeof out.aim);
-    memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
-    value[k] = out.value, within[k] = out.within, ended |= out.ended;
-  }
-  return ended ? -1 : 0;
-}
-
-/* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of previous ones (n, 3). */
-void fl_commands(const real *block, fl_work *work, const real *force, int count, const real *previous, real *command) {
-  int n = COUNT(block);
-  all_limits(block, &work->box);
-  for (int k = 0; k < count; k++)
-    commands_for(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
-}
-
-/* What prices (6,) of the wrench in the basis [W] give: forces (n, 2), and the dual value for a wrench. */
-real fl_look(const real *block, fl_work *work, const real *wrench, const real *inner, real *force) {
-  real target[6];
-  to_basis(block, wrench, target);
-  look(block, work, target, inner, work->state);
-  memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
-  return work->state->value;
-}
-
-/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 3): prices along its force, ahead and
-   in reverse, and what the force is worth, less its power [W]. */
-void fl_worth(const real *block, fl_work *work, const real *price, int count, real *worth) {
-  for (int k = 0; k < count; k++, price += 6) {
-    real inner[6], own[2];
-    price_in_basis(block, price, inner);
-    for (int i = 0; i < COUNT(block); i++, worth += 3) {
-      own_price(block, i, inner, own);
-      along_of(block, i, work->set + i, own, worth, worth + 1);
-      worth[2] = reply_of(block, i, work->set + i, own).conjugate;
-    }
-  }
 }

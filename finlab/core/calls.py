@@ -17,7 +17,6 @@ MAGIC = 41721.0
 """First number of a block; its version is the second."""
 CODES = (
     *("", "no block of a robot", "a block of another version", "a number out of range", "a bad argument"),
-    "a policy that needs double precision",
 )
 
 

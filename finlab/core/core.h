@@ -12,6 +12,7 @@ typedef float fl_real;
 #else
 typedef double fl_real;
 #endif
+typedef double fl_wide; /* of points that are mixed, as their differences are small */
 
 #ifndef FL_MOST
 #define FL_MOST 64 /* actuators */
@@ -91,8 +92,8 @@ typedef struct { /* prices, and what they give */
 #define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
 
 typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
-  fl_real force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6];
-  fl_real q[FL_POINTS][6], r[FL_POINTS][FL_POINTS];
+  fl_real force[FL_POINTS][FL_MOST][2];
+  fl_wide point[FL_POINTS][6], share[FL_POINTS], miss[6], q[FL_POINTS][6], r[FL_POINTS][FL_POINTS];
   int count, done; /* points; how many of them the basis knows */
 } fl_mixture;
 
@@ -147,8 +148,8 @@ typedef struct {
   int placed;                /* 1 where the commands are those of a search, for foils */
 } fl_answer;
 
-/* Error codes; 0 is none. FL_PRIORITY needs double precision. */
-enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT, FL_NEEDS_DOUBLE };
+/* Error codes; 0 is none. */
+enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
 
 int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
@@ -167,7 +168,7 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, i
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
 void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
-void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_real *from, const fl_real *ray, int count,
-              fl_real close, fl_real *size, fl_real *normal, fl_real *force);
+void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_wide *from, const fl_wide *ray, int count,
+              fl_wide close, fl_wide *size, fl_wide *normal, fl_real *force);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
 #endif

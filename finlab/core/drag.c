@@ -36,7 +36,7 @@ static void draw_tangent(const real *block, int i, const fl_box *box, real angle
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
-static real cost_of(const real *block, real command[][3], real force[][2]) {
+real cost_of(const real *block, real command[][3], real force[][2]) {
   real cost = 0, own[3];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -83,6 +83,13 @@ static void stepped(const real *block, const fl_work *work, const fl_box *box, r
   }
 }
 
+/* Whether Levenberg-Marquardt steps make commands within a box give work->aim, to rounding. */
+static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps) {
+  real size = 0;
+  for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
+  return refine(block, work, box, work->aim, command, steps) <= EXACT + ROUNDING * size;
+}
+
 /* Makes commands give work->aim, in the basis `target`, and then cheaper; `price` becomes that of the last step. Their
    forces along the rows, and their cost [W]; NONE where they do not come to give it. */
 static real settle(const real *block, fl_work *work, const real *target, real *price, real command[][3],
@@ -93,7 +100,7 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
   memcpy(before, work->set, sizeof before);
   cost_of(block, command, force);
   take_sides(block, work, &box, command, force);
-  int met = refine(block, work, &box, work->aim, command, 2 * ROUNDS) <= EXACT, moved = 1;
+  int met = come_to_give(block, work, &box, command, 2 * ROUNDS), moved = 1;
   real cost = met ? cost_of(block, command, force) : NONE;
   for (int k = 0; met && k < ROUNDS; k++) {
     for (int i = 0; moved && i < COUNT(block); i++) {
@@ -107,8 +114,7 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
       memcpy(price, work->now->price, sizeof work->now->price);
     memcpy(tried, command, sizeof tried);
     stepped(block, work, &box, force, size, tried);
-    real error = refine(block, work, &box, work->aim, tried, 2 * ROUNDS);
-    real gain = error <= EXACT ? cost - cost_of(block, tried, other) : -NONE;
+    real gain = come_to_give(block, work, &box, tried, 2 * ROUNDS) ? cost - cost_of(block, tried, other) : -NONE;
     if ((moved = gain > 0)) {
       memcpy(command, tried, sizeof tried);
       memcpy(force, other, sizeof other);
@@ -117,8 +123,7 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
       size *= R(0.25);
     if (FABS(gain) <= CHEAPER * cost) break;
   }
-  memcpy(work->set, before, sizeof before);
-  sums_of(block, work);
+  take_sets(block, work, before);
   return cost;
 }
 
@@ -171,8 +176,7 @@ void place_starts(const real *block, fl_work *work, const real *target, real *be
     }
   if (*best <= enough) return;
   first_price(block, work, target, price, &ridge);
-  work->now = work->state;
-  look(block, work, target, price, work->state);
+  stand_at(block, work, target, price);
   place(block, work, target, best);
 }
 
@@ -186,7 +190,7 @@ static int are_sure(const real *block, fl_work *work) {
   if (worst_gap(block, work, work->now->force, work->now->price) >= 0) return 0;
   memcpy(work->best, work->now->force, sizeof work->best);
   commands_for(block, &work->box, work->best, work->previous, work->placed);
-  return refine(block, work, &work->box, work->aim, work->placed, ROUNDS) <= EXACT;
+  return come_to_give(block, work, &work->box, work->placed, ROUNDS);
 }
 
 /* Commands that give work->aim, from what Newton's method came to; 0 where none are found. */
@@ -196,7 +200,7 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
   if (!(status == FL_MET && are_sure(block, work))) {
     if (!least_power(block, work, target, status, &bound)) return 0;
     if (status != FL_MET) { /* prices at the commands may prove more */
-      look(block, work, target, work->near, work->state);
+      stand_at(block, work, target, work->near);
       if (work->state->value > value) memcpy(out->inner, work->near, sizeof out->inner);
     }
   }

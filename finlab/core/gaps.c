@@ -6,10 +6,12 @@
 
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
 
+/* Angle of a force from the middle of its arc. */
+static real off_middle(const fl_set *set, const real *force) { return wrapped(ATAN2(force[1], force[0]) - set->middle); }
 
 /* How far a plane's force is from all that it can give forward and in reverse. */
 static real between_ways(const fl_actuator *a, const fl_set *set, const real *force, real size) {
-  real angle = ATAN2(force[1], force[0]) - set->middle, ends[2] = {set->high, set->reverse};
+  real angle = off_middle(set, force), ends[2] = {set->high, set->reverse};
   if (size <= NEARLY * a->most[0]) return 0;
   for (int way = 0; way < 2; way++)
     if (FABS(wrapped(angle + way * PI)) - set->half <= CLOSE && size <= ends[way] + NEARLY * a->most[0]) return 0;
@@ -32,7 +34,7 @@ static real gap_of(const real *block, int i, const fl_set *set, const real *forc
   real size = size_of(force), amount = 0;
   if (set->reverse > 0 && !price) return between_ways(a, set, force, size);
   if (set->half > NARROW) {
-    real off = FABS(wrapped(ATAN2(force[1], force[0]) - set->middle)) - set->half;
+    real off = FABS(off_middle(set, force)) - set->half;
     if (off > CLOSE && size > NEARLY * a->most[0]) amount += off;
     if (set->low > HOLLOW * largest && size < R(0.98) * set->low) amount += 1 - size / set->low;
   }
@@ -76,7 +78,7 @@ int nearer_side(const real *block, int i, const fl_set *set, const real *force) 
   if (a->speed > 0) return force[0] < (set->low + set->high) / 2 ? -1 : 1;
   if (!is_plane(a)) return FABS(force[0]) > a->band / 2 ? 1 : -1;
   if (set->half >= PI && set->reverse == 0) return 1;
-  real off = wrapped(ATAN2(force[1], force[0]) - set->middle);
+  real off = off_middle(set, force);
   return (set->reverse > 0 ? COS(off) : off) < 0 ? -1 : 1;
 }
 
@@ -151,7 +153,7 @@ static int any_hollow(const real *block, const fl_work *work) {
 
 /* Freezes a plane at its least force, in the direction of a force or next to it in its arc. */
 static void freeze_at_least(const real *block, int i, fl_set *set, const real *force) {
-  real off = CLIP(wrapped(ATAN2(force[1], force[0]) - set->middle), -set->half, set->half);
+  real off = CLIP(off_middle(set, force), -set->half, set->half);
   real least[2] = {set->low * COS(set->middle + off), set->low * SIN(set->middle + off)};
   freeze(block, i, set, least);
 }
@@ -223,14 +225,11 @@ int least_power(const real *block, fl_work *work, const real *target, int status
   memcpy(price, work->now->price, sizeof price);
   if (work->drags) {
     place_starts(block, work, target, &best);
-    look(block, work, target, price, work->state);
-    work->now = work->state;
+    stand_at(block, work, target, price);
   }
   dive(block, work, target, status, &best);
-  memcpy(work->set, work->kept, sizeof work->kept);
-  sums_of(block, work);
-  look(block, work, target, price, work->state);
-  work->now = work->state;
+  take_sets(block, work, work->kept);
+  stand_at(block, work, target, price);
   for (status = root;;) {
     fl_state *s = work->now;
     real own = s->value;
@@ -254,8 +253,7 @@ int least_power(const real *block, fl_work *work, const real *target, int status
     take_side(block, work, node, -node->first);
     status = newton(block, work, target, node->price, STEPS_AT_KINK);
   }
-  memcpy(work->set, work->kept, sizeof work->kept);
-  sums_of(block, work);
+  take_sets(block, work, work->kept);
   *value = bound;
   return best < R(1e30);
 }

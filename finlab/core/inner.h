@@ -6,6 +6,7 @@
 #include <string.h>
 
 typedef fl_real real;
+typedef fl_wide wide;
 #ifdef FL_SINGLE
 #define R(x) x##f
 #define SQRT sqrtf
@@ -20,9 +21,7 @@ typedef fl_real real;
 #define ENOUGH R(1e-4) /* the same where Newton's method stands still for IDLE steps; commands make up for it */
 #define IDLE 6
 #define ROUNDING R(1e-6)
-#define CLOSE_BY R(2e-6) /* distance, on the yardstick, up to which a point is the nearest one */
-#define STALLED R(2e-5) /* the same where planes across misses, by rounding, bound a ray no further */
-#define SAME R(1e-4) /* misses of a policy that differ by less are the same */
+#define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -37,14 +36,13 @@ typedef fl_real real;
 #define TOLERANCE 1e-10
 #define ENOUGH TOLERANCE
 #define IDLE MOST_STEPS
+#define EXACT 1e-8
 #define ROUNDING 1e-12
-#define CLOSE_BY NOTHING
-#define STALLED R(1.0)
-#define SAME NEARLY
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
 #define NOTHING R(1e-9)
+#define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
 #define NEARLY R(1e-6)
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)
@@ -93,14 +91,15 @@ void set_up(const real *block, int i, fl_set *set);
 void freeze(const real *block, int i, fl_set *set, const real *force);
 real cost_at(const real *block, int i, real force);
 reply reply_of(const real *block, int i, const fl_set *set, const real *price);
-void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force);
+void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force, real *ways);
 real drag_of(const real *block, int i, real force);
-void along_of(const real *block, int i, const fl_set *set, const real *price, real *ahead, real *back);
 int undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
 /* newton.c */
 #define MOST_STEPS 200
 void sums_of(const real *block, fl_work *work);
+void take_sets(const real *block, fl_work *work, const fl_set *set);
+void stand_at(const real *block, fl_work *work, const real *target, const real *price);
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
@@ -122,16 +121,30 @@ fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
 /* drag.c */
+real cost_of(const real *block, real command[][3], real force[][2]);
 void place(const real *block, fl_work *work, const real *target, real *best);
 void place_starts(const real *block, fl_work *work, const real *target, real *best);
 int with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
 void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
 
 /* nearest.c */
+static inline wide product(const wide *a, const wide *b, int n) {
+  wide sum = 0;
+  for (int k = 0; k < n; k++) sum += a[k] * b[k];
+  return sum;
+}
+
+static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+
+/* Adds a vector (6,) so many times. */
+static inline void add(wide *to, wide times, const wide *other) {
+  for (int k = 0; k < 6; k++) to[k] += times * other[k];
+}
 void weigh(const real *block, fl_work *work, const real *weight);
-void nearest_point(const real *block, const fl_work *work, const real *target, real close, real apart, fl_mixture *m);
-real farthest_along(const real *block, const fl_work *work, const real *from, const real *ray, real least, real most,
-                    real close, fl_mixture *m, real *plane);
+void point_of(const real *block, const fl_work *work, real force[][2], wide *point);
+wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
+wide farthest_along(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
+                    wide close, fl_mixture *m, wide *plane);
 void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 
 /* law.c */
@@ -140,7 +153,6 @@ void command_for(const real *block, int i, const fl_box *box, const real *force,
 void reach_of(const real *block, int i, const fl_box *box, real *limits);
 
 /* command.c */
-#define EXACT R(1e-8)
 #define TICK_STEPS 5
 void all_limits(const real *block, fl_box *box);
 void tick_limits(const real *block, const real *previous, fl_box *box);

@@ -20,15 +20,6 @@ void to_basis(const real *block, const real *wrench, real *target) {
   }
 }
 
-/* Prices in the basis of those of the wrench. */
-void price_in_basis(const real *block, const real *price, real *inner) {
-  const fl_head *h = HEAD(block);
-  for (int j = 0; j < 6; j++) {
-    inner[j] = 0;
-    for (int k = 0; k < 6; k++) inner[j] += h->basis[k][j] * h->scale[k] * price[k];
-  }
-}
-
 /* How much of a scaled wrench lies beside the range, and its size. */
 real beside_range(const real *block, const real *wrench, const real *target, real *size) {
   const fl_head *h = HEAD(block);
@@ -96,6 +87,11 @@ void sums_of(const real *block, fl_work *work) {
   }
 }
 
+void take_sets(const real *block, fl_work *work, const fl_set *set) {
+  memcpy(work->set, set, sizeof work->set);
+  sums_of(block, work);
+}
+
 /* What prices give for a target in the basis. */
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
   real given[6] = {0}, conjugate = 0;
@@ -115,6 +111,12 @@ void look(const real *block, const fl_work *work, const real *target, const real
   for (int j = 0; j < 6; j++) state->price[j] = price[j], state->residual[j] = target[j] - given[j];
   state->value = dot(price, target, 6) - conjugate;
   state->size = SQRT(dot(state->residual, state->residual, 6));
+}
+
+/* Has Newton's method be at prices. */
+void stand_at(const real *block, fl_work *work, const real *target, const real *price) {
+  work->now = work->state;
+  look(block, work, target, price, work->state);
 }
 
 /* Prices to begin with: those at which actuators whose costs are ~ T^1.5 give a target, each with its force over price
@@ -174,8 +176,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   fl_state *s = work->state, *trial = work->state + 1;
   real first[6], step[6], next[6], ridge = NEARLY, growth = 2, most = work->most_cost * (1 + NOTHING) + NOTHING;
   if (!price) first_price(block, work, target, first, &ridge);
-  look(block, work, target, price ? price : first, s);
-  work->now = s;
+  stand_at(block, work, target, price ? price : first);
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
   for (int k = 0, idle = 0;; k++) {
     if (s->size <= work->enough) return FL_MET;

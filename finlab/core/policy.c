@@ -6,27 +6,28 @@
    all lies in none. */
 #include "inner.h"
 
-#define HELD R(1e3)      /* weight of an axis that is held over one of the group that is served */
+#define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
-#define PULL R(1e-3)     /* what a group may miss without pulling at the axes that are held */
+#define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
-static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                    real force[][2]) {
-  const fl_head *h = HEAD(block);
-  real weight[6], target[6];
+static real rounded(wide value) { return (real)(floor(value / NEARLY + 0.5) * NEARLY); }
+
+static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
+  real weight[6];
+  wide target[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = MAX(policy->weight[k], CLOSE) / h->yard[k];
+    weight[k] = MAX(policy->weight[k], CLOSE) / HEAD(block)->yard[k];
     target[k] = weight[k] * wrench[k];
   }
   weigh(block, work, weight);
   work->mixture.count = 0;
-  nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
-  mixed_force(block, &work->mixture, force);
+  score[0] = (real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
 }
 
-static void direction(const real *block, fl_work *work, const real *wrench, real force[][2]) {
+static void direction(const real *block, fl_work *work, const real *wrench, real *score) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], begin[6], ray[6], all[6], plane[6], size, rest;
+  real target[6], weight[6], all[6], size, rest;
+  wide begin[6], ray[6], plane[6], share;
   for (int k = 0; k < 6; k++) {
     weight[k] = 1 / h->yard[k];
     all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
@@ -36,81 +37,56 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
     ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
   weigh(block, work, weight);
-  farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
-  mixed_force(block, &work->mixture, force);
-}
-
-static real size_in(const unsigned char *group, const real *missing) {
-  real sum = 0;
-  for (int k = 0; k < 6; k++) sum += group[k] ? missing[k] * missing[k] : 0;
-  return SQRT(sum);
+  share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
+  wide *miss = work->mixture.miss, more = product(miss, ray, 6) / MAX(product(ray, ray, 6), 1e-300);
+  add(miss, -more, ray);
+  score[0] = rounded(length_of(miss)), score[1] = (real)(1 - share - more);
 }
 
 /* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
-static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                     real force[][2]) {
-  const fl_head *h = HEAD(block);
+static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
-  real aim[6];
-  int any = 0;
-  memcpy(aim, wrench, sizeof aim);
+  wide wanted[6], aim[6]; /* on the yardstick */
+  for (int k = 0; k < 6; k++) wanted[k] = aim[k] = (wide)wrench[k] / (wide)HEAD(block)->yard[k];
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
     const unsigned char *group = policy->group[g];
-    real weight[6], target[6], got[6], missing[6], missed = 0;
-    for (int k = 0; k < 6; k++) weight[k] = (HELD * held[k] + group[k]) / h->yard[k];
+    real weight[6];
+    wide target[6], missing[6] = {0}, missed, far;
+    for (int k = 0; k < 6; k++) weight[k] = (real)(HELD * held[k] + group[k]) / HEAD(block)->yard[k];
     weigh(block, work, weight);
-    for (int round = 0; round < (any ? ROUNDS : 1); round++) {
-      m->done = 0;
-      for (int p = 0; p < m->count; p++) { /* the points so far, in the axes of this group */
-        wrench_of(block, m->force[p], m->point[p]);
-        for (int k = 0; k < 6; k++) m->point[p][k] *= weight[k];
-      }
-      for (int k = 0; k < 6; k++) target[k] = aim[k] * weight[k];
-      nearest_point(block, work, target, CLOSE_BY * (any ? HELD : 1), 0, m);
-      mixed_force(block, m, force);
-      wrench_of(block, force, got);
-      for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k];
-      missed = size_in(group, missing);
-      if (missed <= PULL || dot(m->miss, m->miss, 6) <= 4 * PULL * PULL) break;
+    m->done = 0; /* the points so far, in the axes of this group: */
+    for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
+    for (int round = 0;; round++) {
+      for (int k = 0; k < 6; k++) target[k] = (HELD * held[k] + group[k]) * aim[k];
+      far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m);
       for (int k = 0; k < 6; k++)
-        if (group[k]) aim[k] = got[k] + PULL / missed * (wrench[k] - got[k]);
+        if (group[k]) missing[k] = wanted[k] - aim[k] - m->miss[k] / (HELD * held[k] + 1);
+      missed = length_of(missing);
+      if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
+      for (int k = 0; k < 6; k++)
+        if (group[k]) aim[k] = wanted[k] - (1 - PULL / missed) * missing[k];
     }
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
-      if (group[k] && missed > NEARLY) aim[k] = got[k];
+      if (group[k] && missed > NEARLY) aim[k] = wanted[k] - missing[k];
     }
-    any = 1;
+    score[g] = rounded(missed);
   }
 }
-
-static real rounded(real value) { return FLOOR(value / SAME + R(0.5)) * SAME; }
 
 /* Serves a policy within the sets of a part; how badly, the first number counting most. */
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real force[][2],
                   real *score) {
-  const fl_head *h = HEAD(block);
-  real got[6], missing[6], along[6], left;
-  if (policy->policy == FL_DIRECTION)
-    direction(block, work, wrench, force);
-  else if (policy->policy == FL_PRIORITY)
-    priority(block, work, wrench, policy, force);
-  else
-    closest(block, work, wrench, policy, force);
-  wrench_of(block, force, got);
   memset(score, 0, FL_SCORES * sizeof *score);
-  for (int k = 0; k < 6; k++) missing[k] = (wrench[k] - got[k]) / h->yard[k], along[k] = (wrench[k] + h->beside[k]) / h->yard[k];
-  if (policy->policy == FL_PRIORITY)
-    for (int g = 0; g < policy->groups; g++) score[g] = rounded(size_in(policy->group[g], missing));
-  else if (policy->policy == FL_DIRECTION) {
-    left = dot(missing, along, 6) / MAX(dot(along, along, 6), TINY);
-    for (int k = 0; k < 6; k++) missing[k] -= left * along[k];
-    score[0] = rounded(SQRT(dot(missing, missing, 6))), score[1] = left;
-  } else {
-    for (int k = 0; k < 6; k++) missing[k] *= MAX(policy->weight[k], CLOSE);
-    score[0] = SQRT(dot(missing, missing, 6));
-  }
+  if (policy->policy == FL_DIRECTION)
+    direction(block, work, wrench, score);
+  else if (policy->policy == FL_PRIORITY)
+    priority(block, work, wrench, policy, score);
+  else
+    closest(block, work, wrench, policy, score);
+  mixed_force(block, &work->mixture, force);
 }
 
 static int is_less(const real *a, const real *b) {
@@ -154,7 +130,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     memcpy(out->inner, work->now->price, sizeof out->inner);
     if (met) {
       memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
-      if (work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
+      if (work->now->size > TOLERANCE && work->now->size <= AT_RIM) wrench_of(block, out->force, out->aim);
       return;
     }
   }
@@ -166,21 +142,19 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
 static void better_side(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_node *node,
                         real force[][2], real *score) {
   real other[FL_MOST][2];
-  int side = nearer_side(block, node->cut, &node->before, node->force);
-  take_side(block, work, node, side);
-  serve(block, work, wrench, policy, force, score);
-  take_side(block, work, node, -side);
+  node->first = nearer_side(block, node->cut, &node->before, node->force);
+  take_side(block, work, node, -node->first);
   serve(block, work, wrench, policy, other, node->score);
-  node->first = side;
-  if (is_less(node->score, score)) {
-    real kept[FL_SCORES];
-    memcpy(kept, score, sizeof kept);
-    memcpy(score, node->score, sizeof kept);
-    memcpy(node->score, kept, sizeof kept);
-    memcpy(force, other, COUNT(block) * sizeof *other);
-    node->first = -side;
-  } else
-    take_side(block, work, node, side);
+  take_side(block, work, node, node->first);
+  serve(block, work, wrench, policy, force, score);
+  if (!is_less(node->score, score)) return;
+  for (int k = 0; k < FL_SCORES; k++) {
+    real kept = score[k];
+    score[k] = node->score[k], node->score[k] = kept;
+  }
+  memcpy(force, other, COUNT(block) * sizeof *other);
+  node->first = -node->first;
+  take_side(block, work, node, node->first);
 }
 
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
@@ -210,9 +184,8 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
     take_side(block, work, node, -node->first);
     serve(block, work, wrench, policy, own, score);
   }
-  memcpy(work->set, work->best_set, sizeof work->set);
+  take_sets(block, work, work->best_set);
   *share = 1 - best[1];
-  sums_of(block, work);
 }
 
 void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
@@ -227,8 +200,7 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
   cheapest(block, work, force, inside, wanted, policy->policy == FL_DIRECTION ? TOLERANCE : AT_RIM, out);
-  memcpy(work->set, work->kept, sizeof work->set);
-  sums_of(block, work);
+  take_sets(block, work, work->kept);
   if (!may_have_gaps(block, work, out->force)) return;
   to_basis(block, out->aim, target); /* another part of the sets may give it for less */
   int status = newton(block, work, target, 0, MOST_STEPS);

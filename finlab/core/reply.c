@@ -216,10 +216,10 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
   force[1] = drag_of(block, i, force[0]);
 }
 
-/* The force that is worth most at a price, whatever its power. */
-void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force) {
+/* The force that is worth most at a price, whatever its power, and the prices along what is given ahead and in reverse. */
+void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force, real *ways) {
   const fl_actuator *a = ACTUATOR(block, i);
-  force[1] = 0;
+  force[1] = 0, ways[0] = price[0], ways[1] = 0;
   if (a->rows == 1) {
     force[0] = price[0] > 0 ? set->high : set->low;
     return;
@@ -230,10 +230,11 @@ void farthest_of(const real *block, int i, const fl_set *set, const real *price,
   }
   fan f = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY);
   real size = f.along > 0 ? set->high : set->low;
-  force[0] = size * f.x, force[1] = size * f.y;
+  force[0] = size * f.x, force[1] = size * f.y, ways[0] = f.along;
   if (set->reverse > 0) {
     fl_set back = reversed(set);
     fan g = direction_of(&back, 0, price, TINY);
+    ways[1] = g.along;
     if (g.along > 0 && back.high * g.along > size * f.along) force[0] = back.high * g.x, force[1] = back.high * g.y;
   }
 }
@@ -248,16 +249,4 @@ int undecided(const real *block, int i, const fl_set *set, const real *price, re
   real dx = ahead.force[0] - other.force[0], dy = ahead.force[1] - other.force[1];
   *off = MIN(share, 1 - share) * SQRT(dx * dx + dy * dy);
   return share >= R(0.5);
-}
-
-/* Prices along the forces that answer a price, ahead and in reverse. */
-void along_of(const real *block, int i, const fl_set *set, const real *price, real *ahead, real *back) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  *ahead = price[0], *back = 0;
-  if (a->rows == 1 || a->speed > 0) return;
-  *ahead = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY).along;
-  if (set->reverse > 0) {
-    fl_set other = reversed(set);
-    *back = direction_of(&other, 0, price, TINY).along;
-  }
 }

@@ -126,20 +126,6 @@ static real exact(const whole *w, real *block, fl_work *work, const real *aim, r
   return error;
 }
 
-/* Forces along the directions of the dual, of commands; their power [W]. */
-static real along_of_all(const real *block, real command[][3], real along[][2]) {
-  real power = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real force[3], size;
-    force_of(block, i, command[i], force, 0);
-    along[i][0] = a->form == FL_THRUSTER ? a->sign * force[0] : force[is_plane(a)], along[i][1] = force[1 + is_plane(a)];
-    size = is_plane(a) ? size_of(along[i]) / (a->gauge > 0 ? gauge_at(block + (int)a->gauge, ATAN2(along[i][1], along[i][0])) : 1) : along[i][0];
-    power += cost_at(block, i, a->form == FL_POD ? command[i][1] : size);
-  }
-  return power;
-}
-
 /* Turns from forces (n, 2) on, as many as are given, or from the previous commands of the question; its price is one
    of the wrench. The forces that they come to, the last answer of the dual by which they got better, with their
    commands, and what they end with (3,): power [W], what an error as large as the yardstick counts [W], the error. */
@@ -150,12 +136,12 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   fl_box box;
   real(*here)[2] = (real(*)[2])forces, command[FL_MOST][3], there[FL_MOST][2], inner[6] = {0}, worth = end[1];
   command_fins(w, block, !q.previous);
-  if (q.previous) along_of_all(block, (real(*)[3])q.previous, here);
+  if (q.previous) cost_of(block, (real(*)[3])q.previous, here);
   all_limits(block, &box);
   commands_for(block, &box, here, q.previous, command);
   /* A tick begins where the robot is; forces that are only looked at need not be exact. */
   real enough = q.previous ? 1 / NOTHING : turns ? NEARLY / 10 : 10 * CLOSE;
-  real error = exact(w, block, work, q.wrench, enough, command), power = along_of_all(block, command, here);
+  real error = exact(w, block, work, q.wrench, enough, command), power = cost_of(block, command, here);
   for (int turn = 0; turn < turns; turn++) {
     int failed = span(block, work), better = 0;
     if (q.price) price_in_basis(block, q.price, inner), q.price = inner;
@@ -170,7 +156,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
       for (int i = 0; i < COUNT(block); i++)
         for (int c = 0; c < 2; c++) force[i][c] = here[i][c] + size * (own.force[i][c] - here[i][c]);
       if (k > 0 || q.previous) commands_for(block, &box, force, q.previous, tried);
-      new_error = exact(w, block, work, q.wrench, NEARLY / 10, tried), new_power = along_of_all(block, tried, there);
+      new_error = exact(w, block, work, q.wrench, NEARLY / 10, tried), new_power = cost_of(block, tried, there);
       if (!(new_power + worth * new_error < merit)) continue;
       better = 1, power = new_power, error = new_error, *out = own;
       memcpy(here, there, COUNT(block) * sizeof *here);

@@ -28,8 +28,10 @@ SAMPLES = 24
 """Questions of a self-test."""
 ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
-NOT_ABOARD = "jets.c", "turns.c", "reach.c"
-"""Files of the core for robots with `interaction`, and for what a layout can do."""
+NOT_ABOARD = "jets.c", "turns.c", "reach.c", "for_python.c"
+"""Files of the core for robots with `interaction`, and for what a layout can do and prices prove."""
+QUESTIONS = ("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("priority", 3.0), ("closest", 0.6)
+"""Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick before."""
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
@@ -120,17 +122,17 @@ def _header(layout: Layout) -> str:
 
 
 def _samples(layout: Layout, method: Dual, count: int) -> str:
-    """Wrenches within reach, out of it by the policies that single precision serves, and ticks; where the
-    core leaves nothing to the library, which has more ways around gaps."""
+    """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to the
+    library, which has more ways around gaps."""
     allocator, rng = Allocator(layout), np.random.default_rng(0)
     before: list[str] = []
     rows: list[str] = []
     for k in range(8 * count):
         if len(rows) == count:
             break
-        policy, far = (("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("closest", 0.6))[k % 4]
+        policy, far = QUESTIONS[k % len(QUESTIONS)]
         wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
-        tick = allocator.allocate(0.5 * wrench).command if k % 4 == 3 else None
+        tick = allocator.allocate(0.5 * wrench).command if far < 0.9 else None
         answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
         given = answer.wrench * layout.commanded
         alone = method.forces(far * wrench[None], Policy(policy)).command
