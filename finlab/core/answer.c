@@ -3,12 +3,6 @@
 
 int fl_version(void) { return FL_VERSION; }
 
-int fl_sizes(int which) {
-  const int sizes[] = {sizeof(real), sizeof(fl_head), sizeof(fl_actuator), sizeof(fl_work),
-                       sizeof(fl_policy), sizeof(fl_answer), FL_MOST};
-  return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
-}
-
 static int are_within(const real *values, int count, real most) {
   for (int k = 0; k < count; k++)
     if (!(FABS(values[k]) <= most)) return 0;
@@ -38,7 +32,7 @@ static int is_grid(const real *block, real place, real length) {
     knots += grid[k], points *= grid[k];
   }
   if (!(grid[3] >= 0 && grid[5] >= 1 && grid[5] <= 3 && grid[5] == FLOOR(grid[5]))) return 0;
-  if (!is_place(place, length, 7) || place + 7 + knots + points * grid[5] > length) return 0;
+  if (place + 7 + knots + points * grid[5] > length) return 0;
   for (int k = 0, at = 7; k < 3; at += (int)grid[k++])
     for (int j = 1; j < (int)grid[k]; j++)
       if (!(grid[at + j] > grid[at + j - 1])) return 0;

@@ -1,5 +1,11 @@
-/* What Python alone asks: many answers, commands of other methods, and what prices prove. */
+/* What Python alone asks: sizes, many answers, commands of other methods, and what prices prove. */
 #include "inner.h"
+
+int fl_sizes(int which) {
+  const int sizes[] = {sizeof(real), sizeof(fl_head), sizeof(fl_actuator), sizeof(fl_work),
+                       sizeof(fl_policy), sizeof(fl_answer), FL_MOST};
+  return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
+}
 
 /* Answers to wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands
    (count, n, 3), within reach; -1 where a search ended at its bound of steps. */

@@ -7,6 +7,7 @@
 #include "inner.h"
 
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
+#define INSIDE R(9.99e-7) /* scaled wrench by which an answer stays inside the rim */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
@@ -108,8 +109,9 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
   }
 }
 
-/* The least power for a wrench that forces give, or hardly another one that is wanted; where Newton's method does
-   not settle, at the rim, a little towards the wrench `inside`, else these forces. */
+/* The least power for a wrench that forces give, or hardly another one that is wanted; at the rim, where power is
+   steep, a little towards the wrench `inside`, and at the rim itself; where Newton's method settles at none, these
+   forces. */
 static void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
                      real enough, fl_answer *out) {
   const fl_head *h = HEAD(block);
@@ -119,10 +121,10 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     real way = (inside[k] - wrench[k]) / h->scale[k];
     size += way * way;
   }
+  real step = work->drags ? 0 : INSIDE / MAX(1, SQRT(size));
   for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
-      out->aim[k] = tried == 0 ? wanted[k]
-                               : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
+      out->aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 1) * step * (inside[k] - wrench[k]);
     to_basis(block, out->aim, target);
     work->enough = enough;
     int met = newton(block, work, target, 0, STEPS_AT_KINK) == FL_MET;

@@ -142,7 +142,7 @@ class Dual(Method):
         if self.error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
             return ""
         kept = False
-        while high > low + CLOSE * size:
+        while high > low + NEARLY * size:
             share = 0.5 * (low + high)
             tried = share / size * target[None]
             one = self.forces(tried, None)
