@@ -19,12 +19,12 @@ from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Axes,
     Usable,
-    axes_of,
     check_flow,
     check_layout,
     check_previous,
     check_reference,
     check_seed,
+    check_target,
     check_wrenches,
     damage_of,
     same_axes,
@@ -267,9 +267,9 @@ class Allocator:
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
-        values = check_wrenches(wrench, single=True)
+        values, axes = check_target(wrench, self._layout)
         known = damage_of(damage, lost, failed)
-        question = self._question(known, policy, flow, seed, axes_of(self._layout, values))
+        question = self._question(known, policy, flow, seed, axes)
         robot, method = question.ready.robot, question.ready.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
@@ -327,7 +327,7 @@ class Allocator:
         The answer keeps the targets as they are, not a copy, and the commands; what else there is to tell is
         computed when it is asked for.
         """
-        values = check_wrenches(wrenches, single=False)
+        values = check_wrenches(wrenches)
         known = damage_of(damage, lost, failed)
         question = self._question(known, policy, flow, seed)
         start = time.perf_counter()

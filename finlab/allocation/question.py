@@ -86,33 +86,45 @@ def _size(array: Array) -> float:
     return math.hypot(*array.ravel().tolist()) if array.size <= FEW else float(np.abs(array).max())
 
 
-def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
-    """One wrench (6,) or many (N, 6) as float64, NaN for an axis that does not count, or a `CommandError`
-    that says what is wrong with what is called `name`. Arrays of many are not copied."""
+def _wrenches(wrench: ArrayLike, name: str, single: bool) -> tuple[Array, bool]:
+    """Checked wrenches, and whether each axis of them counts; see `check_wrenches`."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
-    if not _size(array) <= MAX_WRENCH and (bad := np.abs(array) > MAX_WRENCH).any():
+    if _size(array) <= MAX_WRENCH:
+        return array, True
+    if (bad := np.abs(array) > MAX_WRENCH).any():
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(
             f"{name}: {axis} must be at most {MAX_WRENCH:g} in size, or NaN where it is free, got {value}"
         )
-    return array
+    return array, not np.isnan(array).any()
+
+
+def check_wrenches(wrench: ArrayLike) -> Array:
+    """Wrenches (N, 6) as float64, not copied, NaN for an axis that does not count, or a `CommandError` that
+    says what is wrong."""
+    return _wrenches(wrench, "wrench", single=False)[0]
 
 
 def check_reference(reference: ArrayLike) -> Array:
     """Expected wrenches (K, 6), 0 for an axis that does not count; errors as of `check_wrenches`."""
-    array = check_wrenches(reference, single=False, name="reference")
-    return array if _size(array) >= 0.0 else np.nan_to_num(array)
+    array, whole = _wrenches(reference, "reference", single=False)
+    return array if whole else np.nan_to_num(array)
+
+
+def check_target(wrench: ArrayLike, layout: Layout) -> tuple[Array, Axes | None]:
+    """A wrench (6,) as float64, and the axes of a robot that it asks for: None where these are all that it
+    commands. Errors as of `check_wrenches`, and CommandError: there is none."""
+    array, whole = _wrenches(wrench, "wrench", single=True)
+    return array, None if whole else axes_of(layout, array)
 
 
 def axes_of(layout: Layout, wrench: Array) -> Axes | None:
     """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands. Raises
     CommandError: there is none."""
-    if _size(wrench) >= 0.0:  # no NaN
-        return None
     counts = layout.commanded & ~np.isnan(wrench)
     if (counts == layout.commanded).all():
         return None
@@ -166,7 +178,7 @@ def check_seed(seed: object) -> None:
 
 
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
-    """The previous command (n, 3), in which failed actuators may hold NaN."""
+    """The previous command (n, 3), a copy, in which failed actuators may hold NaN."""
     array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
     if not _size(array) < math.inf and np.isinf(array).any():
         raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
