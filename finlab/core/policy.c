@@ -7,7 +7,6 @@
 #include "inner.h"
 
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
-#define INSIDE R(9.99e-7) /* scaled wrench by which an answer stays inside the rim */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
@@ -121,7 +120,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     real way = (inside[k] - wrench[k]) / h->scale[k];
     size += way * way;
   }
-  real step = work->drags ? 0 : INSIDE / MAX(1, SQRT(size));
+  real step = work->drags ? 0 : R(0.999) * NEARLY / MAX(1, SQRT(size));
   for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
       out->aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 1) * step * (inside[k] - wrench[k]);

@@ -57,24 +57,24 @@ def test_damage_of_another_type_is_refused() -> None:
 
 def test_the_largest_wrench_is_still_taken() -> None:
     most = [question.MAX_WRENCH, -question.MAX_WRENCH, 0, 0, 0, 0]
-    np.testing.assert_array_equal(question.check_wrenches(most, single=True), most)
-    assert question.check_wrenches([1, 2, 3, 4, 5, 6], single=True).dtype == np.float64
-    assert question.check_wrenches(np.empty((0, 6)), single=False).shape == (0, 6)
+    np.testing.assert_array_equal(question.check_target(most, ROBOT)[0], most)
+    assert question.check_target([1, 2, 3, 4, 5, 6], ROBOT)[0].dtype == np.float64
+    assert question.check_wrenches(np.empty((0, 6))).shape == (0, 6)
     sentence = r"wrench: Tx must be at most 1e\+06 in size, or NaN where it is free, got -1000001"
     with pytest.raises(CommandError, match=sentence):
-        question.check_wrenches([[0] * 6, [0, 0, 0, -question.MAX_WRENCH - 1, 0, 9e9]], single=False)
+        question.check_wrenches([[0] * 6, [0, 0, 0, -question.MAX_WRENCH - 1, 0, 9e9]])
 
 
 @pytest.mark.parametrize("shape", [(6,), (2, 5), (1, 2, 6), ()])
 def test_many_wrenches_are_rows_of_six(shape: tuple[int, ...]) -> None:
     sentence = f"wrench: expected an array of shape (N, 6) in N and N m, got an array of shape {shape}"
     with pytest.raises(CommandError, match=f"^{re.escape(sentence)}$"):
-        question.check_wrenches(np.zeros(shape), single=False)
+        question.check_wrenches(np.zeros(shape))
 
 
 def test_complex_numbers_are_no_wrench() -> None:
     with pytest.raises(CommandError, match="wrench: expected six numbers"):
-        question.check_wrenches([1j, 0, 0, 0, 0, 0], single=True)
+        question.check_target([1j, 0, 0, 0, 0, 0], ROBOT)
 
 
 def test_expected_wrenches_ask_nothing_of_a_free_axis() -> None:
