@@ -123,7 +123,7 @@ typedef struct {
   fl_tangent tangent[FL_MOST];
   const fl_real *previous; /* commands of the tick before; 0 for none */
   fl_real aim[6], placed[FL_MOST][3], near[6]; /* wrench; commands of the best part where there are foils, prices there */
-  fl_real metric[6][6], factor[6][6], least_trace, most_cost, enough;
+  fl_real metric[6][6], factor[6][6], least_trace, most_cost;
   int quick, torn, drags, steps, ended;
 } fl_work;
 

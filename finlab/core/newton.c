@@ -70,7 +70,7 @@ int fl_prepare(const real *block, fl_work *work) {
   for (int j = 0; j < 6; j++)
     for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * RANGE(block) / trace + (j == k ? NEARLY : 0);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
-  work->least_trace = NEARLY * trace, work->enough = TOLERANCE;
+  work->least_trace = NEARLY * trace;
   sums_of(block, work);
   return RANGE(block) == 0 || factor(h) ? 0 : FL_BAD_NUMBER;
 }
@@ -81,9 +81,9 @@ void sums_of(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *s = work->set + i;
     work->most_cost += MAX(MAX(s->low_cost, s->high_cost), s->reverse > 0 ? s->reverse_cost : 0);
-    if (s->forked || s->reverse > 0) work->torn = 1;
-    if (ACTUATOR(block, i)->speed > 0) work->drags = 1;
-    if (s->forked || s->reverse > 0 || ACTUATOR(block, i)->band > 0 || ACTUATOR(block, i)->speed > 0) work->quick = 0;
+    work->torn |= s->forked || s->reverse > 0;
+    work->drags |= ACTUATOR(block, i)->speed > 0;
+    if (work->torn || work->drags || ACTUATOR(block, i)->band > 0) work->quick = 0;
   }
 }
 
@@ -179,7 +179,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   stand_at(block, work, target, price ? price : first);
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
   for (int k = 0, idle = 0;; k++) {
-    if (s->size <= work->enough) return FL_MET;
+    if (s->size <= TOLERANCE) return FL_MET;
     if (s->value > most) return FL_BEYOND;
     if (s->value > value + ROUNDING * FABS(value) || s->size < R(0.9) * size)
       value = s->value, size = s->size, idle = 0;

@@ -108,35 +108,32 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
   }
 }
 
-/* The least power for a wrench that forces give, or hardly another one that is wanted; at the rim, where power is
-   steep, a little towards the wrench `inside`, and at the rim itself; where Newton's method settles at none, these
-   forces. */
+/* The least power for a wrench that forces give, or hardly another one that is wanted; a little towards the wrench
+   `inside` where power is steep at the rim; where Newton's method settles at none, these forces. */
 static void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
-                     real enough, fl_answer *out) {
+                     fl_answer *out) {
   const fl_head *h = HEAD(block);
-  real wrench[6], target[6], size = 0;
+  real wrench[6], aim[6], target[6], size = 0, most = R(1e30);
   wrench_of(block, force, wrench);
+  memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
+  memcpy(out->aim, wrench, sizeof wrench);
   for (int k = 0; k < 6; k++) {
     real way = (inside[k] - wrench[k]) / h->scale[k];
     size += way * way;
   }
-  real step = work->drags ? 0 : R(0.999) * NEARLY / MAX(1, SQRT(size));
   for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
-      out->aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 1) * step * (inside[k] - wrench[k]);
-    to_basis(block, out->aim, target);
-    work->enough = enough;
-    int met = newton(block, work, target, 0, STEPS_AT_KINK) == FL_MET;
-    work->enough = TOLERANCE;
+      aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
+    to_basis(block, aim, target);
+    newton(block, work, target, 0, STEPS_AT_KINK);
+    if (work->now->size > MAX(AT_RIM, ENOUGH) || work->now->value > most) continue;
     memcpy(out->inner, work->now->price, sizeof out->inner);
-    if (met) {
-      memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
-      if (work->now->size > TOLERANCE && work->now->size <= AT_RIM) wrench_of(block, out->force, out->aim);
-      return;
-    }
+    memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+    memcpy(out->aim, aim, sizeof aim);
+    if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
+    most = (1 - FINE) * work->now->value;
+    if (tried != 1 || dot(out->inner, target, 6) <= 10 * work->now->value) return;
   }
-  memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
-  memcpy(out->aim, wrench, sizeof wrench);
 }
 
 /* Serves both sides of a cut and stays at the one that does better. */
@@ -200,7 +197,7 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   wrench_of(block, force, wanted);
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
-  cheapest(block, work, force, inside, wanted, policy->policy == FL_DIRECTION ? TOLERANCE : AT_RIM, out);
+  cheapest(block, work, force, inside, wanted, out);
   take_sets(block, work, work->kept);
   if (!may_have_gaps(block, work, out->force)) return;
   to_basis(block, out->aim, target); /* another part of the sets may give it for less */
