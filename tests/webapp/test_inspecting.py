@@ -206,7 +206,7 @@ def test_a_table_fin_goes_through_the_whole_app(
 
 def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(tabled: Layout) -> None:
     content = yaml_text(layout_to_dict(tabled)).encode()
-    with pytest.raises(LayoutError, match="put the layout and its tables, or its learned interaction, into one ZIP archive"):
+    with pytest.raises(LayoutError, match="or its learned interaction, into one ZIP archive"):
         files.read_layout("other.yaml", content.replace(b"tabled", b"other"))
 
 
