@@ -77,8 +77,8 @@ class NetworkConfig:
 
     def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
         """The mixtures that a network with these weights gives for node features (B, n, 10) and normalized,
-        centred targets (B, 6); where robots have fewer than n fins, `mask` (B, n) is True where there is
-        one."""
+        centred targets (B, 6). Where robots have fewer than n fins, `mask` (B, n) is the padding mask, True
+        where there is one: GATv2's edges keep to these, and so do the keys of self-attention."""
         return self.mixture(w, self.encoded(w, x, target, mask))
 
     def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:

@@ -1,6 +1,7 @@
 """The paper's surrogate in torch, and the terms of both losses, for robots of mixed numbers of fins.
 
-Robots are padded to n fins; `mask` (B, n) is True where there is one. The network itself is `NetworkConfig`.
+Robots are padded to n fins; the padding mask (B, n) is True where there is one. The network itself is
+`NetworkConfig`.
 """
 
 from collections.abc import Callable
