@@ -58,6 +58,10 @@ class Ready(NamedTuple):
     free: NDArray[np.bool_] | None
     """Axes (6,) that do not count; None where all do."""
 
+    def freed(self, wrenches: Array, value: float) -> Array:
+        """Wrenches (..., 6) with a value in the axes that do not count; themselves where all do."""
+        return wrenches if self.free is None else np.where(self.free, value, wrenches)
+
 
 class Question(NamedTuple):
     """A checked question but for its wrenches."""
@@ -280,16 +284,15 @@ class Allocator:
         if before is not None and robot.damage.lost:
             before = before[robot.alive]
         start = time.perf_counter()
-        target, free = values, question.ready.free
+        target = values
         if reference is not None:
             target = method.in_time(target, check_reference(reference))
-        if free is not None:
-            target = np.where(free, 0.0, target)
-        solution = question.solution(method, target[None], previous=before, **options)
+        solution = question.solution(
+            method, question.ready.freed(target, 0.0)[None], previous=before, **options
+        )
         solve_ms = (time.perf_counter() - start) * 1e3
-        shown = target.copy() if free is None else np.where(free, np.nan, target)
         return Allocation.of(
-            **self._about(question, shown, values, solution),
+            **self._about(question, question.ready.freed(target, np.nan).copy(), values, solution),
             command=robot.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
@@ -334,15 +337,15 @@ class Allocator:
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
             for axes, places in same_axes(self._layout, values):
-                method = self._ready(known, axes).method
+                ready = self._ready(known, axes)
                 for rows in chunks_of(places, len(values)):
-                    counts = method.layout.commanded
-                    targets = values[rows] if counts.all() else np.where(counts, values[rows], 0.0)
-                    yield rows, question.solution(method, targets, first_of(rows))
+                    yield (
+                        rows,
+                        question.solution(ready.method, ready.freed(values[rows], 0.0), first_of(rows)),
+                    )
 
         solution = joined(parts(), len(values), question.ready.robot.alive)
-        counts = self._layout.commanded
-        targets = values if counts.all() else np.where(counts, values, np.nan)
+        targets = question.ready.freed(values, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation.of(
             **self._about(question, targets, values, solution),

@@ -14,7 +14,6 @@ from mkdocs.exceptions import PluginError
 from finlab import load_layout
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy
-from finlab.core.calls import EACH, HEAD
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 from finlab.physics.objective import yardstick
@@ -23,7 +22,6 @@ from finlab.vehicle.fossen import complete_body
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = "bluerov2_heavy", "A", "turtle_hybrid", "catamaran"
 EXPORTS = "fl_sizes", "fl_check", "fl_prepare", "fl_answer_one", "cost_at", "__heap_base"
-ROWS, HIGH, SIGN = 0, 7, 60  # places of members of `fl_actuator` in finlab/core/core.h
 
 
 def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
@@ -37,31 +35,28 @@ def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
     """What the page shows of a robot, and its blocks: whole, then with each actuator lost."""
     scale = yardstick(layout)
     states = [layout, *(layout.without([name]) for name in layout.names)]
-    blocks = [Dual(state, DualSettings(), scale, None).compiled.robot.block for state in states]
+    robots = [Dual(state, DualSettings(), scale, None).compiled.robot for state in states]
     most = np.abs(axis_ranges(layout, np.zeros(6))).max(axis=0) * layout.commanded
     most[most < 1e-6 * scale] = 0.0
-    members = blocks[0][HEAD : HEAD + EACH * layout.n].reshape(-1, EACH)
-    axes = [
-        frame[1:] if row[ROWS] == 2 else row[SIGN] * frame[:1]
-        for frame, row in zip(layout.frames, members, strict=True)
-    ]
     hull = complete_body(layout).hull
     about = {
         "name": layout.name,
-        "lengths": [len(block) for block in blocks],
+        "lengths": [len(robot.block) for robot in robots],
         "most": most.tolist(),
         "wrench": (most * [0.4, 0, 0.2, 0, 0, 0.3]).tolist(),
         "groups": np.array(Policy("priority").groups).astype(int).tolist(),
         "hull": hull.size_m,
         "center": hull.center_m,
         "size": float(max(np.abs(layout.position).max(), max(hull.size_m) / 2)),
-        "strongest": float(members[:, HIGH].max()),
+        "strongest": float(robots[0].most.max()),
         "actuators": [
             {"name": name, "position": at.tolist(), "directions": own.tolist(), "numbers": part.NUMBERS}
-            for name, at, own, part in zip(layout.names, layout.position, axes, layout.actuators, strict=True)
+            for name, at, own, part in zip(
+                layout.names, layout.position, robots[0].effectiveness[..., :3], layout.actuators, strict=True
+            )
         ],
     }
-    return about, np.concatenate(blocks).astype("<f8").tobytes()
+    return about, np.concatenate([robot.block for robot in robots]).astype("<f8").tobytes()
 
 
 def _compiled() -> bytes:
