@@ -92,8 +92,8 @@ typedef struct { /* prices, and what they give */
 #define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
 
 typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
-  fl_real force[FL_POINTS][FL_MOST][2];
-  fl_wide point[FL_POINTS][6], share[FL_POINTS], miss[6], q[FL_POINTS][6], r[FL_POINTS][FL_POINTS];
+  fl_wide force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6]; /* miss: of a target */
+  fl_wide q[FL_POINTS][6], r[FL_POINTS][FL_POINTS]; /* on the diagonal of r its inverse, 0 where a point depends */
   int count, done; /* points; how many of them the basis knows */
 } fl_mixture;
 
@@ -115,7 +115,7 @@ typedef struct {
   fl_mixture mixture;
   fl_node node[FL_DEPTH];
   fl_box box;
-  fl_real column[FL_MOST][2][6]; /* wrench per newton of each row, in weighted axes */
+  fl_wide column[FL_MOST][2][6]; /* wrench per newton of each row, in weighted axes */
   int corners[FL_MOST];          /* places of polygons that stand for sets; 0 for none */
   fl_real slope[FL_MOST][3][6]; /* wrench over the yardstick by each command, over its width */
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */

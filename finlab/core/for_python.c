@@ -53,7 +53,11 @@ void fl_worth(const real *block, fl_work *work, const real *price, int count, re
     price_in_basis(block, price, inner);
     for (int i = 0; i < COUNT(block); i++, worth += 3) {
       own_price(block, i, inner, own);
-      farthest_of(block, i, work->set + i, own, force, worth);
+      worth[0] = farthest_of(block, i, work->set + i, own, force), worth[1] = 0;
+      if (work->set[i].reverse > 0) {
+        fl_set back = reversed(work->set + i);
+        worth[1] = farthest_of(block, i, &back, own, force);
+      }
       worth[2] = reply_of(block, i, work->set + i, own).conjugate;
     }
   }

@@ -91,7 +91,8 @@ void set_up(const real *block, int i, fl_set *set);
 void freeze(const real *block, int i, fl_set *set, const real *force);
 real cost_at(const real *block, int i, real force);
 reply reply_of(const real *block, int i, const fl_set *set, const real *price);
-void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force, real *ways);
+real farthest_of(const real *block, int i, const fl_set *set, const real *price, wide *force);
+fl_set reversed(const fl_set *set);
 real drag_of(const real *block, int i, real force);
 int undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
@@ -140,8 +141,8 @@ static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
 static inline void add(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
-void weigh(const real *block, fl_work *work, const real *weight);
-void point_of(const real *block, const fl_work *work, real force[][2], wide *point);
+void weigh(const real *block, fl_work *work, const wide *weight);
+void point_of(const real *block, const fl_work *work, wide force[][2], wide *point);
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
 wide farthest_along(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
                     wide close, fl_mixture *m, wide *plane);

@@ -10,43 +10,44 @@
 #define MOST_POINTS 400
 #define MOST_SHARES (5 * ROUNDS)
 
-/* The wrench, in weighted axes, that each force gives per newton. */
-void weigh(const real *block, fl_work *work, const real *weight) {
+/* The wrench on the yardstick, in weighted axes, that each force gives per newton. */
+void weigh(const real *block, fl_work *work, const wide *weight) {
   const fl_head *h = HEAD(block);
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
     work->corners[i] = 0;
     for (int q = 0; q < 2; q++)
-      for (int k = 0; k < 6; k++)
-        work->column[i][q][k] = q < a->rows ? weight[k] * h->scale[k] * dot(h->basis[k], a->matrix[q], RANGE(block)) : 0;
+      for (int k = 0; k < 6; k++) {
+        wide sum = 0;
+        for (int j = 0; j < 6; j++) sum += (wide)h->basis[k][j] * (wide)ACTUATOR(block, i)->matrix[q][j];
+        work->column[i][q][k] = weight[k] * (wide)h->scale[k] * sum / (wide)h->yard[k];
+      }
   }
 }
 
 /* The corner of a polygon, a count and pairs, that is worth most. */
-static void best_corner(const real *polygon, const real *price, real *force) {
+static void best_corner(const real *polygon, const real *price, wide *force) {
   real most = -R(1e30);
   for (const real *at = polygon + 1, *end = at + 2 * (int)polygon[0]; at < end; at += 2)
     if (dot(price, at, 2) > most) most = dot(price, at, 2), force[0] = at[0], force[1] = at[1];
 }
 
 /* The point (6,), in weighted axes, that forces give. */
-void point_of(const real *block, const fl_work *work, real force[][2], wide *point) {
-  for (int k = 0; k < 6; k++) point[k] = 0;
+void point_of(const real *block, const fl_work *work, wide force[][2], wide *point) {
+  memset(point, 0, sizeof work->column[0][0]);
   for (int i = 0; i < COUNT(block); i++)
-    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++)
-      for (int k = 0; k < 6; k++) point[k] += (wide)force[i][q] * (wide)work->column[i][q][k];
+    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) add(point, force[i][q], work->column[i][q]);
 }
 
 /* Puts the forces that are worth most at a normal (6,), and their point, behind the points of a mixture. */
 static void farthest(const real *block, const fl_work *work, const wide *normal, fl_mixture *m) {
-  real price[6], (*force)[2] = m->force[m->count];
-  for (int k = 0; k < 6; k++) price[k] = (real)normal[k];
+  wide(*force)[2] = m->force[m->count];
   for (int i = 0; i < COUNT(block); i++) {
-    real own[2] = {dot(work->column[i][0], price, 6), dot(work->column[i][1], price, 6)}, ways[2];
+    const wide *column = work->column[i][0];
+    real own[2] = {(real)product(column, normal, 6), (real)product(column + 6, normal, 6)};
     if (work->corners[i] > 0)
       best_corner(block + work->corners[i], own, force[i]);
     else
-      farthest_of(block, i, work->set + i, own, force[i], ways);
+      farthest_of(block, i, work->set + i, own, force[i]);
   }
   point_of(block, work, force, m->point[m->count]);
 }
@@ -70,22 +71,21 @@ static int least_share(const fl_mixture *m) {
 static void affine(fl_mixture *m, const wide *target, wide *share) {
   wide right[FL_POINTS], rest[6];
   for (int j = MAX(m->done, 1); j < m->count; j++) {
-    wide *q = m->q[j], size;
+    wide *q = m->q[j], *over = m->r[j] + j, size, left;
     memcpy(q, m->point[j], sizeof rest);
     add(q, -1, m->point[0]);
     for (int i = 1; i < j; i++) m->r[i][j] = 0;
-    m->r[j][j] = size = length_of(q);
-    for (int twice = 0; twice < 2 && !(twice && m->r[j][j] > 0.1 * size); twice++) {
+    size = left = length_of(q);
+    for (int twice = 0; twice < 2 && !(twice && left > 0.1 * size); twice++) {
       for (int i = 1; i < j; i++) {
         wide part = product(m->q[i], q, 6);
         m->r[i][j] += part;
         add(q, -part, m->q[i]);
       }
-      m->r[j][j] = length_of(q);
+      left = length_of(q);
     }
-    if (m->r[j][j] <= BARELY * size) m->r[j][j] = 0;
-    wide over = m->r[j][j] > 0 ? 1 / m->r[j][j] : 0;
-    for (int k = 0; k < 6; k++) q[k] *= over;
+    *over = left > BARELY * size ? 1 / left : 0;
+    for (int k = 0; k < 6; k++) q[k] *= *over;
   }
   m->done = m->count;
   memcpy(rest, target, sizeof rest);
@@ -96,8 +96,7 @@ static void affine(fl_mixture *m, const wide *target, wide *share) {
   }
   share[0] = 1;
   for (int j = m->count - 1; j > 0; j--) {
-    wide sum = right[j] - product(m->r[j] + j + 1, share + j + 1, m->count - j - 1);
-    share[j] = m->r[j][j] > 0 ? sum / m->r[j][j] : 0;
+    share[j] = m->r[j][j] * (right[j] - product(m->r[j] + j + 1, share + j + 1, m->count - j - 1));
     share[0] -= share[j];
   }
 }
@@ -130,23 +129,22 @@ static void mix(fl_mixture *m, const wide *target) {
    distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. Where there is a miss,
    what is worth most across it follows the mixture's points. Returns the miss. */
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m) {
-  wide last = 1e300, normal[6], way[6];
+  wide last = 1e300, way[6];
   if (m->count == 0) {
     farthest(block, work, target, m);
     m->count = 1, m->done = 0, m->share[0] = 1;
   }
   for (int k = 1;; k++) {
-    memcpy(normal, target, sizeof normal);
-    for (int p = 0; p < m->count; p++) add(normal, -m->share[p], m->point[p]);
-    for (int j = 0; j < 6; j++) m->miss[j] = -normal[j];
-    wide size = length_of(normal), gain;
+    memcpy(m->miss, target, sizeof m->miss);
+    for (int p = 0; p < m->count; p++) add(m->miss, -m->share[p], m->point[p]);
+    wide size = length_of(m->miss), gain;
     if (size <= close) return size;
     if (m->count == FL_POINTS) drop(m, least_share(m)); /* more than an affine basis */
-    farthest(block, work, normal, m);
+    farthest(block, work, m->miss, m);
     memcpy(way, m->point[m->count], sizeof way);
     add(way, -1, target);
-    add(way, 1, normal);
-    gain = product(way, normal, 6);
+    add(way, 1, m->miss);
+    gain = product(way, m->miss, 6);
     if (gain <= MAX(close, apart * size) * size || size >= last * (1 - BARELY) || k == MOST_POINTS) return size;
     last = size;
     m->share[m->count++] = 0;
@@ -159,19 +157,18 @@ wide nearest_point(const real *block, const fl_work *work, const wide *target, w
    is as `close`. Returns the bound; where no size is in the set, the least one, and the point is the nearest to it. */
 wide farthest_along(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
                     wide close, fl_mixture *m, wide *plane) {
-  wide size = most, last = 1e300, normal[6], target[6];
-  memcpy(normal, ray, sizeof normal);
+  wide size = most, last = 1e300, target[6];
+  memcpy(m->miss, ray, sizeof m->miss);
   m->count = m->done = 0, m->share[0] = 1;
   farthest(block, work, ray, m);
   for (int k = 0; k < MOST_SHARES; k++) {
-    wide across = product(normal, ray, 6), bound = least;
-    if (across > 0) bound = (product(m->point[m->count], normal, 6) - product(from, normal, 6)) / across;
-    if (bound < size) size = MAX(bound, least), memcpy(plane, normal, sizeof normal);
+    wide across = product(m->miss, ray, 6), bound = least;
+    if (across > 0) bound = (product(m->point[m->count], m->miss, 6) - product(from, m->miss, 6)) / across;
+    if (bound < size) size = MAX(bound, least), memcpy(plane, m->miss, sizeof m->miss);
     memcpy(target, from, sizeof target);
     add(target, size, ray);
     m->count = MAX(m->count, 1);
     wide miss = nearest_point(block, work, target, close, 0.5, m);
-    for (int j = 0; j < 6; j++) normal[j] = -m->miss[j];
     if (size == least || miss <= 2 * close || (size >= last && miss <= 1)) break;
     last = size >= last ? size - miss / (2 * length_of(ray)) : size;
     size = last;
@@ -183,7 +180,7 @@ void mixed_force(const real *block, const fl_mixture *m, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++)
     for (int q = 0; q < 2; q++) {
       wide sum = 0;
-      for (int p = 0; p < m->count; p++) sum += m->share[p] * (wide)m->force[p][i][q];
+      for (int p = 0; p < m->count; p++) sum += m->share[p] * m->force[p][i][q];
       force[i][q] = (real)sum;
     }
 }

@@ -10,14 +10,17 @@
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
 
-static real rounded(wide value) { return (real)(floor(value / NEARLY + 0.5) * NEARLY); }
+static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
+
+static wide on_yardstick(const real *block, const real *wrench, int k) {
+  return (wide)wrench[k] / (wide)HEAD(block)->yard[k];
+}
 
 static void closest(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
-  real weight[6];
-  wide target[6];
+  wide weight[6], target[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = MAX(policy->weight[k], CLOSE) / HEAD(block)->yard[k];
-    target[k] = weight[k] * wrench[k];
+    weight[k] = MAX(policy->weight[k], CLOSE);
+    target[k] = weight[k] * on_yardstick(block, wrench, k);
   }
   weigh(block, work, weight);
   work->mixture.count = 0;
@@ -26,21 +29,21 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
 
 static void direction(const real *block, fl_work *work, const real *wrench, real *score) {
   const fl_head *h = HEAD(block);
-  real target[6], weight[6], all[6], size, rest;
-  wide begin[6], ray[6], plane[6], share;
+  real target[6], all[6], size, rest;
+  wide weight[6], begin[6], ray[6], plane[6], share;
   for (int k = 0; k < 6; k++) {
-    weight[k] = 1 / h->yard[k];
-    all[k] = wrench[k] + h->beside[k], begin[k] = -weight[k] * h->beside[k];
+    weight[k] = 1;
+    all[k] = wrench[k] + h->beside[k], begin[k] = -on_yardstick(block, h->beside, k);
   }
   to_basis(block, all, target);
   rest = beside_range(block, all, target, &size);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
-    ray[k] = rest <= NEARLY * size ? weight[k] * h->scale[k] * dot(h->basis[k], target, RANGE(block)) : 0;
+    ray[k] = rest <= NEARLY * size ? h->scale[k] * dot(h->basis[k], target, RANGE(block)) / h->yard[k] : 0;
   weigh(block, work, weight);
   share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
-  wide *miss = work->mixture.miss, more = product(miss, ray, 6) / MAX(product(ray, ray, 6), 1e-300);
-  add(miss, -more, ray);
-  score[0] = rounded(length_of(miss)), score[1] = (real)(1 - share - more);
+  wide *miss = work->mixture.miss, less = product(miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
+  add(miss, -less, ray);
+  score[0] = rounded((real)length_of(miss)), score[1] = (real)(1 - share + less);
 }
 
 /* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
@@ -48,21 +51,20 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
   wide wanted[6], aim[6]; /* on the yardstick */
-  for (int k = 0; k < 6; k++) wanted[k] = aim[k] = (wide)wrench[k] / (wide)HEAD(block)->yard[k];
+  for (int k = 0; k < 6; k++) wanted[k] = aim[k] = on_yardstick(block, wrench, k);
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
     const unsigned char *group = policy->group[g];
-    real weight[6];
-    wide target[6], missing[6] = {0}, missed, far;
-    for (int k = 0; k < 6; k++) weight[k] = (real)(HELD * held[k] + group[k]) / HEAD(block)->yard[k];
+    wide weight[6], target[6], missing[6] = {0}, missed, far;
+    for (int k = 0; k < 6; k++) weight[k] = HELD * held[k] + group[k];
     weigh(block, work, weight);
     m->done = 0; /* the points so far, in the axes of this group: */
     for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
     for (int round = 0;; round++) {
-      for (int k = 0; k < 6; k++) target[k] = (HELD * held[k] + group[k]) * aim[k];
+      for (int k = 0; k < 6; k++) target[k] = weight[k] * aim[k];
       far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m);
       for (int k = 0; k < 6; k++)
-        if (group[k]) missing[k] = wanted[k] - aim[k] - m->miss[k] / (HELD * held[k] + 1);
+        if (group[k]) missing[k] = wanted[k] - aim[k] + m->miss[k] / weight[k];
       missed = length_of(missing);
       if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
       for (int k = 0; k < 6; k++)
@@ -72,7 +74,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
       held[k] |= group[k];
       if (group[k] && missed > NEARLY) aim[k] = wanted[k] - missing[k];
     }
-    score[g] = rounded(missed);
+    score[g] = rounded((real)missed);
   }
 }
 
@@ -132,7 +134,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     memcpy(out->aim, aim, sizeof aim);
     if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
     most = (1 - FINE) * work->now->value;
-    if (tried != 1 || dot(out->inner, target, 6) <= 10 * work->now->value) return;
+    if (tried != 1 || dot(out->inner, target, 6) <= FINE / NEARLY * work->now->value) return;
   }
 }
 

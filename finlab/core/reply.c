@@ -144,7 +144,7 @@ static reply one_way(const real *block, const fl_actuator *a, const fl_set *set,
 }
 
 /* What a plane that pushes either way gives in reverse. */
-static fl_set reversed(const fl_set *set) {
+fl_set reversed(const fl_set *set) {
   fl_set r = *set;
   r.low = 0, r.high = set->reverse, r.high_cost = set->reverse_cost, r.reverse = 0, r.flipped = 1;
   r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
@@ -204,7 +204,7 @@ real drag_of(const real *block, int i, real force) {
   return a->speed > 0 ? (cost_at(block, i, force) - rest_of(block, a)) / a->speed : 0;
 }
 
-static void farthest_foil(const real *block, int i, const fl_set *set, const real *price, real *force) {
+static void farthest_foil(const real *block, int i, const fl_set *set, const real *price, wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
   real cost = -price[1];
   if (cost > 0)
@@ -213,30 +213,35 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
     real low = price[0] * set->low - cost * drag_of(block, i, set->low);
     force[0] = price[0] * set->high - cost * drag_of(block, i, set->high) > low ? set->high : set->low;
   }
-  force[1] = drag_of(block, i, force[0]);
+  force[1] = drag_of(block, i, (real)force[0]);
 }
 
-/* The force that is worth most at a price, whatever its power, and the prices along what is given ahead and in reverse. */
-void farthest_of(const real *block, int i, const fl_set *set, const real *price, real *force, real *ways) {
+/* The force that is worth most at a price, whatever its power; returns the price along it, of planes that of what is
+   not given in reverse. */
+real farthest_of(const real *block, int i, const fl_set *set, const real *price, wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  force[1] = 0, ways[0] = price[0], ways[1] = 0;
+  force[1] = 0;
   if (a->rows == 1) {
     force[0] = price[0] > 0 ? set->high : set->low;
-    return;
+    return price[0];
   }
   if (a->speed > 0) {
     farthest_foil(block, i, set, price, force);
-    return;
+    return price[0];
   }
   fan f = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY);
   real size = f.along > 0 ? set->high : set->low;
-  force[0] = size * f.x, force[1] = size * f.y, ways[0] = f.along;
+  force[0] = f.x, force[1] = f.y;
+  wide length = a->gauge > 0 ? 1 : product(force, force, 2); /* 1 but for rounding, which would be that of the set */
+  wide times = size / 2 * (3 - length);
+  force[0] *= times, force[1] *= times;
   if (set->reverse > 0) {
     fl_set back = reversed(set);
-    fan g = direction_of(&back, 0, price, TINY);
-    ways[1] = g.along;
-    if (g.along > 0 && back.high * g.along > size * f.along) force[0] = back.high * g.x, force[1] = back.high * g.y;
+    wide other[2];
+    real along = farthest_of(block, i, &back, price, other);
+    if (along > 0 && back.high * along > size * f.along) force[0] = other[0], force[1] = other[1];
   }
+  return f.along;
 }
 
 /* Whether a plane that pushes either way answers rather forward, and how far [N] its blend is from that. */
