@@ -5,8 +5,8 @@
    apart: a cubic whose slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
 typedef struct { real value[4], slope[4]; int at[4], count; } weights;
 
-static void weights_at(const real *knot, int count, int each, real period, real x, weights *w) {
-  *w = (weights){{1}, {0}, {0}, 1};
+static void weights_at(const real *knot, int count, int each, real period, real x, int steep, weights *w) {
+  w->value[0] = 1, w->slope[0] = 0, w->at[0] = 0, w->count = 1;
   if (count == 1) return;
   int cells = period > 0 ? count : count - 1, low = 0, high = cells;
   real begin = knot[0], end = period > 0 ? begin + period : knot[count - 1], held;
@@ -27,13 +27,13 @@ static void weights_at(const real *knot, int count, int each, real period, real 
   real from = knot[low], to = low + 1 < count ? knot[low + 1] : end, width = to - from, t = (held - from) / width;
   real before = low > 0 ? from - knot[low - 1] : period > 0 ? end - knot[count - 1] : 0;
   real after = low + 2 < count ? knot[low + 2] - to : low + 2 == count && period > 0 ? end - to : period > 0 ? knot[1] - knot[0] : 0;
-  real early = width / (before + width), late = width / (width + after), pace = held == x ? 1 / width : 0;
+  real early = width / (before + width), late = width / (width + after), pace = steep && held == x ? 1 / width : 0;
   real linear[4] = {-early, 0, early, 0}, square[4] = {2 * early, late - 3, 3 - 2 * early, -late};
   real cubic[4] = {-early, 2 - late, early - 2, late};
   w->count = 4;
   for (int k = 0; k < 4; k++) {
     w->value[k] = (k == 1) + t * (linear[k] + t * (square[k] + t * cubic[k]));
-    w->slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
+    if (steep) w->slope[k] = pace * (linear[k] + t * (2 * square[k] + 3 * t * cubic[k]));
     w->at[k] = each * (period > 0 ? (low + k - 1 + count) % count : CLIP(low + k - 1, 0, count - 1));
   }
 }
@@ -47,7 +47,7 @@ static void grid_at(const real *grid, const real *command, real *value, real (*s
   const real *knot = grid + 7, *values = knot + count[0] + count[1] + count[2];
   real at[3] = {product ? command[0] * command[1] : command[0], command[1], command[2]};
   weights w[3];
-  for (int k = 0; k < 3; knot += count[k++]) weights_at(knot, count[k], each[k], k == 2 ? grid[3] : 0, at[k], w + k);
+  for (int k = 0; k < 3; knot += count[k++]) weights_at(knot, count[k], each[k], k == 2 ? grid[3] : 0, at[k], slope != 0, w + k);
   for (int c = 0; c < columns; c++, values++) {
     real sum = 0, by[3] = {0};
     for (int a = 0; a < w[0].count; a++)
