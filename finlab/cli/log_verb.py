@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli import shared_options
-
-if TYPE_CHECKING:
-    from finlab.layout import Layout
-    from finlab.log import Log
 
 
 def log(
@@ -44,23 +41,18 @@ def log(
     from finlab.evaluation.plots import check_picture, write_picture
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
-    from finlab.log import judge
+    from finlab.log import judge, read_log
     from finlab.log.words import judgement_text, picture
 
     shared_options.check_json_file(json)
     shared_options.check_json_file(save, "save")
     check_picture(plot)
     known = None if robot is None else shared_options.open_robot(robot)[0]
-    found: Log = in_worker(_read, file, known, scale, demand, outputs)
-    judged = judge(found, priority=[group.split(",") for group in priority], improve=improve)
+    read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
+    groups = [group.split(",") for group in priority]
+    judged = judge(in_worker(read, file, known), priority=groups, improve=improve)
     if plot is not None:
         write_picture(lambda _: picture(judged), [], plot)
     if save is not None and judged.improved is not None:
         save_layout(judged.improved, save)
     shared_options.put_json(judged.to_dict() if json else None, json, judgement_text(judged))
-
-
-def _read(file: Path, robot: Layout | None, scale: Any, demand: str | None, outputs: str | None) -> Log:
-    from finlab.log import read_log
-
-    return read_log(file, robot, scale=scale, demand=demand, outputs=outputs)

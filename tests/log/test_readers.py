@@ -155,9 +155,7 @@ def test_the_command_tells_draws_and_writes(
     assert "<svg" in files["plot"].read_text() and finlab.load_layout(files["save"]).n == 8
 
 
-def test_a_missing_reader_is_named(
-    px4: Dive, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_reader_is_named(px4: Dive, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyulog", None)
-    assert main(["log", str(px4.path)]) == 2
-    assert "finlab-marine[logs]" in capsys.readouterr().err
+    with pytest.raises(FinlabError, match=r"finlab-marine\[logs\]"):
+        finlab.read_log(px4.path)
