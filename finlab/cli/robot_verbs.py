@@ -81,6 +81,7 @@ def export(
     lost: shared_options.Lost = (),
     method: Literal["dual", "mdn", "paper"] = "dual",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
+    flow: shared_options.Flow = None,
 ) -> None:
     """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), the
     layout graph file, or the allocator in C for a microcontroller.
@@ -98,6 +99,8 @@ def export(
         raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, --c DIR, or several")
     if c is not None and method != "dual":
         raise FinlabError(f"method {method!r}: has no C sources; leave --method out, or --c")
+    if c is None and flow is not None:
+        raise FinlabError("flow: only C sources are of one speed; give --c DIR, too, or leave --flow out")
     if output is not None and output.suffix == ".json":
         raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
     robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
@@ -110,9 +113,11 @@ def export(
     if c is not None:
         from finlab.deploy.c_sources import c_sources, write_c
 
-        files = c_sources(left)
+        files = c_sources(left, flow=flow)
         write_c(files, c)
         print(f"{c}: {left.counted}, {len(files)} files; try: cc -std=c99 {c}/*.c -lm && ./a.out")
+        if flow is None and left.by_flow:
+            print(f"{', '.join(left.by_flow)}: no force at rest; --flow says of which speed the files are")
     if output is None:
         return
     from finlab.allocation import Allocator

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import finlab
 from finlab import core
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy
+from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned
@@ -35,15 +37,20 @@ QUESTIONS = ("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("priority",
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
-def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
+def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = None) -> dict[str, bytes]:
     """Returns files by name: the core, `robot.c` and `robot.h`, a self-test of so many questions, a README,
-    CMakeLists.txt, examples. Raises AllocationError: the actuators act on each other, which the core does not
-    know; DataError: a force table cannot be read."""
+    CMakeLists.txt, examples.
+
+    The robot's block is that of one velocity (6,) relative to the water [m/s, rad/s], body frame: foils push
+    by it, propellers lose to it; None is a robot at rest. Raises AllocationError: the actuators act on each
+    other, which the core does not know; CommandError: `flow` is not six finite numbers; DataError: a force
+    table cannot be read."""
     if layout.interaction is not None:
         raise AllocationError(
             f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it without"
         )
-    method = Dual(layout, DualSettings(), yardstick(layout), None)
+    water = check_flow(flow)
+    method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
     block = method.compiled.robot.block
     thin = thinned(block)
     files = [path for path in Path(core.__path__[0]).glob("*.[ch]") if path.name not in NOT_ABOARD]
@@ -51,7 +58,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
     sources["core.h"] = _sized(sources["core.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout)
-    sources["samples.h"] = _samples(layout, method, samples)
+    sources["samples.h"] = _samples(layout, method, samples, water)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
     law = max(sum(len(table) for _, table in row.values()) for row in tables_of(thin))
@@ -64,6 +71,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES) -> dict[str, bytes]:
         single=4 * len(thin),
         law=4 * law,
         axes=", ".join(np.array(AXES)[layout.commanded]),
+        flow="at rest" if water is None else f"with ({', '.join(f'{v:g}' for v in water)}) m/s, rad/s",
     )
     return {name: text.encode() for name, text in sorted(sources.items())}
 
@@ -121,7 +129,7 @@ def _header(layout: Layout) -> str:
     )
 
 
-def _samples(layout: Layout, method: Dual, count: int) -> str:
+def _samples(layout: Layout, method: Dual, count: int, flow: Array | None) -> str:
     """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to the
     library, which has more ways around gaps."""
     allocator, rng = Allocator(layout), np.random.default_rng(0)
@@ -132,8 +140,8 @@ def _samples(layout: Layout, method: Dual, count: int) -> str:
             break
         policy, far = QUESTIONS[k % len(QUESTIONS)]
         wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
-        tick = allocator.allocate(0.5 * wrench).command if far < 0.9 else None
-        answer = allocator.allocate(far * wrench, policy=policy, previous=tick)
+        tick = allocator.allocate(0.5 * wrench, flow=flow).command if far < 0.9 else None
+        answer = allocator.allocate(far * wrench, policy=policy, previous=tick, flow=flow)
         given = answer.wrench * layout.commanded
         alone = method.forces(far * wrench[None], Policy(policy)).command
         if tick is None and method.error(alone, given[None])[0] > ALONE:

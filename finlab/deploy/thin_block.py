@@ -21,7 +21,7 @@ POINTS = 64
 """Directions of a gauge at most."""
 PLACES = 1, 2, 5, 58, 59
 """Where an `fl_actuator` of core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
-LIMITS, TURNS, FORM, FIN = slice(48, 54), 57, 47, 2
+LIMITS, TURNS, FORM, FIN, LAW, LEAN = slice(48, 54), 57, 47, 2, 58, 61
 
 
 def tables_of(block: Array) -> list[dict[int, tuple[int, Array]]]:
@@ -56,6 +56,9 @@ def thinned(block: Array) -> Array:
     length, places = HEAD + EACH * int(block[3]), {0: 0}
     for place, (kind, numbers) in {p: own for row in tables_of(block) for p, own in row.items()}.items():
         places[place] = length + sum(len(table) for table in new)
+        if kind == 3:
+            own = block[HEAD:length].reshape(-1, EACH)
+            numbers = _reached(numbers, own[own[:, LAW] == place])
         new.append((_radial, _radial, _gauge, _grid, _curve)[kind](numbers))
     block = np.concatenate([block[:length], *new])
     block[2] = len(block)
@@ -89,12 +92,34 @@ def _cubic(knot: Array, value: Array) -> CubicHermiteSpline:
     return CubicHermiteSpline(knot[1:-1], value[1:-1], rise.T)
 
 
-def _grid(grid: Array) -> Array:
-    """Fewer angles of a foil, or sizes of a fin; a measured fin keeps its grid."""
+def _parts(grid: Array) -> tuple[list[Array], Array]:
+    """The knots of its axes, and its values (a, f, d, c)."""
     count = grid[:3].astype(int)
     axes = np.split(grid[7 : 7 + count.sum()], np.cumsum(count)[:-1])
-    values = grid[7 + count.sum() :].reshape(*count, -1)
-    if count[0] == count[1] == 1 and grid[3] > 0.0:
+    return axes, grid[7 + count.sum() :].reshape(*count, -1)
+
+
+def _reached(grid: Array, foils: Array) -> Array:
+    """A foil's grid between the angles that commands of these (m, EACH) reach, and three knots beyond; any
+    other grid, and one of all angles, as it is."""
+    (_, _, knot), values = _parts(grid)
+    low, high = np.stack([foils[:, LIMITS][:, ::3].T[k] - foils[:, LEAN] for k in (0, 1)])
+    if grid[3] == 0.0 or foils[0, FORM] == FIN:
+        return grid
+    around = np.concatenate([knot + turn * grid[3] for turn in (-1, 0, 1)])
+    first, last = np.searchsorted(around, low.min()) - 3, np.searchsorted(around, high.max()) + 3
+    if first < 0 or last > len(around) or last - first >= len(knot):
+        return grid
+    rows = np.arange(first, last)
+    return np.concatenate(
+        [[1, 1, len(rows), 0.0, *grid[4:7], 0.0, 0.0], around[rows], values[0, 0, rows % len(knot)].ravel()]
+    )
+
+
+def _grid(grid: Array) -> Array:
+    """Fewer angles of a foil, or sizes of a fin; a measured fin keeps its grid."""
+    axes, values = _parts(grid)
+    if len(axes[0]) == len(axes[1]) == 1 < len(axes[2]):
         kept = _angles(axes[2], values[0, 0], grid[3])
         axes[2], values = axes[2][kept], values[:, :, kept]
     elif values.shape[2:] == (1, 1):
@@ -103,12 +128,18 @@ def _grid(grid: Array) -> Array:
 
 
 def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
-    """Which knots (K,) of a period say all values (K, c) nearly: more and more, where most is missing."""
-    kept = np.arange(0, len(knot), max(len(knot) // 16, 1))
+    """Which knots (K,) of a period, or of an axis where it is 0, say all values (K, c) nearly: more and more,
+    where most is missing."""
+    kept, ends = np.arange(0, len(knot), max(len(knot) // 16, 1)), [0, 1, len(knot) - 2, len(knot) - 1]
+    kept = kept if period else np.union1d(kept, ends)
     while len(kept) < min(2 * CELLS, len(knot)):
-        rows = np.concatenate([kept[-2:], kept, kept[:2]])
-        around = np.concatenate([knot[kept[-2:]] - period, knot[kept], knot[kept[:2]] + period])
+        rows, around = kept, knot[kept]
+        if period:
+            rows = np.concatenate([kept[-2:], kept, kept[:2]])
+            around = np.concatenate([knot[kept[-2:]] - period, around, knot[kept[:2]] + period])
         miss = np.abs(_cubic(around, value[rows])(knot) - value) / np.abs(value).max(axis=0)
+        if not period:
+            miss[[0, -1]] = 0.0
         if miss.max() <= TOLERANCE:
             break
         kept = np.sort(np.append(kept, miss.max(axis=1).argmax()))

@@ -28,15 +28,19 @@ M7 = "-mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard -ffp-contract=o
 SMALL = f"arm-none-eabi-gcc -std=c99 -Os {M7} -ffunction-sections -fdata-sections"
 
 
+SPEED = 2.5, 0.2, -0.1, 0.0, 0.05, 0.1
+"""A velocity through the water [m/s, rad/s]."""
+
+
 @cache
-def _exported(name: str, samples: int) -> TemporaryDirectory[str]:
+def _exported(name: str, samples: int, flow: tuple[float, ...] | None) -> TemporaryDirectory[str]:
     folder = TemporaryDirectory()
-    write_c(c_sources(load_layout(name), samples), folder.name)
+    write_c(c_sources(load_layout(name), samples, flow), folder.name)
     return folder
 
 
-def exported(name: str, samples: int = 24) -> Path:
-    return Path(_exported(name, samples).name)
+def exported(name: str, samples: int = 24, flow: tuple[float, ...] | None = None) -> Path:
+    return Path(_exported(name, samples, flow).name)
 
 
 def ran(command: str, folder: Path, code: int = 0) -> str:
@@ -54,6 +58,13 @@ def test_self_test_holds(name: str, compiler: str, single: str, tmp_path: Path) 
         f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     )
     assert ran(words, exported(name, 200)).startswith("0 of 200 ")
+
+
+@pytest.mark.parametrize("single", SINGLE)
+@pytest.mark.parametrize("name", ["torpedo", "bluerov2"])
+def test_self_test_holds_at_speed(name: str, single: str, tmp_path: Path) -> None:
+    words = f"gcc -std=c99 -O1 {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    assert ran(words, exported(name, 200, SPEED)).startswith("0 of 200 ")
 
 
 @pytest.mark.parametrize("single", SINGLE)
@@ -127,7 +138,8 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
 def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
-    robot = AnyRobot().method(load_layout(name)).compiled.robot
+    method = AnyRobot().method(load_layout(name))
+    robot = method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
     thin = thinned(robot.block)
     assert max(sum(len(table) for _, table in row.values()) for row in tables_of(thin)) * 4 <= 4096
     assert len(thinned(thin)) <= len(thin)
@@ -163,4 +175,5 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "front_left" not in (tmp_path / "c" / "robot.h").read_text()
     (tmp_path / "c" / "mine.c").write_text("")
     assert "'mine.c'" in refused(["export", "A", "--c", str(tmp_path / "c")])
+    assert "--c DIR" in refused(["export", "torpedo", "-o", str(tmp_path / "e"), "--flow", *"100000"])
     assert "no C sources" in refused(["export", "A", "--method", "mdn", "--c", str(tmp_path / "d")])
