@@ -8,7 +8,7 @@
 
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
-#define PULL 1e-3     /* what a group may miss without pulling at the axes that are held */
+#define PULL 1.2e-3   /* what a group may miss without pulling at the axes that are held: they give way by a millionth */
 
 static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
 
@@ -62,7 +62,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
     for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
     for (int round = 0;; round++) {
       for (int k = 0; k < 6; k++) target[k] = weight[k] * aim[k];
-      far = nearest_point(block, work, target, CLOSE_BY * (g > 0 ? HELD : 1), 0, m);
+      far = nearest_point(block, work, target, CLOSE_BY, 0, m);
       for (int k = 0; k < 6; k++)
         if (group[k]) missing[k] = wanted[k] - aim[k] + m->miss[k] / weight[k];
       missed = length_of(missing);
@@ -72,7 +72,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
     }
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
-      if (group[k] && missed > NEARLY) aim[k] = wanted[k] - missing[k];
+      if (group[k]) aim[k] = wanted[k] - missing[k];
     }
     score[g] = rounded((real)missed);
   }
