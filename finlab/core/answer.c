@@ -72,11 +72,6 @@ int fl_check(const real *block, int length) {
   return 0;
 }
 
-static int in_range(const real *block, const real *wrench, const real *target) {
-  real size, rest = beside_range(block, wrench, target, &size);
-  return rest <= NEARLY * (R(1e-3) + size);
-}
-
 /* Limits of the forces for now: those of commands in a box, or all. */
 static void set_limits(const real *block, fl_work *work, const fl_box *box) {
   for (int i = 0; i < COUNT(block); i++) {

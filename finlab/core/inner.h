@@ -106,7 +106,7 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
 void to_basis(const real *block, const real *wrench, real *target);
 void price_in_basis(const real *block, const real *price, real *inner);
-real beside_range(const real *block, const real *wrench, const real *target, real *size);
+int in_range(const real *block, const real *wrench, const real *target);
 void wrench_of(const real *block, real force[][2], real *wrench);
 
 /* gaps.c */
@@ -141,6 +141,7 @@ static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
 static inline void add(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
+wide out_of_basis(const real *block, const real *inner, int axis);
 void weigh(const real *block, fl_work *work, const wide *weight);
 void point_of(const real *block, const fl_work *work, wide force[][2], wide *point);
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);

@@ -10,17 +10,21 @@
 #define MOST_POINTS 400
 #define MOST_SHARES (5 * ROUNDS)
 
+/* An axis of a scaled wrench in the basis, on the yardstick. */
+wide out_of_basis(const real *block, const real *inner, int axis) {
+  const fl_head *h = HEAD(block);
+  wide sum = 0;
+  for (int j = 0; j < 6; j++) sum += (wide)h->basis[axis][j] * (wide)inner[j];
+  return sum * (wide)h->scale[axis] / (wide)h->yard[axis];
+}
+
 /* The wrench on the yardstick, in weighted axes, that each force gives per newton. */
 void weigh(const real *block, fl_work *work, const wide *weight) {
-  const fl_head *h = HEAD(block);
   for (int i = 0; i < COUNT(block); i++) {
     work->corners[i] = 0;
     for (int q = 0; q < 2; q++)
-      for (int k = 0; k < 6; k++) {
-        wide sum = 0;
-        for (int j = 0; j < 6; j++) sum += (wide)h->basis[k][j] * (wide)ACTUATOR(block, i)->matrix[q][j];
-        work->column[i][q][k] = weight[k] * (wide)h->scale[k] * sum / (wide)h->yard[k];
-      }
+      for (int k = 0; k < 6; k++)
+        work->column[i][q][k] = weight[k] * out_of_basis(block, ACTUATOR(block, i)->matrix[q], k);
   }
 }
 

@@ -20,16 +20,15 @@ void to_basis(const real *block, const real *wrench, real *target) {
   }
 }
 
-/* How much of a scaled wrench lies beside the range, and its size. */
-real beside_range(const real *block, const real *wrench, const real *target, real *size) {
+/* Whether a wrench lies in the range but for rounding. */
+int in_range(const real *block, const real *wrench, const real *target) {
   const fl_head *h = HEAD(block);
   real rest = 0, all = 0;
   for (int k = 0; k < 6; k++) {
     real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, 6);
     rest += left * left, all += scaled * scaled;
   }
-  *size = SQRT(all);
-  return SQRT(rest);
+  return SQRT(rest) <= MAX(NEARLY, 10 * ROUNDING) * (R(1e-3) + SQRT(all));
 }
 
 /* The wrench [N, N m] of forces. */

@@ -29,16 +29,16 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
 
 static void direction(const real *block, fl_work *work, const real *wrench, real *score) {
   const fl_head *h = HEAD(block);
-  real target[6], all[6], size, rest;
+  real target[6], all[6];
   wide weight[6], begin[6], ray[6], plane[6], share;
   for (int k = 0; k < 6; k++) {
     weight[k] = 1;
     all[k] = wrench[k] + h->beside[k], begin[k] = -on_yardstick(block, h->beside, k);
   }
   to_basis(block, all, target);
-  rest = beside_range(block, all, target, &size);
+  int ranged = in_range(block, all, target);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
-    ray[k] = rest <= NEARLY * size ? h->scale[k] * dot(h->basis[k], target, RANGE(block)) / h->yard[k] : 0;
+    ray[k] = ranged ? out_of_basis(block, target, k) : 0;
   weigh(block, work, weight);
   share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
   wide *miss = work->mixture.miss, less = product(miss, ray, 6) / (product(ray, ray, 6) + 1e-300);

@@ -40,15 +40,17 @@ static int outside(void) {
   return 0;
 }
 
-/* Whether a command is another one: where several cost the same, or none pushes, the choice is rounding's. */
+/* Whether a command is another one: where several cost the same, the choice is rounding's, as of what hardly pushes. */
 static int is_other(const sample *s) {
-  for (int i = 0; i < ROBOT_COUNT; i++)
+  for (int i = 0; i < ROBOT_COUNT; i++) {
+    const fl_actuator *a = ROBOT_ACTUATOR(i);
+    if (size_of(out.force[i]) <= a->most[0] / 100) continue;
     for (int k = 0; k < 3; k++) {
-      const fl_actuator *a = ROBOT_ACTUATOR(i);
       fl_real way = out.command[i][k] - s->command[i][k], width = a->upper[k] - a->lower[k];
       if (a->turns != 0 && width > 6) way = wrapped(way);
       if (FABS(way) > width / 20) return 1;
     }
+  }
   return 0;
 }
 
