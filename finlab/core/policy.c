@@ -8,7 +8,7 @@
 
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
-#define PULL 1.2e-3   /* what a group may miss without pulling at the axes that are held: they give way by a millionth */
+#define PULL 2e-3     /* miss of a group for which held axes give way by a millionth at a curved rim */
 
 static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
 
@@ -46,33 +46,33 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   score[0] = rounded((real)length_of(miss)), score[1] = (real)(1 - share + less);
 }
 
-/* A group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`. */
+/* A group that wants more than there is pulls at the held axes: then it weighs so much less that these give way by as
+   little as they do for a miss of `PULL`. */
 static void priority(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, real *score) {
   fl_mixture *m = &work->mixture;
   unsigned char held[6] = {0};
-  wide wanted[6], aim[6]; /* on the yardstick */
-  for (int k = 0; k < 6; k++) wanted[k] = aim[k] = on_yardstick(block, wrench, k);
+  wide aim[6]; /* on the yardstick */
+  for (int k = 0; k < 6; k++) aim[k] = on_yardstick(block, wrench, k);
   m->count = 0;
   for (int g = 0; g < policy->groups; g++) {
     const unsigned char *group = policy->group[g];
-    wide weight[6], target[6], missing[6] = {0}, missed, far;
-    for (int k = 0; k < 6; k++) weight[k] = HELD * held[k] + group[k];
-    weigh(block, work, weight);
-    m->done = 0; /* the points so far, in the axes of this group: */
-    for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
-    for (int round = 0;; round++) {
-      for (int k = 0; k < 6; k++) target[k] = weight[k] * aim[k];
-      far = nearest_point(block, work, target, CLOSE_BY, 0, m);
+    wide weight[6], target[6], missing[6] = {0}, missed = PULL;
+    for (int round = 0; round < (g > 0 ? 2 : 1) && missed >= PULL; round++) {
+      for (int k = 0; k < 6; k++) {
+        weight[k] = HELD * held[k] + sqrt(PULL / missed) * group[k];
+        target[k] = weight[k] * aim[k];
+      }
+      weigh(block, work, weight);
+      m->done = 0; /* the points so far, in the axes of this group: */
+      for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
+      nearest_point(block, work, target, CLOSE_BY, 0, m);
       for (int k = 0; k < 6; k++)
-        if (group[k]) missing[k] = wanted[k] - aim[k] + m->miss[k] / weight[k];
+        if (group[k]) missing[k] = m->miss[k] / weight[k];
       missed = length_of(missing);
-      if (g == 0 || round == ROUNDS - 1 || missed <= PULL || far <= 2 * PULL) break;
-      for (int k = 0; k < 6; k++)
-        if (group[k]) aim[k] = wanted[k] - (1 - PULL / missed) * missing[k];
     }
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
-      if (group[k]) aim[k] = wanted[k] - missing[k];
+      if (group[k]) aim[k] -= missing[k];
     }
     score[g] = rounded((real)missed);
   }

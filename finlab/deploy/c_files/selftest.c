@@ -54,15 +54,14 @@ static int is_other(const sample *s) {
   return 0;
 }
 
-/* How much farther a wrench is than the library's: `direction` gives one point, the others distances. Less counts
-   where rounding is enlarged: of groups after the first, which move at a curved rim by the root of what those before
-   them lack, and of `direction` where foils drag, whose share is the last one that a search meets. */
+/* How much farther a wrench is than the library's: `direction` gives one point, the others distances. A tenth counts
+   of `direction` where foils drag, whose share is the last one that a search meets. */
 static double farther(const sample *s) {
   double most = 0;
   if (s->policy == FL_DIRECTION) return apart(out.aim, s->aim, all) / (work.drags ? 10 : 1);
   if (s->policy == FL_CLOSEST) return apart(out.aim, s->wrench, all) - apart(s->aim, s->wrench, all);
   for (int g = 0; g < GROUPS; g++)
-    most = fmax(most, (apart(out.aim, s->wrench, group[g]) - apart(s->aim, s->wrench, group[g])) / (g > 0 ? 3 : 1));
+    most = fmax(most, apart(out.aim, s->wrench, group[g]) - apart(s->aim, s->wrench, group[g]));
   return most;
 }
 
