@@ -339,10 +339,8 @@ class Allocator:
             for axes, places in same_axes(self._layout, values):
                 ready = self._ready(known, axes)
                 for rows in chunks_of(places, len(values)):
-                    yield (
-                        rows,
-                        question.solution(ready.method, ready.freed(values[rows], 0.0), first_of(rows)),
-                    )
+                    targets = ready.freed(values[rows], 0.0)
+                    yield rows, question.solution(ready.method, targets, first_of(rows))
 
         solution = joined(parts(), len(values), question.ready.robot.alive)
         targets = question.ready.freed(values, np.nan)

@@ -216,8 +216,8 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
   force[1] = drag_of(block, i, (real)force[0]);
 }
 
-/* The force that is worth most at a price, whatever its power; returns the price along it, of planes that of what is
-   not given in reverse. */
+/* The force that is worth most at a price, whatever its power; returns the price along it, of planes that push either
+   way along what they push ahead. */
 real farthest_of(const real *block, int i, const fl_set *set, const real *price, wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
   force[1] = 0;

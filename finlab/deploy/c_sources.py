@@ -58,7 +58,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = N
     sources["core.h"] = _sized(sources["core.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout)
-    sources["samples.h"] = _samples(layout, method, samples, water)
+    sources["samples.h"] = _samples(layout, method, samples)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
     law = max(sum(len(table) for _, table in row.values()) for row in tables_of(thin))
@@ -129,10 +129,10 @@ def _header(layout: Layout) -> str:
     )
 
 
-def _samples(layout: Layout, method: Dual, count: int, flow: Array | None) -> str:
+def _samples(layout: Layout, method: Dual, count: int) -> str:
     """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to the
     library, which has more ways around gaps."""
-    allocator, rng = Allocator(layout), np.random.default_rng(0)
+    allocator, flow, rng = Allocator(layout), method.plant.flow, np.random.default_rng(0)
     before: list[str] = []
     rows: list[str] = []
     for k in range(8 * count):

@@ -4,6 +4,8 @@ Forces follow from prices by the tables alone and commands are made exact on the
 error is in the wrench, and it stays below TOLERANCE. Errors of other tables cost power, by their squares.
 """
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
@@ -21,7 +23,7 @@ POINTS = 64
 """Directions of a gauge at most."""
 PLACES = 1, 2, 5, 58, 59
 """Where an `fl_actuator` of core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
-LIMITS, TURNS, FORM, FIN, LAW, LEAN = slice(48, 54), 57, 47, 2, 58, 61
+LIMITS, TURNS, FORM, FIN, LAW, LEAN, ANGLES = slice(48, 54), 57, 47, 2, 58, 61, [48, 51]
 
 
 def tables_of(block: Array) -> list[dict[int, tuple[int, Array]]]:
@@ -56,10 +58,9 @@ def thinned(block: Array) -> Array:
     length, places = HEAD + EACH * int(block[3]), {0: 0}
     for place, (kind, numbers) in {p: own for row in tables_of(block) for p, own in row.items()}.items():
         places[place] = length + sum(len(table) for table in new)
-        if kind == 3:
-            own = block[HEAD:length].reshape(-1, EACH)
-            numbers = _reached(numbers, own[own[:, LAW] == place])
-        new.append((_radial, _radial, _gauge, _grid, _curve)[kind](numbers))
+        parts = block[HEAD:length].reshape(-1, EACH)
+        grid = partial(_grid, parts=parts[parts[:, LAW] == place])
+        new.append((_radial, _radial, _gauge, grid, _curve)[kind](numbers))
     block = np.concatenate([block[:length], *new])
     block[2] = len(block)
     for row in block[HEAD:length].reshape(-1, EACH):
@@ -92,39 +93,31 @@ def _cubic(knot: Array, value: Array) -> CubicHermiteSpline:
     return CubicHermiteSpline(knot[1:-1], value[1:-1], rise.T)
 
 
-def _parts(grid: Array) -> tuple[list[Array], Array]:
-    """The knots of its axes, and its values (a, f, d, c)."""
+def _grid(grid: Array, parts: Array) -> Array:
+    """Fewer angles of foils, of those that the commands of these parts (m, EACH) reach, or sizes of a fin; a
+    measured fin keeps its grid."""
     count = grid[:3].astype(int)
     axes = np.split(grid[7 : 7 + count.sum()], np.cumsum(count)[:-1])
-    return axes, grid[7 + count.sum() :].reshape(*count, -1)
-
-
-def _reached(grid: Array, foils: Array) -> Array:
-    """A foil's grid between the angles that commands of these (m, EACH) reach, and three knots beyond; any
-    other grid, and one of all angles, as it is."""
-    (_, _, knot), values = _parts(grid)
-    low, high = np.stack([foils[:, LIMITS][:, ::3].T[k] - foils[:, LEAN] for k in (0, 1)])
-    if grid[3] == 0.0 or foils[0, FORM] == FIN:
-        return grid
-    around = np.concatenate([knot + turn * grid[3] for turn in (-1, 0, 1)])
-    first, last = np.searchsorted(around, low.min()) - 3, np.searchsorted(around, high.max()) + 3
-    if first < 0 or last > len(around) or last - first >= len(knot):
-        return grid
-    rows = np.arange(first, last)
-    return np.concatenate(
-        [[1, 1, len(rows), 0.0, *grid[4:7], 0.0, 0.0], around[rows], values[0, 0, rows % len(knot)].ravel()]
-    )
-
-
-def _grid(grid: Array) -> Array:
-    """Fewer angles of a foil, or sizes of a fin; a measured fin keeps its grid."""
-    axes, values = _parts(grid)
-    if len(axes[0]) == len(axes[1]) == 1 < len(axes[2]):
-        kept = _angles(axes[2], values[0, 0], grid[3])
-        axes[2], values = axes[2][kept], values[:, :, kept]
+    values, period = grid[7 + count.sum() :].reshape(*count, -1), grid[3]
+    if count[0] == count[1] == 1 < count[2]:
+        axes[2], value, period = _reached(axes[2], values[0, 0], period, parts)
+        kept = _angles(axes[2], value, period)
+        axes[2], values = axes[2][kept], value[None, None, kept]
     elif values.shape[2:] == (1, 1):
         axes[0], values = _sizes(axes[0], values, 2 if grid[6] else 1)
-    return np.concatenate([[*map(len, axes)], grid[3:7], *axes, values.ravel()])
+    return np.concatenate([[*map(len, axes)], [period], grid[4:7], *axes, values.ravel()])
+
+
+def _reached(knot: Array, value: Array, period: float, foils: Array) -> tuple[Array, Array, float]:
+    """Knots (K,) and values (K, c) of a period between the angles that foils (m, EACH) reach, and three
+    beyond, without a period; all of them where that is no less."""
+    angles = foils[:, ANGLES] - foils[:, [LEAN]]
+    around = np.concatenate([knot + turn * period for turn in (-1, 0, 1)])
+    first, last = np.searchsorted(around, angles.min()) - 3, np.searchsorted(around, angles.max()) + 3
+    if not period or foils[0, FORM] == FIN or first < 0 or last > len(around) or last - first >= len(knot):
+        return knot, value, period
+    rows = np.arange(first, last)
+    return around[rows], value[rows % len(knot)], 0.0
 
 
 def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:

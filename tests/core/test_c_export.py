@@ -52,19 +52,15 @@ def ran(command: str, folder: Path, code: int = 0) -> str:
 
 
 @pytest.mark.parametrize(("compiler", "single"), [("gcc", ""), ("clang", "-DFL_SINGLE")])
+@pytest.mark.parametrize("flow", [None, SPEED])
 @pytest.mark.parametrize("name", ["A", "octo", "torpedo", "bluerov2"])
-def test_self_test_holds(name: str, compiler: str, single: str, tmp_path: Path) -> None:
+def test_self_test_holds(
+    name: str, flow: tuple[float, ...] | None, compiler: str, single: str, tmp_path: Path
+) -> None:
     words = (
         f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     )
-    assert ran(words, exported(name, 200)).startswith("0 of 200 ")
-
-
-@pytest.mark.parametrize("single", SINGLE)
-@pytest.mark.parametrize("name", ["torpedo", "bluerov2"])
-def test_self_test_holds_at_speed(name: str, single: str, tmp_path: Path) -> None:
-    words = f"gcc -std=c99 -O1 {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
-    assert ran(words, exported(name, 200, SPEED)).startswith("0 of 200 ")
+    assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
 
 @pytest.mark.parametrize("single", SINGLE)
