@@ -57,7 +57,7 @@ test: setup board-tools
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser $(CASES)
 
 fuzz: setup board-tools
-	FUZZ=250000 $(BIN)/python -m pytest -n 2 -k fuzzer tests/core
+	FUZZ=250000 $(BIN)/python -m pytest -n 2 -m "" -o faulthandler_timeout=0 -k fuzzer tests/core
 
 test-all: CASES := -m ""
 test-all: test

@@ -10,6 +10,8 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -42,8 +44,8 @@ def map_parts(
     Inside `on_cluster` the parts run there, else in at most `jobs` processes, 1 being this one; those still
     open are dropped when the iteration ends early. A function of a module, or a `partial` of one, and parts
     that can be pickled can be sent. With a title `what` there is a bar on a terminal's stderr, which counts
-    units. Raises FinlabError: the cluster is gone, or a part ends every worker; and whatever `function`
-    raises."""
+    units. Raises FinlabError: the cluster is gone, a part ends every worker, or a process of this machine
+    has ended; and whatever `function` raises."""
     client, count = _client.get(), len(parts)
     jobs = min(jobs, count)
     if client is not None:
@@ -110,9 +112,19 @@ def _version() -> str:
 
 
 def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs: int) -> Iterator[Made]:
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(jobs, initializer=end_with_parent) as pool:
-        yield from pool.imap(function, parts)
+    others, context = set(multiprocessing.active_children()), multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, end_with_parent) as pool:
+        try:
+            yield from pool.map(function, parts)
+        except GeneratorExit:
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+            raise
+        except BrokenProcessPool:
+            raise FinlabError(
+                "a process that computes parts has ended: give it more memory, or fewer processes; a script "
+                'must be guarded by `if __name__ == "__main__":`'
+            ) from None
 
 
 def _by_cluster(client: "Client", function: Callable[[Part], Made], parts: Sequence[Part]) -> Iterator[Made]:

@@ -1,6 +1,7 @@
 """Parts of work give the same rows in this process, in several, and on a cluster that loses a worker."""
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -15,11 +16,12 @@ from typing import Any
 import pytest
 
 from finlab.cli import main
+from finlab.errors import FinlabError
 from finlab.executor import map_parts, on_cluster
 
 WRENCH = [
-    *("eval", "wrench", "--split", "id,tables,thrusters", "--methods", "dual,qp"),
-    *("--layouts", "4", "--targets", "2", "--seed", "5", "--json"),
+    *("eval", "wrench", "--split", "id,tables", "--methods", "dual,qp"),
+    *("--layouts", "3", "--targets", "2", "--seed", "5", "--json"),
 ]
 
 
@@ -61,6 +63,18 @@ def test_processes_answer_in_order(tmp_path: Path) -> None:
     assert len({path.name.split("-")[1] for path in tmp_path.iterdir()} - {str(os.getpid())}) > 0
 
 
+def test_a_process_that_has_ended_is_one_sentence() -> None:
+    with pytest.raises(FinlabError, match="give it more memory"):
+        list(map_parts(os._exit, [3, 4, 5], jobs=2))
+
+
+def test_what_is_not_waited_for_is_ended() -> None:
+    others, made = set(multiprocessing.active_children()), map_parts(time.sleep, [0.0, 600.0, 600.0], jobs=2)
+    assert next(iter(made)) is None
+    del made
+    assert set(multiprocessing.active_children()) <= others
+
+
 def test_a_lost_worker_costs_its_parts_again(cluster: tuple[str, list[int]], tmp_path: Path) -> None:
     address, pids = cluster
     with on_cluster(address):
@@ -85,7 +99,7 @@ def test_rows_are_those_of_one_process(
     killer.join()
     files = (tmp_path / f"{name}.json" for name in ("alone", "cluster"))
     alone, shared = (json.loads(file.read_text())["rows"] for file in files)
-    assert len(alone) == 5 and plain(shared) == plain(alone)
+    assert len(alone) == 4 and plain(shared) == plain(alone)
 
 
 @pytest.mark.parametrize(

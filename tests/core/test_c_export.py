@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 from functools import cache
+from itertools import starmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,6 +19,7 @@ from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.layout import load_layout
 from tests.any_robot import AnyRobot
+from tests.exhaustive import sampled
 from tests.mixed_robots import KINDS, load, random_robot, with_rates
 from tests.terminal import refused
 
@@ -30,6 +32,7 @@ SMALL = f"arm-none-eabi-gcc -std=c99 -Os {M7} -ffunction-sections -fdata-section
 
 SPEED = 2.5, 0.2, -0.1, 0.0, 0.05, 0.1
 """A velocity through the water [m/s, rad/s]."""
+EXPORTS = ("octo", None), ("A", None), ("torpedo", SPEED), ("bluerov2", None), ("torpedo", None)
 
 
 @cache
@@ -51,16 +54,10 @@ def ran(command: str, folder: Path, code: int = 0) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize(("compiler", "single"), [("gcc", ""), ("clang", "-DFL_SINGLE")])
-@pytest.mark.parametrize(
-    ("name", "flow"), [("A", None), ("octo", None), ("bluerov2", None), ("torpedo", None), ("torpedo", SPEED)]
-)
-def test_self_test_holds(
-    name: str, flow: tuple[float, ...] | None, compiler: str, single: str, tmp_path: Path
-) -> None:
-    words = (
-        f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror {single} *.c -lm -o {tmp_path}/it && {tmp_path}/it"
-    )
+@pytest.mark.parametrize("compiler", ["gcc", "clang -DFL_SINGLE"])
+@pytest.mark.parametrize(("name", "flow"), sampled(starmap(pytest.param, EXPORTS), every=2))
+def test_self_test_holds(name: str, flow: tuple[float, ...] | None, compiler: str, tmp_path: Path) -> None:
+    words = f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
 
@@ -98,8 +95,8 @@ def test_single_precision_answers_as_double_does(name: str, tmp_path: Path) -> N
     [
         ("catamaran", 12000, "gcc"),
         ("torpedo", 3000, "clang -DFL_SINGLE"),
-        ("octo", 1000, "clang"),
-        ("mixed", 1000, "gcc -DFL_SINGLE"),
+        pytest.param("octo", 1000, "clang", marks=pytest.mark.exhaustive),
+        pytest.param("mixed", 1000, "gcc -DFL_SINGLE", marks=pytest.mark.exhaustive),
     ],
 )
 def test_fuzzer_finds_nothing(name: str, cases: int, compiler: str, tmp_path: Path) -> None:

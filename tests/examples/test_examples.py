@@ -5,6 +5,7 @@ import runpy
 import shutil
 import time
 from collections.abc import Iterator
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,11 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell
 
+from tests.exhaustive import sampled
+
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("[0-9]*.py"))
+"""`make docs` runs all of them."""
+stem = attrgetter("stem")
 NOTEBOOKS = [path for path in EXAMPLES if "# %%" in path.read_text()]
 PATIENCE_S = 20.0
 """What a notebook may take."""
@@ -32,7 +37,7 @@ def test_there_are_examples() -> None:
     assert len(NOTEBOOKS) >= 12
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sampled(NOTEBOOKS, every=4), ids=stem)
 def test_notebook_runs(path: Path, kernel: NotebookClient, tmp_path: Path) -> None:
     shutil.copy(path.with_name("soft_fin.csv"), tmp_path)
     notebook = jupytext.read(path)
@@ -56,7 +61,7 @@ def test_the_script_says_how_it_is_called(monkeypatch: Any, capsys: pytest.Captu
         assert path.name in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", EXAMPLES, ids=stem)
 def test_example_is_short_and_says_what_you_will_see(path: Path) -> None:
     text = path.read_text()
     assert len(text.splitlines()) < 70

@@ -68,8 +68,8 @@ def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
     limits = Limits(zero_direction=(0.3 - half, 0.3 + half))
     fin = Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, FinModelSpec("soft", tuple(sorted(numbers.items()))))
     layout = Layout("one", (fin,))
-    axes = [np.linspace(low, high, 40) for low, high in zip(fin.lower, fin.upper, strict=True)]
-    axes[2] = np.linspace(*limits.zero_direction, 2001)
+    axes = [np.linspace(low, high, 20) for low, high in zip(fin.lower, fin.upper, strict=True)]
+    axes[2] = np.linspace(*limits.zero_direction, 501)
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     force = np.concatenate([Plant(layout).wrench(command)[:, 1:3], np.zeros((1, 2))])
     angle = np.arange(60) * 2.0 * np.pi / 60

@@ -171,7 +171,7 @@ def tab(workers: Workers) -> Iterator[Tab]:
             for kind, places in ((RuntimeError, COMPUTED + DRAWN), (FinlabError, (COMPUTED[0], DRAWN[2])))
             for place in places
         ],
-        every=3,
+        every=6,
     ),
 )
 def test_no_figure_of_the_robot_before_stays(

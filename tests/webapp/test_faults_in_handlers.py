@@ -121,7 +121,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
             pytest.param("webapp.panels.files_tab.command_line", "Export", None),
             pytest.param("webapp.panels.swim_tab.axis_reach", "Simulate", None),
         ],
-        every=2,
+        every=3,
     ),
 )
 def test_every_widget_survives_a_fault_in_what_is_written(

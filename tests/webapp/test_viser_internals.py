@@ -177,7 +177,9 @@ def test_real_server_refuses_before_anything_is_shown() -> None:
         def get(path: str, **headers: str) -> http.client.HTTPResponse:
             connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
             connection.request("GET", path, headers=headers)
-            return connection.getresponse()
+            answer = connection.getresponse()
+            answer.close()  # a server that stops waits for pages that are open
+            return answer
 
         assert get("/").status == 401
         opened = get("/?token=secret-token")

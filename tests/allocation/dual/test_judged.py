@@ -15,6 +15,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.file import parse_layout
 from tests import mixed_robots
+from tests.exhaustive import sampled
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
 from tests.own_plant import OwnPlant
 
@@ -48,7 +49,7 @@ def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
         assert missing(plant, near, wrench) <= 1.0005 * least_miss(plant, wrench)
 
 
-@pytest.mark.parametrize("number", [0, 1, pytest.param(2, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("number", sampled(range(3)))
 @pytest.mark.parametrize("kind", mixed_robots.KINDS)
 def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
     plant, rng = mixed_robots.random_plant(kind, number, 7), np.random.default_rng(number)

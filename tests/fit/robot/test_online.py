@@ -13,9 +13,10 @@ from finlab.fit.robot.fitted_robot import OnlineFit, leaned
 from finlab.layout import FinModelSpec
 from finlab.physics import plant_of
 from finlab.sim import ClosedLoop, Fault, make_trajectory
+from tests.exhaustive import sampled
 
 
-@pytest.mark.parametrize("name", ["A", "bluerov2_heavy"])
+@pytest.mark.parametrize("name", sampled(["A", "bluerov2_heavy"]))
 def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     """Actuators lean by 5 degrees, one this way and the next that way, and give 0.8 of their force."""
     layout = load_layout(name)

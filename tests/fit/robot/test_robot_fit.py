@@ -15,6 +15,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, Thruster, load_layout, save
 from finlab.physics import plant_of
 from finlab.sim.excite import excitation
 from tests.any_robot import AnyRobot
+from tests.exhaustive import sampled
 from tests.fit.robot.swims import swim, write_csv
 
 CENTER = np.array([0.015, -0.01, 0.005])
@@ -131,7 +132,7 @@ def test_the_command_reads_a_csv_file(
     assert not (tmp_path / "found.txt").exists()
 
 
-@pytest.mark.parametrize("name", ["turtle_hybrid", "bluerov2_heavy", "catamaran"])
+@pytest.mark.parametrize("name", sampled(["turtle_hybrid", "bluerov2_heavy", "catamaran"]))
 def test_strengths_of_any_actuators_are_found_in_a_minute_on_the_spot(name: str, tmp_path: Path) -> None:
     layout = load_layout(name)
     loop, shares = excitation(layout, 60.0, seed=3), [(0.9, 0.7)[i % 2] for i in range(layout.n)]

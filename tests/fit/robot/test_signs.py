@@ -29,7 +29,7 @@ def fitted(layout: Layout, path: Path) -> RobotFit:
 @pytest.mark.parametrize(
     ("name", "motor"),
     [
-        ("bluerov2_heavy", 2),
+        pytest.param("bluerov2_heavy", 2, marks=pytest.mark.exhaustive),
         pytest.param("bluerov2_heavy", 5, marks=pytest.mark.exhaustive),
         ("ucat", 1),
         pytest.param("catamaran", 0, marks=pytest.mark.exhaustive),
