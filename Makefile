@@ -5,6 +5,9 @@ STAMP := .venv/.ready
 LIBRARY := finlab/core/libfinlab.$(if $(filter Darwin,$(shell uname)),dylib,so)
 HOST_PORT ?= 8080
 
+# Whatever the shell says, what is imported is compiled once: tests start hundreds of processes.
+export PYTHONDONTWRITEBYTECODE :=
+
 # Tests and benchmarks share few cores with a browser; one thread each is faster than many that wait.
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -34,7 +37,7 @@ setup: $(STAMP) $(LIBRARY)
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
-	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/pip install --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev]'
 	@touch $@
 
 core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.[ch])
