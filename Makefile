@@ -18,7 +18,7 @@ help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
 	@echo "make core         compile the C files of finlab/core, a second; setup does it where they changed"
 	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
-	@echo "make test         every test, browser tests included; of long tables of cases one in ten"
+	@echo "make test         every test, browser tests included; of long tables of cases a share"
 	@echo "make test-all     every test and every case"
 	@echo "make fuzz         a million mutated robots and wild wrenches for the core in C, under sanitizers"
 	@echo "make test-near    the tests near what was changed since the branch main"

@@ -114,17 +114,18 @@ def _version() -> str:
 def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs: int) -> Iterator[Made]:
     others, context = set(multiprocessing.active_children()), multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, context, end_with_parent) as pool:
+        made = pool.map(function, parts)
+        started = set(multiprocessing.active_children()) - others
         try:
-            yield from pool.map(function, parts)
-        except GeneratorExit:
-            for process in set(multiprocessing.active_children()) - others:
-                process.terminate()
-            raise
+            yield from made
         except BrokenProcessPool:
             raise FinlabError(
                 "a process that computes parts has ended: give it more memory, or fewer processes; a script "
                 'must be guarded by `if __name__ == "__main__":`'
             ) from None
+        finally:
+            for process in started:
+                process.terminate()
 
 
 def _by_cluster(client: "Client", function: Callable[[Part], Made], parts: Sequence[Part]) -> Iterator[Made]:

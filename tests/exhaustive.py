@@ -1,4 +1,4 @@
-"""Long tables of cases: one in ten runs every day, the others with `make test-all`."""
+"""Long tables of cases: a share runs every day, the others with `make test-all`."""
 
 from collections.abc import Iterable
 from itertools import product

@@ -20,8 +20,8 @@ from finlab.errors import FinlabError
 from finlab.executor import map_parts, on_cluster
 
 WRENCH = [
-    *("eval", "wrench", "--split", "id,tables", "--methods", "dual,qp"),
-    *("--layouts", "3", "--targets", "2", "--seed", "5", "--json"),
+    *("eval", "wrench", "--split", "id,tables,thrusters", "--methods", "dual,qp"),
+    *("--layouts", "4", "--targets", "2", "--seed", "5", "--json"),
 ]
 
 
@@ -70,8 +70,11 @@ def test_a_process_that_has_ended_is_one_sentence() -> None:
 
 def test_what_is_not_waited_for_is_ended() -> None:
     others, made = set(multiprocessing.active_children()), map_parts(time.sleep, [0.0, 600.0, 600.0], jobs=2)
-    assert next(iter(made)) is None
+    assert next(made) is None
     del made
+    assert set(multiprocessing.active_children()) <= others
+    with pytest.raises(ValueError, match="non-negative"):  # of the first part
+        list(map_parts(time.sleep, [-1.0, 600.0], jobs=2))
     assert set(multiprocessing.active_children()) <= others
 
 
@@ -99,7 +102,7 @@ def test_rows_are_those_of_one_process(
     killer.join()
     files = (tmp_path / f"{name}.json" for name in ("alone", "cluster"))
     alone, shared = (json.loads(file.read_text())["rows"] for file in files)
-    assert len(alone) == 4 and plain(shared) == plain(alone)
+    assert len(alone) == 5 and plain(shared) == plain(alone)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from nbformat.v4 import new_code_cell
 from tests.exhaustive import sampled
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("[0-9]*.py"))
+NOTEBOOKS = [path for path in EXAMPLES if "# %%" in path.read_text()]
 """`make docs` runs all of them."""
 stem = attrgetter("stem")
-NOTEBOOKS = [path for path in EXAMPLES if "# %%" in path.read_text()]
 PATIENCE_S = 20.0
 """What a notebook may take."""
 

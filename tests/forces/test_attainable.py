@@ -118,7 +118,7 @@ def test_bluerov2_heavy_reaches_what_its_sources_say() -> None:
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins any shaft", "rudders", "mixed"])
 def test_as_far_as_linear_programs_by_another_plant(kind: str) -> None:
     rng = np.random.default_rng(7)
-    for number in range(3):
+    for number in range(5):
         plant, flow = random_plant(kind, number, 3), random_flow(kind, number, 3)
         sets = force_sets(load(random_robot(kind, number, 3)), flow=flow)
         drawn = rng.standard_normal((6, 6))

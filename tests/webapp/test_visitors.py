@@ -139,7 +139,7 @@ def frozen() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("frozen")
-def test_many_pages_one_after_the_other_and_at_once(app: App, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_hundred_pages_one_after_the_other_and_at_once(app: App, monkeypatch: pytest.MonkeyPatch) -> None:
     longest = 0.0
 
     async def beat() -> None:
@@ -150,7 +150,7 @@ def test_many_pages_one_after_the_other_and_at_once(app: App, monkeypatch: pytes
             longest = max(longest, time.monotonic() - before)
 
     async def come() -> tuple[list[bool], list[bool]]:
-        one_by_one = [await visit(port_of(app)) for _ in range(60)]
+        one_by_one = [await visit(port_of(app)) for _ in range(200)]
         monkeypatch.setattr(Blank, "BUILDING_S", 0.02)
         return one_by_one, await asyncio.gather(*(visit(port_of(app), 60.0) for _ in range(200)))
 
