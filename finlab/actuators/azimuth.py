@@ -63,6 +63,7 @@ class AzimuthGroup(Group):
         self._lower = np.array([azimuth.lower for azimuth in azimuths])
         self._upper = np.array([azimuth.upper for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
+        self._band = np.array([azimuth.dead_band for azimuth in azimuths])
         middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
         self.responses = [
             _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
@@ -73,15 +74,20 @@ class AzimuthGroup(Group):
     def forms(self) -> list[Form]:
         return [Form("pod")] * len(self.responses)
 
-    def radial_worth(self, price: Array, back: Array) -> Array:
-        least, most = self._lower[:, 1], self._upper[:, 1]
-        ahead = self._power.worth(price, np.maximum(least, 0.0), most)
-        return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
+    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
+        least, most = (self._lower[:, 1], self._upper[:, 1]) if ends is None else ends.T
+        least = np.where(least > self._band, least, np.minimum(least, 0.0))  # within its band it rests
+        ahead = self._power.worth(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
+        astern = self._power.worth(-back, least, np.minimum(most, 0.0))
+        worth = np.where(most < 0.0, astern, ahead)
+        return np.where((least < 0.0) & (most >= 0.0), np.maximum(ahead, astern), worth)
 
 
 def _plane(azimuth: "Azimuth", matrix: Array, middle: float, half: float) -> Plane:
     """What one offers; `matrix` (2, 6) is the wrench per newton."""
     least, most = azimuth.force
+    if 0.0 < least < azimuth.dead_band:
+        least = 0.0  # what it is told then gives no force, and takes no power
     table = radial_table(azimuth.model, 1, max(least, 0.0), most)
     reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
     return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)

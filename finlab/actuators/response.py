@@ -257,10 +257,18 @@ class Group(ABC):
         """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
         return np.zeros((len(force), 6))
 
-    def radial_worth(self, price: Array, back: Array) -> Array | None:
-        """Returns the most (N, m) [W] that force along its own direction is worth at prices (N, m) [W/N],
-        less its power, by the law itself (of lines signed prices; of planes that push either way `back` in
-        reverse); NaN, or None, where that is what the tables say."""
+    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array | None:
+        """Returns the most that force along its own direction is worth, less its power, by the law itself.
+
+        Args:
+            price: prices (N, m) [W/N] of that force, of lines signed.
+            back: the same of a force in reverse, of planes that push either way.
+            ends: least and largest force (m, 2) [N] now, of planes below 0 in reverse; None for all that
+                the limits allow. What a law may give beyond them makes the bound weaker, not wrong.
+
+        Returns:
+            (N, m) [W]; NaN, or None, where that is what the tables say.
+        """
         return None
 
     def worth(self, price: Array) -> Array | None:

@@ -64,8 +64,11 @@ class ThrusterGroup(Group):
     def forms(self) -> list[Form]:
         return [Form("thruster", numbers=(sign, *Form("thruster").numbers[1:])) for sign in self._sign]
 
-    def radial_worth(self, price: Array, back: Array) -> Array:
-        return self._power.worth(self._sign * price, *self._limits.T)
+    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
+        if ends is None:
+            return self._power.worth(self._sign * price, *self._limits.T)
+        low, high = np.sort(self._sign[:, None] * ends, axis=1).T
+        return self._power.worth(self._sign * price, low, high)
 
 
 def _line(thruster: "Thruster", along: Array) -> Line:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
-from finlab.allocation.solution import Candidates, PlainData, Rows
+from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
 from finlab.display import blocks
 from finlab.display.pictures import robot_picture
@@ -301,15 +301,3 @@ class Allocation(Answer[float]):
 def chunks(n: int) -> Iterator[slice]:
     """Slices of at most `CHUNK` of n rows."""
     return (slice(start, start + CHUNK) for start in range(0, n, CHUNK))
-
-
-def chunks_of(places: NDArray[np.intp] | None, n: int) -> Iterator[Rows]:
-    """At most `CHUNK` places at a time, of all n rows where they are None."""
-    if places is None:
-        return chunks(n)
-    return (places[part] for part in chunks(len(places)))
-
-
-def first_of(rows: Rows) -> int:
-    """The first of some places."""
-    return int(rows.start if isinstance(rows, slice) else rows[0])

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
-from finlab.allocation.allocation import Allocation, BatchAllocation, chunks_of, first_of
+from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
 from finlab.allocation.method import Method
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
-    Axes,
     Usable,
     check_flow,
     check_layout,
@@ -27,12 +26,13 @@ from finlab.allocation.question import (
     check_target,
     check_wrenches,
     damage_of,
-    same_axes,
+    free_mask,
     usable,
 )
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
+from finlab.axes import axes_in
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
 from finlab.layout import Layout
@@ -52,7 +52,7 @@ class Ready(NamedTuple):
     robot: Usable
     """Which actuators may be used."""
     method: Method
-    """Made for these."""
+    """Made for these, or for all where it takes losses with the question."""
     plant: Plant
     """Of all actuators; judges."""
     free: NDArray[np.bool_] | None
@@ -71,14 +71,26 @@ class Question(NamedTuple):
     flow: Array | None
     seed: int
 
-    def solution(self, method: Method, targets: Array, offset: int = 0, **options: Any) -> Solution:
-        """The answer of a method to targets (N, 6), with rest for actuators that have nothing to do."""
+    def solution(
+        self, targets: Array, previous: Array | None = None, offset: int = 0, **options: Any
+    ) -> Solution:
+        """The answer to targets (N, 6) for all actuators, NaN for lost ones; in a tick after commands (n, 3)
+        never outside of what the drives' limits and rates allow, else with rest for actuators that have
+        nothing to do."""
+        robot, method, *_ = self.ready
+        if method.takes_losses:
+            options["lost"], options["free"] = robot.lost, self.ready.free
+        elif previous is not None:
+            options["previous"] = previous[robot.alive]
+        if method.takes_losses and previous is not None:
+            options["previous"] = previous
         solution = method.solve(
             targets, policy=self.policy, flow=self.flow, seed=self.seed + offset, **options
         )
-        if options.get("previous") is not None:
-            return solution
-        return solution._replace(command=method.plant.rested(solution.command))
+        if previous is None:
+            return solution._replace(command=method.plant.rested(solution.command))
+        box = method.rates.box(options["previous"])
+        return solution._replace(command=box.held(solution.command, method.plant))
 
 
 class Answered(NamedTuple):
@@ -94,8 +106,9 @@ class Answered(NamedTuple):
         return self.question.ready.plant.at(self.question.flow)
 
     def notes(self) -> tuple[str, ...]:
-        (robot, method, *_), _, flow, _ = self.question
-        return answer_notes(robot.healthy, method, flow, self.wrenches, self.solution.notes)
+        (robot, method, _, free), _, flow, _ = self.question
+        wanted = self.wrenches if free is None else np.where(free, 0.0, self.wrenches)
+        return answer_notes(robot.healthy, method, flow, wanted, self.solution.notes)
 
     def candidates(self) -> Candidates | None:
         return self._among_all(self.solution.candidates)
@@ -244,6 +257,7 @@ class Allocator:
         failed: Sequence[str] = (),
         previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
+        free: Sequence[str] = (),
         policy: Policy | str = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
@@ -251,8 +265,7 @@ class Allocator:
         """Commands for one target.
 
         Args:
-            wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that is free here: it
-                takes what the cheapest answer gives it, as those do that the layout does not command.
+            wrench: desired wrench (6,) [N, N m] in the body frame.
             lost: names of actuators that do not work; they leave the graph.
             damage: these and actuators that work in part; the result's layout has what is left of their
                 limits.
@@ -261,42 +274,42 @@ class Allocator:
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
                 follow answers the one that they will be in time for, which is then the result's target.
+            free: names of axes that are free here: they take what the cheapest answer gives them, as those
+                do that the layout does not command.
             policy: what to do when the wrench is out of reach; see `Policy`.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six numbers, none counts, or another array has a wrong shape.
+            CommandError: the wrench is not six finite numbers, no axis counts, or another array has a wrong
+                shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
-        values, axes = check_target(wrench, self._layout)
+        values = check_target(wrench)
         known = damage_of(damage, lost, failed)
-        question = self._question(known, policy, flow, seed, axes)
-        robot, method = question.ready.robot, question.ready.method
+        question = self._question(known, policy, flow, seed, free)
+        ready = question.ready
+        robot, method = ready.robot, ready.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
                 options["prices"] = previous.prices
             previous = previous.command
         before = None if previous is None else check_previous(previous, robot.layout)
-        if before is not None and robot.damage.lost:
-            before = before[robot.alive]
         start = time.perf_counter()
         target = values
         if reference is not None:
             target = method.in_time(target, check_reference(reference))
-        solution = question.solution(
-            method, question.ready.freed(target, 0.0)[None], previous=before, **options
-        )
+        solution = question.solution(ready.freed(target, 0.0)[None], before, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation.of(
-            **self._about(question, question.ready.freed(target, np.nan).copy(), values, solution),
+            **self._about(question, ready.freed(target, np.nan).copy(), values, solution),
             command=robot.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
-            previous=None if before is None else robot.among_all(before),
+            previous=before,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
             prices=None if solution.prices is None else solution.prices[0],
         )
@@ -321,6 +334,7 @@ class Allocator:
         lost: Sequence[str] = (),
         damage: Damage | None = None,
         failed: Sequence[str] = (),
+        free: Sequence[str] = (),
         policy: Policy | str = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
@@ -332,18 +346,17 @@ class Allocator:
         """
         values = check_wrenches(wrenches)
         known = damage_of(damage, lost, failed)
-        question = self._question(known, policy, flow, seed)
+        question = self._question(known, policy, flow, seed, free)
+        ready = question.ready
         start = time.perf_counter()
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
-            for axes, places in same_axes(self._layout, values):
-                ready = self._ready(known, axes)
-                for rows in chunks_of(places, len(values)):
-                    targets = ready.freed(values[rows], 0.0)
-                    yield rows, question.solution(ready.method, targets, first_of(rows))
+            for rows in chunks(len(values)):
+                targets = ready.freed(values[rows], 0.0)
+                yield rows, question.solution(targets, offset=rows.start)
 
-        solution = joined(parts(), len(values), question.ready.robot.alive)
-        targets = question.ready.freed(values, np.nan)
+        solution = joined(parts(), len(values), ready.robot.alive)
+        targets = ready.freed(values, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation.of(
             **self._about(question, targets, values, solution),
@@ -358,12 +371,12 @@ class Allocator:
         policy: Policy | str,
         flow: ArrayLike | None,
         seed: int,
-        axes: Axes | None = None,
+        free: Sequence[str] = (),
     ) -> Question:
         policy = as_policy(policy)
         check_seed(seed)
         water = check_flow(flow)
-        ready = self._ready(damage, axes)
+        ready = self._ready(damage, free)
         ready.method.check_policy(policy)
         return Question(ready, policy, water, int(seed))
 
@@ -394,23 +407,31 @@ class Allocator:
             )
         return ready
 
-    def _ready(self, damage: Damage, axes: Axes | None = None) -> Ready:
-        """The robot in a state, asked for some axes, prepared now or kept from an earlier question."""
-        if axes is None and damage == WHOLE:
+    def _ready(self, damage: Damage, free: Sequence[str] = ()) -> Ready:
+        """The robot in a state, asked for all axes but some, prepared now or kept from an earlier
+        question."""
+        if damage == WHOLE and not len(free):
             return self._whole
-        key = damage, axes
-        ready = self._prepared.pop(key, None) or self._make(damage, axes)
+        mask = free_mask(self._layout, free)
+        key = damage, None if mask is None else mask.tobytes()
+        ready = self._prepared.pop(key, None) or self._make(damage, mask)
         self._prepared[key] = ready  # the newest is last
         while len(self._prepared) > MOST_PREPARED:
             self._prepared.pop(next(iter(self._prepared)), None)
         return ready
 
-    def _make(self, damage: Damage, axes: Axes | None = None) -> Ready:
+    def _make(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> Ready:
+        """The robot in a state. A method that takes losses with the question is that of the state without
+        any, and a loss prepares nothing."""
         robot, choice = usable(self._layout, damage), self._choice
-        layout = robot.healthy if axes is None else replace(robot.healthy, axes=axes)
+        counts = self._layout.commanded if free is None else self._layout.commanded & ~free
+        none_count = None if counts.all() else ~counts
+        if choice.kind.takes_losses and (robot.damage.lost or free is not None):
+            rest = self._ready(replace(damage, lost=()))
+            return Ready(robot, rest.method, rest.plant, none_count)
+        layout = robot.healthy if free is None else replace(robot.healthy, axes=axes_in(counts))
         method = choice.kind(layout, choice.settings, self._scale, choice.weights)
-        free = None if layout.commanded.all() else ~layout.commanded
-        return Ready(robot, method, plant_of(robot.layout), free)
+        return Ready(robot, method, plant_of(robot.layout), none_count)
 
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"

@@ -4,13 +4,14 @@ The last stage of a search: it works in commands, not forces, and with the actua
 the error that compiled tables leave. The paper's method uses it with its surrogate.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.rates import Box
 from finlab.arrays import AnyArray, Array, solve
 from finlab.axes import feasible
 from finlab.least_squares import Damping, levenberg_marquardt
@@ -41,12 +42,32 @@ class CommandProblem:
     """True (n,) where the zero direction may turn a full circle."""
     sigma: Array | None = None
     """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any other."""
+    works: NDArray[np.bool_] | None = None
+    """Which actuators (n,) give a force; None where all do."""
+    counts: NDArray[np.bool_] | None = None
+    """Which axes (6,) of the wrench count; None where all do."""
 
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
         """A robot as its actuators' own laws say, wrenches normalized by `sigma` (6,)."""
         own = None if plant.interaction is None else sigma
         return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own)
+
+    def standing(
+        self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None
+    ) -> Self:
+        """Returns the problem of the same robot where some actuators (n,) work and some axes (6,) count."""
+        effectiveness = self.effectiveness
+        if works is not None:
+            effectiveness = np.where(works[:, None, None], effectiveness, 0.0)
+        if counts is not None:
+            effectiveness = np.where(counts, effectiveness, 0.0)
+        return replace(self, effectiveness=effectiveness, works=works, counts=counts)
+
+    def after(self, box: Box) -> Self:
+        """Returns the problem within what may follow the command of the tick before."""
+        full_turn = box.free[:, 2] & self.full_turn
+        return replace(self, lower=box.lower, upper=box.upper, full_turn=full_turn)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -68,16 +89,26 @@ class CommandProblem:
         """The same of forces (R, n, 3)."""
         effectiveness = self.effectiveness.reshape(-1, 6)
         wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
-        return wrench if self.sigma is None else wrench + self.forces.offset(force) / self.sigma
+        if self.sigma is None:
+            return wrench
+        acting = force if self.works is None else np.where(self.works[:, None], force, 0.0)
+        offset = self.forces.offset(acting) / self.sigma
+        return wrench + (offset if self.counts is None else np.where(self.counts, offset, 0.0))
 
     def slope(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives (R, n, 3, 6)."""
         force, jacobian = self.forces.force_and_jacobian(command)
         if self.sigma is None:
             return self.wrench_of(force), np.matmul(jacobian, self.effectiveness)
-        offset, effectiveness = self.forces.effect(force)
-        wrench = np.einsum("rnk,nkw->rw", force, self.effectiveness) + offset / self.sigma
-        return wrench, np.matmul(jacobian, effectiveness / self.sigma)
+        acting = force if self.works is None else np.where(self.works[:, None], force, 0.0)
+        offset, effectiveness = self.forces.effect(acting)
+        offset, effectiveness = offset / self.sigma, effectiveness / self.sigma
+        if self.works is not None:
+            effectiveness = np.where(self.works[:, None, None], effectiveness, 0.0)
+        if self.counts is not None:
+            offset, effectiveness = (np.where(self.counts, each, 0.0) for each in (offset, effectiveness))
+        wrench = np.einsum("rnk,nkw->rw", force, self.effectiveness) + offset
+        return wrench, np.matmul(jacobian, effectiveness)
 
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first."""

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from finlab.allocation.policy import Policy
+from finlab.allocation.rates import Rates
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -18,6 +19,8 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import following_delay
 
+USUAL_PERIOD_S = 0.1
+"""Time between ticks of methods for which it is no setting [s]."""
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
 
@@ -35,6 +38,9 @@ class Method(ABC):
     """Whether more than the least plain error may be asked for."""
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
+    takes_losses: ClassVar[bool] = False
+    """Whether `solve` takes `lost` actuators and `free` axes, rather than being made for a robot without
+    them."""
     begins_at_prices: ClassVar[bool] = False
     """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
     fin_model: FinModelSpec | None = None
@@ -140,6 +146,16 @@ class Method(ABC):
             if isinstance(getattr(type(self), name, None), cached_property):
                 del other.__dict__[name]
         return other
+
+    @property
+    def period_s(self) -> float:
+        """Time between ticks [s]."""
+        return float(vars(self.settings).get("period_s", USUAL_PERIOD_S))
+
+    @cached_property
+    def rates(self) -> Rates:
+        """How far commands may change in a tick."""
+        return Rates(self.plant, self.layout.rates * self.period_s)
 
     @property
     def undriven(self) -> tuple[str, ...]:

@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.solution import among_all
 from finlab.arrays import Array
-from finlab.axes import AXES, Axis, axes_in
+from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage, lost_names
@@ -24,20 +24,26 @@ MAX_FLOW = 100.0
 FEW = 100
 """Numbers that are checked in the interpreter."""
 
-Axes = tuple[Axis, ...]
-"""Axes that a question asks for."""
-
-
-class Usable(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Usable:
     """The actuators of a robot, and which of them an allocator may use."""
 
     layout: Layout
     """All of them, with the limits that damage has left."""
     damage: Damage
-    healthy: Layout
-    """The others."""
+    """What is known of those that are damaged."""
     alive: NDArray[np.bool_]
-    """Mask (n,) of the others."""
+    """Mask (n,) of those that work."""
+
+    @cached_property
+    def healthy(self) -> Layout:
+        """The robot of those that work alone."""
+        return self.layout.without(self.damage.lost) if self.damage.lost else self.layout
+
+    @property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """Mask (n,) of those that do not work; None where all do."""
+        return ~self.alive if self.damage.lost else None
 
     def among_all(self, command: Array) -> Array:
         """Commands (..., m, 3) of the healthy ones put among all n; the failed ones hold NaN."""
@@ -63,10 +69,11 @@ def usable(layout: Layout, damage: Damage) -> Usable:
     """A robot some of whose actuators are lost or damaged. Raises LayoutError: an unknown actuator, or none
     left."""
     left = damage.applied_to(layout)
-    if not damage.lost:
-        return Usable(left, damage, left, np.ones(left.n, dtype=bool))
-    alive = np.array([name not in set(damage.lost) for name in left.names])
-    return Usable(left, damage, left.without(damage.lost), alive)
+    lost = set(damage.lost)
+    alive = np.array([name not in lost for name in left.names])
+    if lost and (not alive.any() or len(lost) > left.n - int(alive.sum())):
+        left.without(damage.lost)  # says what is wrong
+    return Usable(left, damage, alive)
 
 
 def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> Array:
@@ -86,65 +93,64 @@ def _size(array: Array) -> float:
     return math.hypot(*array.ravel().tolist()) if array.size <= FEW else float(np.abs(array).max())
 
 
-def _wrenches(wrench: ArrayLike, name: str, single: bool) -> tuple[Array, bool]:
-    """Checked wrenches, and whether each axis of them counts; see `check_wrenches`."""
+def _wrenches(wrench: ArrayLike, name: str, single: bool) -> Array:
+    """Checked wrenches; see `check_wrenches`."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
     if _size(array) <= MAX_WRENCH:
-        return array, True
-    if (bad := np.abs(array) > MAX_WRENCH).any():
+        return array
+    bad = ~(np.abs(array) <= MAX_WRENCH)
+    if bad.any():
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(
-            f"{name}: {axis} must be at most {MAX_WRENCH:g} in size, or NaN where it is free, got {value}"
+            f"{name}: {axis} must be a number of at most {MAX_WRENCH:g} in size, got {value}; an axis that "
+            f'may take any wrench is named: free=("{axis}",)'
         )
-    return array, not np.isnan(array).any()
+    return array
 
 
 def check_wrenches(wrench: ArrayLike) -> Array:
-    """Wrenches (N, 6) as float64, not copied, NaN for an axis that does not count, or a `CommandError` that
-    says what is wrong."""
-    return _wrenches(wrench, "wrench", single=False)[0]
+    """Wrenches (N, 6) as finite float64, not copied, or a `CommandError` that says what is wrong."""
+    return _wrenches(wrench, "wrench", single=False)
 
 
 def check_reference(reference: ArrayLike) -> Array:
-    """Expected wrenches (K, 6), 0 for an axis that does not count; errors as of `check_wrenches`."""
-    array, whole = _wrenches(reference, "reference", single=False)
-    return array if whole else np.nan_to_num(array)
+    """Expected wrenches (K, 6); errors as of `check_wrenches`."""
+    return _wrenches(reference, "reference", single=False)
 
 
-def check_target(wrench: ArrayLike, layout: Layout) -> tuple[Array, Axes | None]:
-    """A wrench (6,) as float64, and the axes of a robot that it asks for: None where these are all that it
-    commands. Errors as of `check_wrenches`, and CommandError: there is none."""
-    array, whole = _wrenches(wrench, "wrench", single=True)
-    return array, None if whole else axes_of(layout, array)
+def check_target(wrench: ArrayLike) -> Array:
+    """A wrench (6,) as finite float64, a copy; errors as of `check_wrenches`."""
+    return _wrenches(wrench, "wrench", single=True)
 
 
-def axes_of(layout: Layout, wrench: Array) -> Axes | None:
-    """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands. Raises
-    CommandError: there is none."""
-    counts = layout.commanded & ~np.isnan(wrench)
-    if (counts == layout.commanded).all():
+def free_mask(layout: Layout, free: Sequence[str]) -> NDArray[np.bool_] | None:
+    """Returns a mask (6,) of axes that are free for one question; None where there are none.
+
+    Args:
+        layout: the robot.
+        free: their names, such as `("Ty",)`.
+
+    Raises:
+        CommandError: it is no list of names of axes, or no axis is left that the robot commands.
+    """
+    if not len(free):
         return None
-    if not counts.any():
+    if isinstance(free, str) or not isinstance(free, Sequence):
+        raise CommandError(f'free: expected a list of axes such as ("Ty",), got {free!r:.100}')
+    unknown = [axis for axis in free if axis not in AXES]
+    if unknown:
+        raise CommandError(f"free: expected axes among {', '.join(AXES)}, got {unknown[0]!r:.60}")
+    mask = mask_of(free)
+    if not (layout.commanded & ~mask).any():
         raise CommandError(
-            f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), "
-            "expected a number on one of them"
+            f"free: names each axis that layout {layout.name} commands ({', '.join(layout.axes)}), expected "
+            "one of them to be left"
         )
-    return axes_in(counts)
-
-
-def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:
-    """Groups of wrenches (N, 6) that ask for the same axes: the axes as `axes_of` gives them, and their
-    places; None for all. Raises CommandError: a wrench asks for no axis."""
-    free = np.isnan(wrenches)
-    if not free.any():
-        return [(None, None)]
-    patterns, group = np.unique(free, axis=0, return_inverse=True)
-    rows = [np.flatnonzero(group.ravel() == i) for i in range(len(patterns))]
-    return [(axes_of(layout, wrenches[places[0]]), places) for places in rows]
+    return mask
 
 
 def check_flow(flow: ArrayLike | None) -> Array | None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.dual.rates import Rates
+from finlab.allocation.rates import Rates
 from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.control.contract import Measurement

@@ -1,4 +1,5 @@
-/* One target after the other: least power where it is within reach, else what a policy gives in its place. */
+/* One target after the other: least power where it is within what may be given now, else what a policy gives in its
+   place. */
 #include "inner.h"
 
 int fl_version(void) { return FL_VERSION; }
@@ -14,6 +15,7 @@ static int is_place(real place, real length, int numbers) {
 }
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
+#define MOST_CALM 1000
 
 /* Whether there is a table, or a gauge, at a place: its cells, or points, are few enough to lie in the block. */
 static int is_table(const real *block, real place, real length, int counted, int each, int more) {
@@ -50,7 +52,7 @@ int fl_check(const real *block, int length) {
   if (!(h->n >= 1 && h->n <= FL_MOST && h->n == FLOOR(h->n) && length >= head + own * (int)h->n)) return FL_BAD_BLOCK;
   if (!(h->range >= 0 && h->range <= 6 && h->range == FLOOR(h->range))) return FL_BAD_BLOCK;
   for (int k = 0; k < 6; k++)
-    if (!(h->scale[k] > 0 && h->yard[k] > 0)) return FL_BAD_NUMBER;
+    if (!(h->scale[k] > 0 && h->yard[k] > 0 && (h->counts[k] == 0 || h->counts[k] == 1))) return FL_BAD_NUMBER;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->rows != 1 && a->rows != 2) return FL_BAD_BLOCK;
@@ -72,37 +74,25 @@ int fl_check(const real *block, int length) {
   return 0;
 }
 
-/* Limits of the forces for now: those of commands in a box, or all. */
-static void set_limits(const real *block, fl_work *work, const fl_box *box) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real own[4] = {a->least, a->high, a->middle, a->half};
-    if (box) {
-      reach_of(block, i, box, own);
-      own[0] = CLIP(own[0], a->low, a->high), own[1] = CLIP(own[1], a->low, a->high);
-    }
-    limit(block, i, work->set + i, own[0], own[1], own[2], own[3]);
-  }
-  sums_of(block, work);
-}
-
 /* Forces for a wrench, of which what is on top of the forces is taken off already. */
 static void answer(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, const real *price,
                    fl_answer *out) {
-  int n = COUNT(block), r = RANGE(block);
+  const int n = COUNT(block);
+  const fl_span *span = &work->span;
   real target[6];
   out->value = 0, out->status = FL_MET, out->placed = 0;
   memset(out->inner, 0, sizeof out->inner);
   memset(out->price, 0, sizeof out->price);
   memset(out->force, 0, n * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof out->aim);
-  to_basis(block, wrench, target);
-  if (r == 0) { /* nothing pushes, such as foils at rest */
+  to_basis(work, wrench, target);
+  if (span->range == 0) { /* nothing pushes, such as foils at rest */
     out->within = 1;
     for (int k = 0; k < 6; k++) out->within &= wrench[k] == 0, out->aim[k] = 0;
     return;
   }
-  int torn = work->torn || work->drags, ranged = in_range(block, wrench, target);
+  const int torn = work->torn || work->drags || work->turns;
+  const int ranged = in_range(work, wrench, target);
   int status = newton(block, work, target, price, torn ? STEPS_AT_KINK : MOST_STEPS);
   int within = (status == FL_MET || (status == FL_STUCK && torn)) && ranged;
   out->status = status;
@@ -118,64 +108,90 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
       real value;
       within = least_power(block, work, target, status, &value);
       if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
-      out->value = within ? value * (1 - FINE) : 0;
+      out->value = within && !work->turns ? value * (1 - FINE) : 0; /* with turning it is more than power */
     } else
       within &= status == FL_MET;
   }
   if (!(out->within = within) && policy) out->placed = 0, in_its_place(block, work, wrench, policy, out);
-  for (int k = 0; k < 6; k++) out->price[k] = dot(HEAD(block)->basis[k], out->inner, r) / HEAD(block)->scale[k];
+  for (int k = 0; k < 6; k++) out->price[k] = dot(span->basis[k], out->inner, span->range) / span->scale[k];
 }
 
-/* The commands that come nearest to an aim among those that may follow the previous ones. */
-static void in_a_tick(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
-  static const fl_policy nearest = {FL_CLOSEST, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
-  const fl_head *h = HEAD(block);
-  fl_answer own;
-  real wrench[6], price[6];
-  for (int k = 0; k < 6; k++) wrench[k] = out->aim[k] - h->beside[k];
-  memcpy(price, out->inner, sizeof price);
-  memcpy(work->aim, out->aim, sizeof work->aim);
-  tick_limits(block, q->previous, &work->box);
-  set_limits(block, work, &work->box);
-  answer(block, work, wrench, &nearest, price, &own);
-  set_limits(block, work, 0);
-  if (own.within && own.placed)
-    memcpy(out->command, own.command, COUNT(block) * sizeof own.command[0]);
-  else
-    commands_for(block, &work->box, own.force, q->previous, out->command);
-  out->error = refine(block, work, &work->box, out->aim, out->command, TICK_STEPS);
-  rest_in_bands(block, &work->box, out->command);
-  into_limits(block, out->command);
+/* Prices in the basis to begin with; 0 where there are none, or none of use. */
+static const real *first_prices(const fl_work *work, const fl_question *q, real *inner) {
+  if (!q->price) return 0;
+  price_in_basis(work, q->price, inner);
+  return are_within(inner, 6, LARGEST) ? inner : 0;
+}
+
+/* Whether commands rest in a dead band that the drive cannot leave at once, or that it may have to pass. */
+static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const int k = a->form == FL_POD ? 1 : 0;
+    if (work->span.lost[i] || !is_in_band(a, command[i])) continue;
+    if (work->box.low[i][k] > a->lower[k] || work->box.high[i][k] < a->upper[k]) return 1;
+  }
+  return 0;
+}
+
+/* Has drives that give nothing in a tick pass through their dead bands: each goes, within its band, towards the command
+   that it would have if drives were as quick as can be. */
+static void pass_bands(const real *block, fl_work *work, const fl_question *q, real command[][3]) {
+  const fl_box box = work->box;
+  fl_answer later;
+  real wrench[6];
+  set_limits(block, work, 0, 0);
+  for (int k = 0; k < 6; k++) wrench[k] = work->span.counts[k] ? q->wrench[k] - work->span.beside[k] : 0;
+  memcpy(work->aim, q->wrench, sizeof work->aim);
+  answer(block, work, wrench, q->policy, 0, &later);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const int k = a->form == FL_POD ? 1 : 0;
+    const real inside = a->band * (1 - NEARLY);
+    real wanted[3];
+    if (work->span.lost[i] || !is_in_band(a, command[i]) || size_of(later.force[i]) < inside) continue;
+    command_for(block, i, &box, later.force[i], q->now.previous + 3 * i, wanted);
+    wanted[k] = CLIP(wanted[k], -inside, inside);
+    memcpy(command[i], wanted, sizeof wanted);
+  }
+  work->box = box;
+  work->is_whole = 0;
 }
 
 static void answered(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
-  const fl_head *h = HEAD(block);
+  const fl_span *span = &work->span;
   real wrench[6];
-  for (int k = 0; k < 6; k++) wrench[k] = q->wrench[k] - h->beside[k];
+  real inner[6];
+  for (int k = 0; k < 6; k++) work->aim[k] = span->counts[k] ? q->wrench[k] : 0;
+  for (int k = 0; k < 6; k++) wrench[k] = work->aim[k] - span->beside[k];
+  real asked[6];
+  memcpy(asked, work->aim, sizeof asked);
   work->steps = work->ended = 0;
-  memcpy(work->aim, q->wrench, sizeof work->aim);
-  work->previous = q->previous;
-  all_limits(block, &work->box);
-  answer(block, work, wrench, q->policy, q->price, out);
-  for (int k = 0; k < 6; k++) out->aim[k] = out->within ? q->wrench[k] : out->aim[k] + h->beside[k];
-  if (!out->placed) commands_for(block, &work->box, out->force, q->previous, out->command);
+  work->previous = q->now.previous;
+  answer(block, work, wrench, q->policy, first_prices(work, q, inner), out);
+  for (int k = 0; k < 6; k++) out->aim[k] = out->within ? asked[k] : out->aim[k] + span->beside[k];
+  if (!out->placed) commands_for(block, &work->box, out->force, q->now.previous, out->command);
   out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
   rest_in_bands(block, &work->box, out->command);
-  if (q->previous && !may_follow(block, q->previous, out->command)) in_a_tick(block, work, q, out);
-  out->steps = work->steps, out->ended = work->ended;
+  if (q->now.previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);
+  into_box(block, &work->box, out->command);
+  out->steps = work->steps;
+  out->ended = work->ended;
 }
 
 /* An answer to a question; an error code. */
 int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
   const fl_policy *policy = q->policy;
-  if (!are_within(q->wrench, 6, LARGEST) || (q->price && !are_within(q->price, 6, LARGEST))) return FL_BAD_ARGUMENT;
+  if (!are_within(q->wrench, 6, LARGEST)) return FL_BAD_ARGUMENT;
+  if (!(q->now.calm >= 0 && q->now.calm <= MOST_CALM)) return FL_BAD_ARGUMENT;
   if (policy) {
     if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_CLOSEST && !are_within(policy->weight, 6, 1)) return FL_BAD_ARGUMENT;
   }
-  for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
-    if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
+  for (int k = 0; q->now.previous && k < 3 * COUNT(block); k++)
+    if (FABS(q->now.previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
+  if (!stand_as(block, work, &q->now)) return FL_BAD_NUMBER;
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
 }

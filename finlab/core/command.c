@@ -1,5 +1,4 @@
-/* Commands of all actuators: for forces, made exact by Levenberg-Marquardt steps, and within what may follow the
-   commands of the tick before. */
+/* Commands of all actuators: for forces, and made exact by Levenberg-Marquardt steps within a box. */
 #include "inner.h"
 
 /* Which number of a command is an angle; -1 where none is. */
@@ -12,50 +11,6 @@ real held_in(const fl_box *box, int i, int k, int angle, real value) {
   return CLIP(value, low, high);
 }
 
-void all_limits(const real *block, fl_box *box) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    memcpy(box->low[i], a->lower, sizeof a->lower);
-    memcpy(box->high[i], a->upper, sizeof a->upper);
-    box->free[i] = a->turns != 0;
-  }
-}
-
-static int is_known(const real *row) { return row[0] == row[0] && row[1] == row[1] && row[2] == row[2]; }
-
-/* What may follow previous commands (n, 3); an angle that turns freely is counted from the previous one. */
-void tick_limits(const real *block, const real *previous, fl_box *box) {
-  all_limits(block, box);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const real *row = previous + 3 * i;
-    int angle = angle_of(a);
-    if (!is_known(row)) continue;
-    for (int k = 0; k < 3; k++) {
-      int turns = k == angle && a->turns != 0;
-      if (turns && !(a->step[k] < PI)) continue;
-      real center = turns ? row[k] : CLIP(row[k], a->lower[k], a->upper[k]);
-      real low = center - a->step[k], high = center + a->step[k];
-      box->low[i][k] = turns ? low : MAX(low, a->lower[k]);
-      box->high[i][k] = turns ? high : MIN(high, a->upper[k]);
-      if (turns) box->free[i] = 0;
-    }
-  }
-}
-
-/* Whether commands may follow previous ones in a tick. */
-int may_follow(const real *block, const real *previous, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    for (int k = 0; k < 3; k++) {
-      real change = FABS(command[i][k] - previous[3 * i + k]);
-      if (k == angle_of(a) && a->turns != 0) change = MIN(change, FABS(2 * PI - change));
-      if (change > a->step[k]) return 0;
-    }
-  }
-  return 1;
-}
-
 void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const real *before = previous && is_known(previous + 3 * i) ? previous + 3 * i : 0;
@@ -63,39 +18,45 @@ void commands_for(const real *block, const fl_box *box, real force[][2], const r
   }
 }
 
-/* Commands whose angles are wrapped, or held, within the limits. */
-void into_limits(const real *block, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    for (int k = 0; k < 3; k++) {
-      real middle = (a->lower[k] + a->upper[k]) / 2;
-      if (k == angle_of(a)) command[i][k] = middle + wrapped(command[i][k] - middle);
-      command[i][k] = CLIP(command[i][k], a->lower[k], a->upper[k]);
-    }
-  }
+/* Which number of a command is a force; -1 where none is. */
+static int force_number(const fl_actuator *a) {
+  if (a->form == FL_THRUSTER) return 0;
+  if (a->form == FL_POD) return 1;
+  return -1;
 }
 
-/* Commands inside a dead band give no force: they rest, where the box allows. */
+/* Whether a command lies in the dead band of its actuator, where it gives no force. */
+int is_in_band(const fl_actuator *a, const real *command) {
+  const int k = force_number(a);
+  return k >= 0 && FABS(command[k]) < a->band;
+}
+
+/* Has commands inside a dead band rest, where the box allows. */
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    int k = a->form == FL_POD ? 1 : 0;
-    if (!(a->band > 0) || !(FABS(command[i][k]) < a->band)) continue;
+    if (!is_in_band(a, command[i])) continue;
+    const int k = force_number(a);
     if (box->low[i][k] <= 0 && box->high[i][k] >= 0) command[i][k] = 0;
   }
 }
 
 /* The miss (6,) of commands from an aim, on the yardstick. Returns its square. */
-static real miss_of(const real *block, const real *aim, real command[][3], real *miss) {
+static real miss_of(const real *block, const fl_work *work, const real *aim, real command[][3], real *miss) {
   const fl_head *h = HEAD(block);
-  for (int k = 0; k < 6; k++) miss[k] = (aim[k] - h->beside[k]) / h->yard[k];
+  const fl_span *span = &work->span;
+  for (int k = 0; k < 6; k++) miss[k] = (aim[k] - span->beside[k]) / h->yard[k];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3];
+    if (span->lost[i]) continue;
     force_of(block, i, command[i], force, 0);
+    if (is_in_band(a, command[i])) memset(force, 0, sizeof force);
     for (int k = 0; k < 6; k++)
       miss[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
   }
+  for (int k = 0; k < 6; k++)
+    if (!span->counts[k]) miss[k] = 0;
   return dot(miss, miss, 6);
 }
 
@@ -105,10 +66,12 @@ static void slopes_of(const real *block, fl_work *work, const fl_box *box, real 
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3], by[3][3];
     force_of(block, i, command[i], force, by);
+    if (work->span.lost[i] || is_in_band(a, command[i])) memset(by, 0, sizeof by);
     for (int c = 0; c < 3; c++) {
       real width = box->high[i][c] - box->low[i][c];
       for (int k = 0; k < 6; k++)
-        work->slope[i][c][k] = width * (by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k]);
+        work->slope[i][c][k] = !work->span.counts[k] ? 0 :
+            width * (by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k]);
     }
   }
 }
@@ -140,7 +103,7 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
 /* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
   int n = COUNT(block);
-  real miss[6], cost = miss_of(block, aim, command, miss), damping = NEARLY;
+  real miss[6], cost = miss_of(block, work, aim, command, miss), damping = NEARLY;
   int moved = 1;
   for (int k = 0; k < steps && cost > EXACT * EXACT; k++) {
     unsigned char held[FL_MOST][3] = {{0}};
@@ -157,7 +120,7 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
         own = command[i][c] + own * (box->high[i][c] - box->low[i][c]);
         tried[i][c] = held_in(box, i, c, angle_of(ACTUATOR(block, i)), own);
       }
-    new_cost = miss_of(block, aim, tried, other);
+    new_cost = miss_of(block, work, aim, tried, other);
     if ((moved = new_cost <= cost)) {
       memcpy(command, tried, n * sizeof *tried);
       memcpy(miss, other, sizeof miss);

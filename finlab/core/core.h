@@ -25,7 +25,7 @@ typedef double fl_wide; /* of points that are mixed, as their differences are sm
 #define FL_SETTLE (12 * 60)
 #define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
-#define FL_VERSION 2
+#define FL_VERSION 3
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* Layout of a block: an `fl_head`, then an `fl_actuator` for each of the n actuators, then their tables. All
@@ -35,6 +35,7 @@ typedef struct {
   fl_real magic, version, length, n, range; /* length: numbers in the block; range: of the effectiveness, r */
   fl_real scale[6];                         /* wrench = scale * scaled wrench [N, N m] */
   fl_real yard[6];                          /* yardstick of errors [N, N m] */
+  fl_real counts[6];                        /* 1 of an axis that the robot commands, else 0 */
   fl_real beside[6];                        /* wrench on top of that of the forces [N, N m] */
   fl_real basis[6][6];                      /* 6 x r: directions of scaled wrenches that are driven */
 } fl_head;
@@ -78,13 +79,18 @@ typedef struct { /* a foil near to a command: force, by angle, cost, by angle an
 typedef struct { /* what one actuator may give now */
   fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
+  fl_real turn;     /* kappa: turning by d from `at` costs kappa / 2 d^2 [W/rad^2]; 0 where it costs nothing */
+  fl_real at;       /* angle of the force before, within a turn of `middle` [rad] */
+  fl_real cut;      /* where it jumps: angle between the two answers [rad] */
   int flipped, forked;
+  int jumps;        /* whether its answer jumps where Newton's method stood still */
   const fl_tangent *tangent; /* of a foil near to a command, whose limits are angles from there; else 0 */
 } fl_set;
 
 typedef struct { /* prices, and what they give */
   fl_real price[6], residual[6], force[FL_MOST][2];
   fl_real slope[FL_MOST][4]; /* of forces by prices: xx, xy, yy; then force over price [N^2/W] */
+  fl_real angle[FL_MOST];    /* of a plane whose turning costs: angle at which it pushes [rad] */
   fl_real value, size;       /* dual value [W], size of the residual */
 } fl_state;
 
@@ -93,6 +99,7 @@ typedef struct { /* prices, and what they give */
 
 typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
   fl_wide force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6]; /* miss: of a target */
+  fl_wide along[FL_POINTS]; /* of each point, how much of the ray (0 or 1) it takes */
   fl_wide q[FL_POINTS][6], r[FL_POINTS][FL_POINTS]; /* on the diagonal of r its inverse, 0 where a point depends */
   int count, done; /* points; how many of them the basis knows */
 } fl_mixture;
@@ -109,7 +116,18 @@ typedef struct { /* commands that are allowed */
   int free[FL_MOST]; /* whether the angle may be any */
 } fl_box;
 
+typedef struct { /* what the actuators that work span in the axes that count */
+  unsigned char lost[FL_MOST], counts[6];
+  fl_real scale[6];              /* wrench = scale * scaled wrench [N, N m] */
+  fl_real basis[6][6];           /* 6 x range: directions of scaled wrenches that are driven */
+  fl_real matrix[FL_MOST][2][6]; /* scaled wrench in the basis per newton of each row; 0 of a lost actuator */
+  fl_real beside[6];             /* wrench on top of that of the forces [N, N m] */
+  int range;
+} fl_span;
+
 typedef struct {
+  fl_span span;
+  int is_whole; /* whether `set` and `box` are those of the robot outside of ticks */
   fl_set set[FL_MOST];
   fl_state state[2], *now; /* what Newton's method looks at, and what it came to */
   fl_mixture mixture;
@@ -122,9 +140,10 @@ typedef struct {
   fl_real best[FL_MOST][2];                /* forces of the best part */
   fl_tangent tangent[FL_MOST];
   const fl_real *previous; /* commands of the tick before; 0 for none */
+  const fl_wide *ray;      /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
   fl_real aim[6], placed[FL_MOST][3], near[6]; /* wrench; commands of the best part where there are foils, prices there */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost;
-  int quick, torn, drags, steps, ended;
+  int quick, torn, drags, turns, steps, ended;
 } fl_work;
 
 enum { FL_MET, FL_BEYOND, FL_STUCK };
@@ -138,7 +157,7 @@ typedef struct {
 typedef struct {
   fl_real force[FL_MOST][2]; /* of each actuator's rows [N] */
   fl_real price[6];          /* of the wrench [W/N, W/(N m)] */
-  fl_real inner[6];          /* the same in the basis [W] */
+  fl_real inner[6];          /* the same in the basis of what the actuators span now [W] */
   fl_real aim[6];            /* wrench that the forces give [N, N m] */
   fl_real value;             /* power that gaps are proved to need [W] */
   fl_real error;             /* distance of the commands' wrench from the aim, on the yardstick, by the laws' tables */
@@ -155,19 +174,25 @@ int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
 int fl_check(const fl_real *block, int length);
 int fl_prepare(const fl_real *block, fl_work *work);
+typedef struct { /* what holds now; all zeros outside of ticks, where all actuators work and all axes count */
+  const fl_real *previous;   /* commands (n, 3) of the tick before; 0 for none, NaN for an unknown one */
+  const unsigned char *lost; /* (n,) which actuators do not work; 0 for none */
+  const unsigned char *free; /* (6,) which axes may take any wrench, beside those that the robot does not command */
+  fl_real calm;              /* what turning costs in a tick: 0 nothing, 2 usual, up to 10 */
+} fl_now;
 typedef struct {
   fl_real wrench[6];       /* [N, N m] */
   const fl_policy *policy; /* what to give beyond reach; 0: nothing else */
-  const fl_real *price;    /* in the basis: where to begin; 0 for none */
-  const fl_real *previous; /* commands (n, 3) of the tick before; 0 for none, NaN for an unknown one */
+  const fl_real *price;    /* of the wrench [W/N, W/(N m)]: where to begin; 0 for none */
+  fl_now now;
 } fl_question;
 int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
-int fl_answer_many(const fl_real *block, fl_work *work, const fl_real *wrench, int count, const fl_policy *policy,
+int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
                    fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,
                    unsigned char *within);
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
-void fl_worth(const fl_real *block, fl_work *work, const fl_real *price, int count, fl_real *worth);
+int fl_worth(const fl_real *block, fl_work *work, const fl_now *now, const fl_real *price, int count, fl_real *worth);
 void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_wide *from, const fl_wide *ray, int count,
               fl_wide close, fl_wide *size, fl_wide *normal, fl_real *force);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);

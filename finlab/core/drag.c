@@ -36,11 +36,13 @@ static void draw_tangent(const real *block, int i, const fl_box *box, real angle
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
-real cost_of(const real *block, real command[][3], real force[][2]) {
+real cost_of(const real *block, const fl_work *work, real command[][3], real force[][2]) {
   real cost = 0, own[3];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     int plane = is_plane(a);
+    force[i][0] = force[i][1] = 0;
+    if (work->span.lost[i]) continue;
     force_of(block, i, command[i], own, 0);
     force[i][0] = plane ? own[1] : a->sign * own[0], force[i][1] = plane ? own[2] : 0;
     real size = plane ? size_of(force[i]) : force[i][0];
@@ -98,14 +100,14 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
   fl_set before[FL_MOST];
   real size = 1, tried[FL_MOST][3], other[FL_MOST][2];
   memcpy(before, work->set, sizeof before);
-  cost_of(block, command, force);
+  cost_of(block, work, command, force);
   take_sides(block, work, &box, command, force);
   int met = come_to_give(block, work, &box, command, 2 * ROUNDS), moved = 1;
-  real cost = met ? cost_of(block, command, force) : NONE;
+  real cost = met ? cost_of(block, work, command, force) : NONE;
   for (int k = 0; met && k < ROUNDS; k++) {
     for (int i = 0; moved && i < COUNT(block); i++) {
       real own[2];
-      own_price(block, i, price, own);
+      own_price(work, i, price, own);
       if (ACTUATOR(block, i)->speed > 0)
         draw_tangent(block, i, &box, command[i][0], own, work->tangent + i, work->set + i);
     }
@@ -114,7 +116,7 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
       memcpy(price, work->now->price, sizeof work->now->price);
     memcpy(tried, command, sizeof tried);
     stepped(block, work, &box, force, size, tried);
-    real gain = come_to_give(block, work, &box, tried, 2 * ROUNDS) ? cost - cost_of(block, tried, other) : -NONE;
+    real gain = come_to_give(block, work, &box, tried, 2 * ROUNDS) ? cost - cost_of(block, work, tried, other) : -NONE;
     if ((moved = gain > 0)) {
       memcpy(command, tried, sizeof tried);
       memcpy(force, other, sizeof other);
@@ -211,7 +213,6 @@ int with_drag(const real *block, fl_work *work, const real *target, int status, 
 /* Commands that give the largest share of a wrench that steps come to, between that which commands are `found` for, 0
    without any, and the `most` that the dual allows. `out` has forces near to it. */
 void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out) {
-  const fl_head *h = HEAD(block);
   real part[6], target[6], inner[6], own[FL_MOST][2], start[FL_MOST][3], command[FL_MOST][3], less = NEARLY, all = most;
   for (int i = 0; i < 2 * COUNT(block); i++) /* a stalled foil gives more than its table */
     if (may_stall(block, work, i / 2, i % 2, part)) most = MIN(all * (1 + R(0.1)), 1);
@@ -219,8 +220,8 @@ void on_ray(const real *block, fl_work *work, const real *wrench, real found, re
   for (int k = 0; k < 2 * ROUNDS && less < 1 && most - found > NEARLY / 4 * all; k++) {
     real share = found > 0 ? (found + most) / 2 : all * (1 - less);
     int met = 0;
-    for (int j = 0; j < 6; j++) work->aim[j] = share * (wrench[j] + h->beside[j]), part[j] = work->aim[j] - h->beside[j];
-    to_basis(block, part, target);
+    for (int j = 0; j < 6; j++) work->aim[j] = share * (wrench[j] + work->span.beside[j]), part[j] = work->aim[j] - work->span.beside[j];
+    to_basis(work, part, target);
     for (int way = found > 0 ? 0 : 1; way < 2 && !met; way++) {
       memcpy(command, way ? start : out->command, sizeof command);
       memcpy(inner, out->inner, sizeof inner);

@@ -7,66 +7,76 @@ int fl_sizes(int which) {
   return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
 }
 
-/* Answers to wrenches (count, 6): forces (count, n, 2), prices and aims (count, 6), values, commands
-   (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
-int fl_answer_many(const real *block, fl_work *work, const real *wrench, int count, const fl_policy *policy,
+/* Answers to wrenches (count, 6), all else as of a question: forces (count, n, 2), prices and aims (count, 6), values,
+   commands (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
+int fl_answer_many(const real *block, fl_work *work, const fl_question *question, const real *wrench, int count,
                    real *force, real *price, real *aim, real *value, real *command, unsigned char *within) {
-  int n = COUNT(block), ended = 0;
-  fl_question q = {{0}, policy, 0, 0};
+  const int n = COUNT(block);
+  int ended = 0;
+  fl_question q = *question;
   fl_answer out;
   for (int k = 0; k < count; k++) {
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
-    int error = fl_answer_one(block, work, &q, &out);
+    const int error = fl_answer_one(block, work, &q, &out);
     if (error) return error;
     memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
     memcpy(price + 6 * k, out.price, sizeof out.price);
     memcpy(aim + 6 * k, out.aim, sizeof out.aim);
     memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
-    value[k] = out.value, within[k] = out.within, ended |= out.ended;
+    value[k] = out.value;
+    within[k] = out.within;
+    ended |= out.ended;
   }
   return ended ? -1 : 0;
-}
-
-/* Prices in the basis of those of the wrench. */
-void price_in_basis(const real *block, const real *price, real *inner) {
-  const fl_head *h = HEAD(block);
-  for (int j = 0; j < 6; j++) {
-    inner[j] = 0;
-    for (int k = 0; k < 6; k++) inner[j] += h->basis[k][j] * h->scale[k] * price[k];
-  }
 }
 
 /* What prices (6,) of the wrench in the basis [W] give: forces (n, 2), and the dual value for a wrench. */
 real fl_look(const real *block, fl_work *work, const real *wrench, const real *inner, real *force) {
   real target[6];
-  to_basis(block, wrench, target);
+  to_basis(work, wrench, target);
   look(block, work, target, inner, work->state);
   memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
   return work->state->value;
 }
 
-/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 3): prices along its force, ahead and
-   in reverse, and what the force is worth, less its power [W]. */
-void fl_worth(const real *block, fl_work *work, const real *price, int count, real *worth) {
+/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 5) in what may be given now: prices along
+   its force, ahead and in reverse, what the force is worth, less its power [W], and least and largest force [N], of planes
+   below 0 in reverse. An error code. */
+int fl_worth(const real *block, fl_work *work, const fl_now *now, const real *price, int count, real *worth) {
+  fl_now still = *now;
+  still.calm = 0; /* turning is no power */
+  if (!stand_as(block, work, &still)) return FL_BAD_NUMBER;
   for (int k = 0; k < count; k++, price += 6) {
-    real inner[6], own[2], force[2];
-    price_in_basis(block, price, inner);
-    for (int i = 0; i < COUNT(block); i++, worth += 3) {
-      own_price(block, i, inner, own);
-      worth[0] = farthest_of(block, i, work->set + i, own, force), worth[1] = 0;
-      if (work->set[i].reverse > 0) {
-        fl_set back = reversed(work->set + i);
+    real inner[6];
+    price_in_basis(work, price, inner);
+    for (int i = 0; i < COUNT(block); i++, worth += 5) {
+      const fl_set *set = work->set + i;
+      real own[2];
+      wide force[2];
+      own_price(work, i, inner, own);
+      worth[0] = farthest_of(block, i, set, own, force);
+      worth[1] = 0;
+      worth[3] = set->flipped ? -set->high : set->low;
+      worth[4] = set->flipped ? -set->low : set->high;
+      if (set->reverse > 0) {
+        const fl_set back = reversed(set);
         worth[1] = farthest_of(block, i, &back, own, force);
+        worth[3] = -set->reverse;
       }
-      worth[2] = reply_of(block, i, work->set + i, own).conjugate;
+      if (set->flipped) {
+        worth[1] = worth[0];
+        worth[0] = 0;
+      }
+      worth[2] = reply_of(block, i, set, own).conjugate;
     }
   }
+  return 0;
 }
 
 /* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of previous ones (n, 3). */
 void fl_commands(const real *block, fl_work *work, const real *force, int count, const real *previous, real *command) {
   int n = COUNT(block);
-  all_limits(block, &work->box);
+  set_limits(block, work, 0, 0);
   for (int k = 0; k < count; k++)
     commands_for(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
 }

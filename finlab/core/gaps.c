@@ -18,11 +18,20 @@ static real between_ways(const fl_actuator *a, const fl_set *set, const real *fo
   return PI;
 }
 
+/* How far into its dead band, as a share, a plane's force is that its set could take out of it; 0 where it is not. */
+static real in_band(const fl_actuator *a, const fl_set *set, const real *force) {
+  const real size = size_of(force);
+  if (!(a->band > 0) || size >= a->band * (1 - NOTHING) || size <= NOTHING * a->most[0]) return 0;
+  if (set->low >= a->band || !(set->high > 0 || set->reverse > 0)) return 0;
+  return 1 - size / a->band;
+}
+
 /* How far a force is in a gap of its set; 0 where it is not. One that comes from prices is in one where it is
    between what an actuator gives forward and in reverse. */
-static real gap_of(const real *block, int i, const fl_set *set, const real *force, real largest,
-                   const real *price) {
+static real gap_of(const real *block, const fl_work *work, int i, const real *force, real largest, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
+  const fl_set *set = work->set + i;
+  if (set->turn > 0 && price) return set->jumps ? PI : in_band(a, set, force);
   if (!is_plane(a)) {
     real size = FABS(force[0]), over;
     if (a->speed > 0) {
@@ -31,8 +40,8 @@ static real gap_of(const real *block, int i, const fl_set *set, const real *forc
     }
     return size < a->band * (1 - NOTHING) && size > NOTHING * a->most[0] && set->low < set->high;
   }
-  real size = size_of(force), amount = 0;
-  if (set->reverse > 0 && !price) return between_ways(a, set, force, size);
+  real size = size_of(force), amount = in_band(a, set, force);
+  if (set->reverse > 0 && !price) return MAX(between_ways(a, set, force, size), amount);
   if (set->half > NARROW) {
     real off = FABS(off_middle(set, force)) - set->half;
     if (off > CLOSE && size > NEARLY * a->most[0]) amount += off;
@@ -40,7 +49,7 @@ static real gap_of(const real *block, int i, const fl_set *set, const real *forc
   }
   if (set->reverse > 0) {
     real own[2], off;
-    own_price(block, i, price, own);
+    own_price(work, i, price, own);
     int ahead = undecided(block, i, set, own, &off);
     return off > CLOSE * a->most[0] ? PI : ahead ? amount : 0;
   }
@@ -59,7 +68,7 @@ int worst_gap(const real *block, const fl_work *work, real force[][2], const rea
   real worst = 0, largest = largest_of(block, force);
   int which = -1;
   for (int i = 0; i < COUNT(block); i++) {
-    real amount = gap_of(block, i, work->set + i, force[i], largest, price);
+    real amount = gap_of(block, work, i, force[i], largest, price);
     if (amount > worst) worst = amount, which = i;
   }
   return which;
@@ -77,37 +86,103 @@ int nearer_side(const real *block, int i, const fl_set *set, const real *force) 
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->speed > 0) return force[0] < (set->low + set->high) / 2 ? -1 : 1;
   if (!is_plane(a)) return FABS(force[0]) > a->band / 2 ? 1 : -1;
-  if (set->half >= PI && set->reverse == 0) return 1;
+  if (in_band(a, set, force) > 0) return size_of(force) > a->band / 2 ? 1 : -1;
+  if (set->half >= PI && set->reverse == 0 && !set->jumps) return 1;
   real off = off_middle(set, force);
+  if (set->jumps && set->reverse == 0) return ATAN2(force[1], force[0]) < set->cut ? -1 : 1;
   return (set->reverse > 0 ? COS(off) : off) < 0 ? -1 : 1;
 }
 
-/* Cuts a set by a force and keeps one side: of an arc the half towards smaller (-1) or larger angles (1), of a
-   full circle that away from or around the force, of either way reverse or the rest, of a dead band rest or
-   what is beyond, of drag less or more. */
+/* Turns a set round: what it pushed in reverse is what it pushes now. */
+static void turn_round(fl_set *set) {
+  set->high = set->reverse;
+  set->high_cost = set->reverse_cost;
+  set->reverse = 0;
+  set->middle += PI;
+  set->at += PI;
+  set->flipped = 1;
+}
+
+/* Keeps of a plane with a dead band what is beyond the band on the side of a force (1), or all else (-1). */
+static void narrow_by_band(const real *block, int i, fl_set *set, const real *force, int side) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const int is_back = set->reverse > 0 && (set->high == 0 || COS(off_middle(set, force)) < 0);
+  if (side > 0) {
+    if (is_back) turn_round(set);
+    set->reverse = 0;
+    set->low = a->band;
+    set->low_cost = cost_at(block, i, set->flipped ? -a->band : a->band);
+    return;
+  }
+  if (is_back)
+    set->reverse = 0;
+  else {
+    set->high = 0;
+    set->high_cost = set->low_cost;
+  }
+}
+
+/* Keeps one half of an arc: towards smaller (-1) or larger angles (1), of a full circle that away from or around a
+   force; where its answer jumps, the arc is cut between its two answers. */
+static void narrow_by_angle(fl_set *set, const real *force, int side) {
+  real low = set->middle - set->half;
+  real high = set->middle + set->half;
+  if (set->turn > 0 && set->half >= PI) {
+    low = set->at - PI;
+    high = set->at + PI;
+  }
+  if (set->jumps) {
+    if (side < 0)
+      high = set->cut;
+    else
+      low = set->cut;
+    set->middle = (low + high) / 2;
+    set->half = (high - low) / 2;
+    return;
+  }
+  const real angle = ATAN2(force[1], force[0]);
+  if (set->half >= PI)
+    set->middle = wrapped(angle + (side > 0 ? 0 : PI));
+  else
+    set->middle = wrapped(set->middle + side * set->half / 2);
+  set->half /= 2;
+  set->at = set->middle + wrapped(set->at - set->middle);
+}
+
+/* Keeps of a line what is beyond its dead band on the side of a force (1), or all else (-1); of a foil more or less. */
+static void narrow_line(const real *block, int i, fl_set *set, const real *force, int side) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real edge = 0;
+  int is_above = (side > 0) == (force[0] > 0);
+  if (a->speed > 0) {
+    edge = force[0];
+    is_above = side > 0;
+  } else if (side > 0)
+    edge = force[0] > 0 ? a->band : -a->band;
+  const real cost = cost_at(block, i, edge);
+  if (is_above) {
+    set->low = edge;
+    set->low_cost = cost;
+  } else {
+    set->high = edge;
+    set->high_cost = cost;
+  }
+}
+
+/* Cuts a set by a force and keeps one side of its gap: of a plane that pushes either way reverse (-1) or ahead (1), else
+   as the functions above say. */
 void narrow(const real *block, int i, fl_set *set, const real *force, int side) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (is_plane(a)) {
-    if (set->reverse > 0) {
-      if (side < 0) {
-        set->high = set->reverse, set->high_cost = set->reverse_cost;
-        set->middle += PI, set->flipped = 1;
-      }
-      set->reverse = 0;
-    } else {
-      real angle = ATAN2(force[1], force[0]);
-      set->middle = wrapped(set->half >= PI ? angle + (side > 0 ? 0 : PI) : set->middle + side * set->half / 2);
-      set->half /= 2;
-    }
-  } else {
-    real edge = a->speed > 0 ? force[0] : side > 0 ? (force[0] > 0 ? a->band : -a->band) : 0;
-    real cost = cost_at(block, i, edge);
-    int above = a->speed > 0 ? side > 0 : (side > 0) == (force[0] > 0);
-    if (above)
-      set->low = edge, set->low_cost = cost;
-    else
-      set->high = edge, set->high_cost = cost;
-  }
+  if (!is_plane(a))
+    narrow_line(block, i, set, force, side);
+  else if (in_band(a, set, force) > 0)
+    narrow_by_band(block, i, set, force, side);
+  else if (set->reverse > 0) {
+    if (side < 0) turn_round(set);
+    set->reverse = 0;
+  } else
+    narrow_by_angle(set, force, side);
+  set->jumps = 0;
   set_up(block, i, set);
 }
 
@@ -142,7 +217,7 @@ fl_node *last_open(const real *block, fl_work *work, int *depth) {
 
 /* Whether the smoothed answer of an arc has a force that is smaller than any in it. */
 static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
-  return is_plane(ACTUATOR(block, i)) && set->half <= NARROW && size_of(force) < R(0.9) * set->low;
+  return is_plane(ACTUATOR(block, i)) && set->turn == 0 && set->half <= NARROW && size_of(force) < R(0.9) * set->low;
 }
 
 static int any_hollow(const real *block, const fl_work *work) {
@@ -183,8 +258,8 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
       fl_set *set = work->set + i;
       const real *force = s->force[i];
       int hollow = is_hollow(block, i, set, force);
-      if (!hollow && !(gap_of(block, i, set, force, largest, s->price) > 0)) continue;
-      if (hollow || (is_plane(ACTUATOR(block, i)) && size_of(force) < R(0.98) * set->low)) {
+      if (!hollow && !(gap_of(block, work, i, force, largest, s->price) > 0)) continue;
+      if (hollow || (is_plane(ACTUATOR(block, i)) && set->turn == 0 && size_of(force) < R(0.98) * set->low)) {
         freeze_at_least(block, i, set, force);
       } else
         narrow(block, i, set, force, nearer_side(block, i, set, force));

@@ -54,7 +54,6 @@ typedef fl_wide wide;
 #define HEAD(block) ((const fl_head *)(block))
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
 #define COUNT(block) ((int)HEAD(block)->n)
-#define RANGE(block) ((int)HEAD(block)->range)
 
 /* linear.c */
 static inline real dot(const real *a, const real *b, int n) {
@@ -64,16 +63,23 @@ static inline real dot(const real *a, const real *b, int n) {
 }
 static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
 real wrapped(real angle);
+void add_square(real h[6][6], const real *b, real weight);
+real trace_of(real h[6][6]);
 int factor(real a[6][6]);
 void solve(real a[6][6], const real *right, real *x);
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
 /* Prices of an actuator's rows at prices of the wrench in the basis. */
-static inline void own_price(const real *block, int i, const real *price, real *own) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  own[0] = dot(a->matrix[0], price, 6), own[1] = dot(a->matrix[1], price, 6);
+static inline void own_price(const fl_work *work, int i, const real *price, real *own) {
+  own[0] = dot(work->span.matrix[i][0], price, 6);
+  own[1] = dot(work->span.matrix[i][1], price, 6);
 }
+
+/* span.c */
+int span_anew(const real *block, fl_work *work, int is_as_prepared);
+void beside_of(const real *block, fl_span *span);
+int span_now(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free);
 
 /* table.c */
 typedef struct { real force, slope, conjugate; } along;
@@ -85,7 +91,9 @@ real gauge_at(const real *gauge, real angle);
 real lean_at(const real *gauge, real angle);
 
 /* reply.c */
-typedef struct { real force[2], xx, xy, yy, conjugate; } reply;
+typedef struct { real force[2], xx, xy, yy, conjugate, angle; } reply; /* angle: where turning costs */
+void leave_out(const real *block, int i, fl_set *set);
+along limited(const real *block, const fl_actuator *a, const fl_set *set, int line, real price);
 void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half);
 void set_up(const real *block, int i, fl_set *set);
 void freeze(const real *block, int i, fl_set *set, const real *force);
@@ -96,6 +104,12 @@ fl_set reversed(const fl_set *set);
 real drag_of(const real *block, int i, real force);
 int undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
+/* turning.c */
+reply turned(const real *block, int i, const fl_set *set, const real *price);
+int has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
+               const real *step, int is_short);
+void mark_jump(fl_set *set, real one, real other);
+
 /* newton.c */
 #define MOST_STEPS 200
 void sums_of(const real *block, fl_work *work);
@@ -104,10 +118,10 @@ void stand_at(const real *block, fl_work *work, const real *target, const real *
 void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
 void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most);
-void to_basis(const real *block, const real *wrench, real *target);
-void price_in_basis(const real *block, const real *price, real *inner);
-int in_range(const real *block, const real *wrench, const real *target);
-void wrench_of(const real *block, real force[][2], real *wrench);
+void to_basis(const fl_work *work, const real *wrench, real *target);
+void price_in_basis(const fl_work *work, const real *price, real *inner);
+int in_range(const fl_work *work, const real *wrench, const real *target);
+void wrench_of(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* gaps.c */
 #define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
@@ -122,7 +136,7 @@ fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);
 
 /* drag.c */
-real cost_of(const real *block, real command[][3], real force[][2]);
+real cost_of(const real *block, const fl_work *work, real command[][3], real force[][2]);
 void place(const real *block, fl_work *work, const real *target, real *best);
 void place_starts(const real *block, fl_work *work, const real *target, real *best);
 int with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
@@ -141,7 +155,7 @@ static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
 static inline void add(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
-wide out_of_basis(const real *block, const real *inner, int axis);
+wide out_of_basis(const real *block, const fl_work *work, const real *inner, int axis);
 void weigh(const real *block, fl_work *work, const wide *weight);
 void point_of(const real *block, const fl_work *work, wide force[][2], wide *point);
 wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
@@ -152,19 +166,22 @@ void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 /* law.c */
 void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]);
 void command_for(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command);
-void reach_of(const real *block, int i, const fl_box *box, real *limits);
+typedef struct { real low, high, middle, half, lean; } reach;
+reach reach_of(const real *block, int i, const fl_box *box);
+
+/* now.c */
+void set_limits(const real *block, fl_work *work, const real *previous, real calm);
+int is_known(const real *command);
+int stand_as(const real *block, fl_work *work, const fl_now *now);
+void into_box(const real *block, const fl_box *box, real command[][3]);
 
 /* command.c */
-#define TICK_STEPS 5
-void all_limits(const real *block, fl_box *box);
-void tick_limits(const real *block, const real *previous, fl_box *box);
-int may_follow(const real *block, const real *previous, real command[][3]);
 int angle_of(const fl_actuator *a);
 real held_in(const fl_box *box, int i, int k, int angle, real value);
 void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
-void into_limits(const real *block, real command[][3]);
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]);
+int is_in_band(const fl_actuator *a, const real *command);
 
 /* policy.c */
 void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out);

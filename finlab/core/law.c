@@ -187,39 +187,65 @@ void command_for(const real *block, int i, const fl_box *box, const real *force,
   }
 }
 
-/* Limits of the forces (4,) that commands within a box give: least and largest, middle and half of the arc. */
-void reach_of(const real *block, int i, const fl_box *box, real *limits) {
+/* Least and largest force of a fin, or lift of a foil, on a grid of the commands within a box; and the direction of the
+   largest one. */
+#define PROBES 5
+static void sizes_in(const real *block, int i, const fl_box *box, real *least, real *largest, real *direction) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *low = box->low[i], *high = box->high[i];
-  if (a->form == FL_THRUSTER) {
-    limits[0] = a->sign > 0 ? low[0] : -high[0], limits[1] = a->sign > 0 ? high[0] : -low[0];
-    limits[2] = limits[3] = 0;
-    return;
-  }
-  int angle = MAX(angle_of(a), 0);
-  real half = (high[angle] - low[angle]) / 2, best = 0;
-  limits[2] = (low[angle] + high[angle]) / 2, limits[3] = half >= PI - NOTHING ? PI : half;
-  limits[0] = low[1], limits[1] = high[1];
-  if (a->form == FL_POD) return;
-  limits[0] = R(1e30), limits[1] = -R(1e30);
-  for (int j = 0; j < 25; j++) {
-    real force[3], command[3] = {0, 0, limits[2]};
-    if (a->form == FL_FOIL)
-      command[0] = low[0] + (real)j / 24 * (high[0] - low[0]);
-    else
-      command[0] = low[0] + (real)(j % 5) / 4 * (high[0] - low[0]), command[1] = low[1] + (real)(j / 5) / 4 * (high[1] - low[1]);
+  const real *low = box->low[i];
+  const real *high = box->high[i];
+  *least = R(1e30);
+  *largest = -R(1e30);
+  *direction = 0;
+  for (int j = 0; j < PROBES * PROBES; j++) {
+    real command[3] = {0, 0, (low[2] + high[2]) / 2};
+    real force[3];
+    if (a->form == FL_FOIL) {
+      command[0] = low[0] + (real)j / (PROBES * PROBES - 1) * (high[0] - low[0]);
+    } else {
+      command[0] = low[0] + (real)(j % PROBES) / (PROBES - 1) * (high[0] - low[0]);
+      command[1] = low[1] + (real)(j / PROBES) / (PROBES - 1) * (high[1] - low[1]);
+    }
     force_of(block, i, command, force, 0);
-    real size = a->form == FL_FOIL ? force[0] : size_of(force + 1);
-    if (size > limits[1]) best = ATAN2(force[2], force[1]);
-    limits[0] = MIN(limits[0], size), limits[1] = MAX(limits[1], size);
+    const real size = a->form == FL_FOIL ? force[0] : size_of(force + 1);
+    if (size > *largest) *direction = ATAN2(force[2], force[1]);
+    *least = MIN(*least, size);
+    *largest = MAX(*largest, size);
+  }
+}
+
+/* What commands within a box give: least and largest force [N], of planes below 0 in reverse, and the arc of their
+   directions [rad]. `lean` is the angle from the middle of the commands' angles to that of the arc. */
+reach reach_of(const real *block, int i, const fl_box *box) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *low = box->low[i];
+  const real *high = box->high[i];
+  reach o = {0, 0, 0, 0, 0};
+  if (a->form == FL_THRUSTER) {
+    o.low = a->sign > 0 ? low[0] : -high[0];
+    o.high = a->sign > 0 ? high[0] : -low[0];
+    return o;
   }
   if (a->form == FL_FOIL) {
-    limits[2] = limits[3] = 0;
-    return;
+    real none;
+    sizes_in(block, i, box, &o.low, &o.high, &none);
+    return o;
   }
-  limits[2] += wrapped(best - limits[2]); /* where the force points at the middle of the commands' arc */
+  const int angle = angle_of(a);
+  o.middle = (low[angle] + high[angle]) / 2;
+  o.half = (high[angle] - low[angle]) / 2;
+  if (o.half >= PI - NOTHING) o.half = PI;
+  o.low = low[1];
+  o.high = high[1];
+  if (a->form == FL_POD) return o;
+  real direction;
+  sizes_in(block, i, box, &o.low, &o.high, &direction);
+  o.lean = wrapped(direction - o.middle);
+  o.middle += o.lean;
   if (a->gauge > 0) {
-    real rho = gauge_at(block + (int)a->gauge, limits[2]);
-    limits[0] /= rho, limits[1] /= rho;
+    const real rho = gauge_at(block + (int)a->gauge, o.middle);
+    o.low /= rho;
+    o.high /= rho;
   }
+  return o;
 }

@@ -7,17 +7,17 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 2
+VERSION = 3
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
 SIGNATURES = {
     "fl_sizes": "ii",
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
-    "fl_answer_many": "ipppippppppp",
+    "fl_answer_many": "ippppipppppp",
     "fl_commands": "vpppipp",
     "fl_look": "rppppp",
-    "fl_worth": "vpppip",
+    "fl_worth": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_settle": "ippppippp",

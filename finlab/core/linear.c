@@ -3,6 +3,20 @@
 
 real wrapped(real angle) { return angle - 2 * PI * FLOOR((angle + PI) / (2 * PI)); }
 
+/* Adds b b' times a weight to a lower triangle. */
+void add_square(real h[6][6], const real *b, real weight) {
+  for (int j = 0; j < 6; j++) {
+    const real own = weight * b[j];
+    for (int k = 0; k <= j; k++) h[j][k] += own * b[k];
+  }
+}
+
+real trace_of(real h[6][6]) {
+  real sum = 0;
+  for (int j = 0; j < 6; j++) sum += h[j][j];
+  return sum;
+}
+
 /* Turns the lower triangle of a (6 x 6) into L and 1 / D of L D L'; 0 where a is singular to rounding. */
 int factor(real a[6][6]) {
   for (int i = 0; i < 6; i++) {

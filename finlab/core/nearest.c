@@ -11,11 +11,11 @@
 #define MOST_SHARES (5 * ROUNDS)
 
 /* An axis of a scaled wrench in the basis, on the yardstick. */
-wide out_of_basis(const real *block, const real *inner, int axis) {
-  const fl_head *h = HEAD(block);
+wide out_of_basis(const real *block, const fl_work *work, const real *inner, int axis) {
+  const fl_span *span = &work->span;
   wide sum = 0;
-  for (int j = 0; j < 6; j++) sum += (wide)h->basis[axis][j] * (wide)inner[j];
-  return sum * (wide)h->scale[axis] / (wide)h->yard[axis];
+  for (int j = 0; j < 6; j++) sum += (wide)span->basis[axis][j] * (wide)inner[j];
+  return sum * (wide)span->scale[axis] / (wide)HEAD(block)->yard[axis];
 }
 
 /* The wrench on the yardstick, in weighted axes, that each force gives per newton. */
@@ -24,7 +24,7 @@ void weigh(const real *block, fl_work *work, const wide *weight) {
     work->corners[i] = 0;
     for (int q = 0; q < 2; q++)
       for (int k = 0; k < 6; k++)
-        work->column[i][q][k] = weight[k] * out_of_basis(block, ACTUATOR(block, i)->matrix[q], k);
+        work->column[i][q][k] = weight[k] * out_of_basis(block, work, work->span.matrix[i][q], k);
   }
 }
 
@@ -54,6 +54,8 @@ static void farthest(const real *block, const fl_work *work, const wide *normal,
       farthest_of(block, i, work->set + i, own, force[i]);
   }
   point_of(block, work, force, m->point[m->count]);
+  m->along[m->count] = work->ray && product(work->ray, normal, 6) < 0 ? 1 : 0;
+  if (m->along[m->count] > 0) add(m->point[m->count], -1, work->ray);
 }
 
 static void drop(fl_mixture *m, int k) {
@@ -61,6 +63,7 @@ static void drop(fl_mixture *m, int k) {
   memmove(m->force + k, m->force + k + 1, (m->count - k) * sizeof m->force[0]);
   memmove(m->point + k, m->point + k + 1, (m->count - k) * sizeof m->point[0]);
   memmove(m->share + k, m->share + k + 1, (m->count - k) * sizeof m->share[0]);
+  memmove(m->along + k, m->along + k + 1, (m->count - k) * sizeof m->along[0]);
 }
 
 static int least_share(const fl_mixture *m) {

@@ -12,76 +12,57 @@
 #define SATURATED R(1e-1) /* share c of M, and ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
 
 /* Scaled wrench in the basis. */
-void to_basis(const real *block, const real *wrench, real *target) {
-  const fl_head *h = HEAD(block);
+void to_basis(const fl_work *work, const real *wrench, real *target) {
+  const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
     target[j] = 0;
-    for (int k = 0; k < 6; k++) target[j] += h->basis[k][j] * (wrench[k] / h->scale[k]);
+    for (int k = 0; k < 6; k++) target[j] += span->basis[k][j] * (wrench[k] / span->scale[k]);
+  }
+}
+
+/* Prices in the basis of those of the wrench. */
+void price_in_basis(const fl_work *work, const real *price, real *inner) {
+  const fl_span *span = &work->span;
+  for (int j = 0; j < 6; j++) {
+    inner[j] = 0;
+    for (int k = 0; k < 6; k++) inner[j] += span->basis[k][j] * span->scale[k] * price[k];
   }
 }
 
 /* Whether a wrench lies in the range but for rounding. */
-int in_range(const real *block, const real *wrench, const real *target) {
-  const fl_head *h = HEAD(block);
+int in_range(const fl_work *work, const real *wrench, const real *target) {
+  const fl_span *span = &work->span;
   real rest = 0, all = 0;
   for (int k = 0; k < 6; k++) {
-    real scaled = wrench[k] / h->scale[k], left = scaled - dot(h->basis[k], target, 6);
+    real scaled = wrench[k] / span->scale[k], left = scaled - dot(span->basis[k], target, 6);
     rest += left * left, all += scaled * scaled;
   }
   return SQRT(rest) <= MAX(NEARLY, 10 * ROUNDING) * (R(1e-3) + SQRT(all));
 }
 
 /* The wrench [N, N m] of forces. */
-void wrench_of(const real *block, real force[][2], real *wrench) {
-  const fl_head *h = HEAD(block);
+void wrench_of(const real *block, const fl_work *work, real force[][2], real *wrench) {
+  const fl_span *span = &work->span;
   real given[6] = {0};
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    for (int q = 0; q < (int)a->rows; q++)
-      for (int j = 0; j < RANGE(block); j++) given[j] += force[i][q] * a->matrix[q][j];
-  }
-  for (int k = 0; k < 6; k++) wrench[k] = h->scale[k] * dot(h->basis[k], given, 6);
-}
-
-/* Adds b b' times a weight to a lower triangle. */
-static void add_square(real h[6][6], const real *b, real weight) {
-  for (int j = 0; j < 6; j++) {
-    real own = weight * b[j];
-    for (int k = 0; k <= j; k++) h[j][k] += own * b[k];
-  }
-}
-
-static real trace_of(real h[6][6]) {
-  real sum = 0;
-  for (int j = 0; j < 6; j++) sum += h[j][j];
-  return sum;
-}
-
-int fl_prepare(const real *block, fl_work *work) {
-  real(*h)[6] = work->factor, trace;
-  memset(work->factor, 0, sizeof work->factor);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
-    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], a->gain[q]);
-  }
-  trace = trace_of(h);
-  for (int j = 0; j < 6; j++)
-    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * RANGE(block) / trace + (j == k ? NEARLY : 0);
-  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
-  work->least_trace = NEARLY * trace;
-  sums_of(block, work);
-  return RANGE(block) == 0 || factor(h) ? 0 : FL_BAD_NUMBER;
+  for (int i = 0; i < COUNT(block); i++)
+    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++)
+      for (int j = 0; j < span->range; j++) given[j] += force[i][q] * span->matrix[i][q][j];
+  for (int k = 0; k < 6; k++) wrench[k] = span->scale[k] * dot(span->basis[k], given, 6);
 }
 
 /* What follows from all sets. */
 void sums_of(const real *block, fl_work *work) {
-  work->most_cost = 0, work->quick = 1, work->torn = work->drags = 0;
+  work->most_cost = 0, work->quick = 1, work->torn = work->drags = work->turns = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *s = work->set + i;
     work->most_cost += MAX(MAX(s->low_cost, s->high_cost), s->reverse > 0 ? s->reverse_cost : 0);
+    if (s->turn > 0) {
+      const real farthest = MIN(FABS(s->middle - s->at) + s->half, PI);
+      work->most_cost += s->turn / 2 * farthest * farthest;
+      work->turns = 1;
+    }
     work->torn |= s->forked || s->reverse > 0;
-    work->drags |= ACTUATOR(block, i)->speed > 0;
+    work->drags |= ACTUATOR(block, i)->speed > 0 && !work->span.lost[i];
     if (work->torn || work->drags || ACTUATOR(block, i)->band > 0) work->quick = 0;
   }
 }
@@ -97,15 +78,17 @@ void look(const real *block, const fl_work *work, const real *target, const real
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real own[2], *slope = state->slope[i];
-    own_price(block, i, price, own);
+    own_price(work, i, price, own);
     reply o = reply_of(block, i, work->set + i, own);
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
     slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
+    state->angle[i] = o.angle;
     int line = a->rows == 1;
     real paid = line ? FABS(own[0]) : size_of(own), size = line ? FABS(o.force[0]) : size_of(o.force);
     slope[3] = work->drags ? 0 : size / MAX(paid, a->most[0] / a->gain[0]);
     conjugate += o.conjugate;
-    for (int j = 0; j < 6; j++) given[j] += o.force[0] * a->matrix[0][j] + o.force[1] * a->matrix[1][j];
+    const real(*matrix)[6] = work->span.matrix[i];
+    for (int j = 0; j < 6; j++) given[j] += o.force[0] * matrix[0][j] + o.force[1] * matrix[1][j];
   }
   for (int j = 0; j < 6; j++) state->price[j] = price[j], state->residual[j] = target[j] - given[j];
   state->value = dot(price, target, 6) - conjugate;
@@ -127,7 +110,7 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real own[2], most = a->most[0], gain[2] = {a->gain[0], a->gain[1]};
-    own_price(block, i, even, own);
+    own_price(work, i, even, own);
     real size = a->gain[0] * (is_plane(a) ? size_of(own) : FABS(own[0]));
     if (a->rows == 1) {
       const real *table = block + (int)(own[0] < 0 && a->back > 0 ? a->back : a->ahead);
@@ -137,7 +120,7 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
     real share = size / most;
     if (share > R(0.8)) *ridge = SATURATED;
     real weight = share > 1 && !work->drags ? 1 / share : SQRT(CLIP(share, CLOSE, 1));
-    for (int q = 0; q < (int)a->rows; q++) add_square(h, a->matrix[q], weight * gain[q]);
+    for (int q = 0; q < (int)a->rows; q++) add_square(h, work->span.matrix[i][q], weight * gain[q]);
   }
   trace = trace_of(h);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
@@ -151,7 +134,7 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
 static int step_of(const real *block, const fl_work *work, const fl_state *s, real ridge, real *step) {
   real h[6][6] = {{0}};
   for (int i = 0; i < COUNT(block); i++) {
-    const real *b = ACTUATOR(block, i)->matrix[0], *c = b + 6, *slope = s->slope[i];
+    const real *b = work->span.matrix[i][0], *c = work->span.matrix[i][1], *slope = s->slope[i];
     real xx = slope[0] + ridge * slope[3], xy = slope[1], yy = slope[2] + ridge * slope[3];
     if (ACTUATOR(block, i)->rows == 1) {
       if (xx > 0) add_square(h, b, xx);
@@ -170,6 +153,28 @@ static int step_of(const real *block, const fl_work *work, const fl_state *s, re
   return 1;
 }
 
+#define JUMPS 4 /* looks at which an answer jumps, after which Newton's method stands still */
+
+/* How many answers jump between two states a step apart; where wanted they are marked as what is to be cut. */
+static int jumps_between(const real *block, fl_work *work, const fl_state *one, const fl_state *other,
+                         const real *step, int marked) {
+  const real full = NOTHING * work->most_cost; /* in a hole around rest prices go to 0 */
+  const real square = dot(step, step, 6);
+  const real all = dot(one->price, one->price, 6) + 100 * work->most_cost * full;
+  int jumps = 0;
+  if (!(square < R(1e-3) * all)) return 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    fl_set *set = work->set + i;
+    real own[2];
+    if (!(set->turn > 0)) continue;
+    own_price(work, i, step, own);
+    if (!has_jumped(block, i, set, one, other, own, square < R(1e-7) * all)) continue;
+    jumps++;
+    if (marked) mark_jump(set, one->angle[i], other->angle[i]);
+  }
+  return jumps;
+}
+
 /* Newton's method from prices on; work->now is what it comes to. */
 int newton(const real *block, fl_work *work, const real *target, const real *price, int most_steps) {
   fl_state *s = work->state, *trial = work->state + 1;
@@ -177,7 +182,8 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
   if (!price) first_price(block, work, target, first, &ridge);
   stand_at(block, work, target, price ? price : first);
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
-  for (int k = 0, idle = 0;; k++) {
+  for (int i = 0; work->turns && i < COUNT(block); i++) work->set[i].jumps = 0;
+  for (int k = 0, idle = 0, jumps = 0;; k++) {
     if (s->size <= TOLERANCE) return FL_MET;
     if (s->value > most) return FL_BEYOND;
     if (s->value > value + ROUNDING * FABS(value) || s->size < R(0.9) * size)
@@ -190,6 +196,10 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
     }
     for (int j = 0; j < 6; j++) next[j] = s->price[j] + step[j];
     look(block, work, target, next, trial);
+    if (work->turns && jumps_between(block, work, s, trial, step, 0) && ++jumps >= JUMPS) {
+      jumps_between(block, work, s, trial, step, 1);
+      return FL_STUCK;
+    }
     /* A step is kept that ends uphill, or where the value rose, or is the same and the residual fell. */
     real slope = dot(step, s->residual, 6), end = dot(step, trial->residual, 6), change = end / MAX(slope, TINY);
     real rose = trial->value - s->value, slack = ROUNDING * FABS(s->value);

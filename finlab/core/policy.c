@@ -27,23 +27,35 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
   score[0] = (real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
 }
 
+/* The largest share of a wrench that can be given alone. In a tick there may be none, as drives cannot stop or turn at
+   once: then what is nearest to any share. */
 static void direction(const real *block, fl_work *work, const real *wrench, real *score) {
-  const fl_head *h = HEAD(block);
+  fl_mixture *m = &work->mixture;
   real target[6], all[6];
-  wide weight[6], begin[6], ray[6], plane[6], share;
+  wide weight[6], begin[6], ray[6], plane[6];
   for (int k = 0; k < 6; k++) {
     weight[k] = 1;
-    all[k] = wrench[k] + h->beside[k], begin[k] = -on_yardstick(block, h->beside, k);
+    all[k] = wrench[k] + work->span.beside[k];
+    begin[k] = -on_yardstick(block, work->span.beside, k);
   }
-  to_basis(block, all, target);
-  int ranged = in_range(block, all, target);
+  to_basis(work, all, target);
+  const int ranged = in_range(work, all, target);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
-    ray[k] = ranged ? out_of_basis(block, target, k) : 0;
+    ray[k] = ranged ? out_of_basis(block, work, target, k) : 0;
   weigh(block, work, weight);
-  share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, &work->mixture, plane);
-  wide *miss = work->mixture.miss, less = product(miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
-  add(miss, -less, ray);
-  score[0] = rounded((real)length_of(miss)), score[1] = (real)(1 - share + less);
+  wide share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, m, plane);
+  const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
+  add(m->miss, -less, ray);
+  score[0] = rounded((real)length_of(m->miss));
+  score[1] = (real)(1 - share + less);
+  if (share > 0 || !(score[0] > 0)) return;
+  m->count = 0;
+  work->ray = ray;
+  score[0] = rounded((real)nearest_point(block, work, begin, CLOSE_BY, 0, m));
+  work->ray = 0;
+  share = 0;
+  for (int p = 0; p < m->count; p++) share += m->share[p] * m->along[p];
+  score[1] = (real)(1 - share);
 }
 
 /* A group that wants more than there is pulls at the held axes: then it weighs so much less that these give way by as
@@ -114,25 +126,24 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
    `inside` where power is steep at the rim; where Newton's method settles at none, these forces. */
 static void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
                      fl_answer *out) {
-  const fl_head *h = HEAD(block);
   real wrench[6], aim[6], target[6], size = 0, most = R(1e30);
-  wrench_of(block, force, wrench);
+  wrench_of(block, work, force, wrench);
   memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof wrench);
   for (int k = 0; k < 6; k++) {
-    real way = (inside[k] - wrench[k]) / h->scale[k];
+    real way = (inside[k] - wrench[k]) / work->span.scale[k];
     size += way * way;
   }
   for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
       aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
-    to_basis(block, aim, target);
+    to_basis(work, aim, target);
     newton(block, work, target, 0, STEPS_AT_KINK);
     if (work->now->size > MAX(AT_RIM, ENOUGH) || work->now->value > most) continue;
     memcpy(out->inner, work->now->price, sizeof out->inner);
     memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
     memcpy(out->aim, aim, sizeof aim);
-    if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) wrench_of(block, out->force, out->aim);
+    if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) wrench_of(block, work, out->force, out->aim);
     most = (1 - FINE) * work->now->value;
     if (tried != 1 || dot(out->inner, target, 6) <= FINE / NEARLY * work->now->value) return;
   }
@@ -194,18 +205,18 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
   best_part(block, work, wrench, policy, force, &share, &most);
   if (policy->policy != FL_DIRECTION) {
     middle_of(block, work, middle);
-    wrench_of(block, middle, inside);
+    wrench_of(block, work, middle, inside);
   }
-  wrench_of(block, force, wanted);
+  wrench_of(block, work, force, wanted);
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
   cheapest(block, work, force, inside, wanted, out);
   take_sets(block, work, work->kept);
   if (!may_have_gaps(block, work, out->force)) return;
-  to_basis(block, out->aim, target); /* another part of the sets may give it for less */
+  to_basis(work, out->aim, target); /* another part of the sets may give it for less */
   int status = newton(block, work, target, 0, MOST_STEPS);
   if (work->drags) {
-    for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + h->beside[k];
+    for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + work->span.beside[k];
     int met = with_drag(block, work, target, status, out);
     if (policy->policy == FL_DIRECTION) on_ray(block, work, wrench, met * share, most, out);
     return;

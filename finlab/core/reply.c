@@ -40,16 +40,33 @@ void set_up(const real *block, int i, fl_set *set) {
   set->cos_half = COS(set->half), set->sin_half = SIN(set->half);
 }
 
+/* Leaves of an interval of forces what is outside of a dead band, and rest: commands within the band give no force. */
+static void without_band(real band, real *low, real *high) {
+  const int touches = *low < band && *high > -band;
+  if (!(band > 0) || !touches) return;
+  if (*low > -band) *low = 0;
+  if (*high < band) *high = 0;
+}
+
 /* A set between two forces [N], of planes below 0 against their direction, in an arc [rad]. */
 void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
+  without_band(ACTUATOR(block, i)->band, &low, &high);
   int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
   set->flipped = back && high <= 0, set->tangent = 0;
+  set->turn = set->at = set->cut = 0, set->jumps = 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
   set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;
   set->reverse = back && !set->flipped ? -low : 0;
   set->reverse_cost = back ? cost_at(block, i, low) : set->low_cost;
   set->middle = middle + (set->flipped ? PI : 0), set->half = half;
+  set_up(block, i, set);
+}
+
+/* The set of an actuator that is lost: rest, at no power. */
+void leave_out(const real *block, int i, fl_set *set) {
+  memset(set, 0, sizeof *set);
+  if (is_plane(ACTUATOR(block, i))) set->half = PI;
   set_up(block, i, set);
 }
 
@@ -64,7 +81,8 @@ void freeze(const real *block, int i, fl_set *set, const real *force) {
   set_up(block, i, set);
 }
 
-static along limited(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
+/* The force that is worth most at a price along it, between the limits of a set. */
+along limited(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
   int back = set->flipped, narrow = !line && set->half < PI;
   real sign = line && price < 0 ? -1 : 1, size = sign * price;
   if (line) back = price < 0;
@@ -127,7 +145,7 @@ static reply along_fan(along o, const fan *f) {
                  o.slope * f->x * f->x + o.force * f->xx,
                  o.slope * f->x * f->y + o.force * f->xy,
                  o.slope * f->y * f->y + o.force * f->yy,
-                 o.conjugate};
+                 o.conjugate, 0};
 }
 
 static reply one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
@@ -147,7 +165,7 @@ static reply one_way(const real *block, const fl_actuator *a, const fl_set *set,
 fl_set reversed(const fl_set *set) {
   fl_set r = *set;
   r.low = 0, r.high = set->reverse, r.high_cost = set->reverse_cost, r.reverse = 0, r.flipped = 1;
-  r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
+  r.at = set->at + PI, r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
   set_ends(1, &r);
   return r;
 }
@@ -178,7 +196,7 @@ static reply foil(const real *block, const fl_actuator *a, const fl_set *set, co
                  o.slope,
                  o.slope * lean,
                  o.slope * lean * lean + (most - cost) * bend / (a->speed * a->speed),
-                 o.conjugate};
+                 o.conjugate, 0};
 }
 
 static reply on_tangent(const fl_set *set, const real *price) {
@@ -186,16 +204,19 @@ static reply on_tangent(const fl_set *set, const real *price) {
   real gain = dot(price, t->slope, 2) - t->pay, step = CLIP(gain / t->bend, set->low, set->high);
   real x = t->slope[0], y = t->slope[1], free = step > set->low && step < set->high ? 1 / t->bend : 0;
   return (reply){{t->force[0] + step * x, t->force[1] + step * y}, free * x * x, free * x * y, free * y * y,
-                 dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost};
+                 dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost, 0};
 }
 
 reply reply_of(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->rows == 1) {
     along o = limited(block, a, set, 1, price[0]);
-    return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate};
+    return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate, 0};
   }
-  return set->tangent ? on_tangent(set, price) : a->speed > 0 ? foil(block, a, set, price) : plane(block, a, set, price);
+  if (set->tangent) return on_tangent(set, price);
+  if (a->speed > 0) return foil(block, a, set, price);
+  if (set->turn > 0) return turned(block, i, set, price);
+  return plane(block, a, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.core.calls import Core, Found
+from finlab.core.calls import STILL, Core, Found, Now
 from finlab.core.library import library
 
 _EFFECT = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, ctypes.c_int, *[ctypes.c_void_p] * 4)
@@ -78,15 +78,15 @@ class Whole(Core):
         turns: int,
         policy: Any = None,
         price: Array | None = None,
-        previous: Array | None = None,
+        now: Now = STILL,
         worth: float = 0.0,
     ) -> Ended:
-        """What turns from forces (n, 2) on, or from a `previous` command (n, 3), come to for a wrench (6,):
+        """What turns from forces (n, 2) on, or in a tick from the command before, come to for a wrench (6,):
         at most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of
         the wrench. An error counts `worth` [W] at least. Else as for `one`."""
         with self._turn:
             self._begin[0], self._end[1], self._turns = 0.0 if force is None else force, worth, turns
-            found = self.one(wrench, policy, price, previous)
+            found = self.one(wrench, policy, price, now)
             return Ended(found._replace(force=self._begin.copy()), *self._end.tolist())
 
     def _ask(self) -> int:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.dual.rates import Rates
+from finlab.allocation.rates import Rates
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import MdnSettings, Settings

@@ -114,14 +114,20 @@ LEAST_LEVER = 1e-3
 def yardstick(layout: Layout) -> Array:
     """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
 
-    F is the root of the sum of squares of the actuators' largest forces, T that of their largest torques
-    about the origin, each actuator alone. A robot that gives nothing has F = 1 N. Raises DataError: a fin's
-    force table cannot be read."""
+    F is the root of the sum of squares of the actuators' largest forces, and T is F times the root mean square
+    of their levers: each one's largest torque about the origin over its largest force. So how a force compares
+    with a torque is a matter of where actuators stand, and stays as it is while rates, damage or a tick leave
+    some of them less to give. A robot that gives nothing has F = 1 N. Raises DataError: a fin's force table
+    cannot be read."""
     plant = Plant(layout)
     wrench = np.einsum("kni,niw->knw", plant.force(plant.grid(STEPS)), plant.effectiveness)
-    force = float(np.sqrt((wrench[..., :3] ** 2).sum(-1).max(0).sum())) or 1.0
-    torque = float(np.sqrt((wrench[..., 3:] ** 2).sum(-1).max(0).sum()))
-    scale = np.repeat([force, max(torque, LEAST_LEVER * force)], 3)
+    forces = np.linalg.norm(wrench[..., :3], axis=-1).max(axis=0)
+    torques = np.linalg.norm(wrench[..., 3:], axis=-1).max(axis=0)
+    force = float(np.sqrt((forces**2).sum())) or 1.0
+    pushes = forces > 0.0
+    levers = torques[pushes] / forces[pushes]
+    lever = float(np.sqrt((levers**2).mean())) if pushes.any() else 0.0
+    scale = np.repeat([force, max(lever, LEAST_LEVER) * force], 3)
     scale.setflags(write=False)
     return scale
 

@@ -75,7 +75,7 @@ class FinGroup(Group):
     def forms(self) -> list[Form]:
         return [table.form for table in self._tables]
 
-    def radial_worth(self, price: Array, back: Array) -> Array:
+    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law; of fins that
         were measured nothing."""
         result = np.full(price.shape, np.nan)

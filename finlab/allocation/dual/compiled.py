@@ -5,11 +5,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
+from finlab.core.calls import STILL, Now, Worth
 from finlab.layout import Layout
 from finlab.physics.expected_miss import uncertainties
 from finlab.physics.plant import Plant
@@ -32,7 +34,7 @@ class Compiled:
         `price_of_doubt`. Errors as for `FinGroup`."""
         self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
         self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
-        self._effectiveness = plant.effectiveness
+        self._effectiveness, self._counts = plant.effectiveness, plant.counts
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -58,11 +60,23 @@ class Compiled:
                 drags = isinstance(response, Line) and response.drag is not None
                 doubted = with_square(response, weight) if weight and not drags else response
                 responses[place], forms[place] = doubted, form
-        self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
+        self.beside = self.beside_of_working(np.ones(self.count, bool))
         """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
         self.robot = DualRobot(
-            responses, forms, self._limits, self._effectiveness, self._yardstick, self.beside, self.weight
+            responses,
+            forms,
+            self._limits,
+            self._effectiveness,
+            self._yardstick,
+            self.beside,
+            self.weight,
+            self._counts,
         )
+
+    def beside_of_working(self, works: NDArray[np.bool_]) -> Array:
+        """Returns the wrench (6,) beside the forces of the actuators that work (n,)."""
+        each = (group.beside[works[places]].sum(axis=0) for places, group in self.groups)
+        return sum(each, np.zeros(6)) * self._counts
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
@@ -88,13 +102,16 @@ class Compiled:
         """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own axes."""
         return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
-    def radial_worth(self, group: Group, ahead: Array, back: Array) -> Array | None:
-        """See `Group.radial_worth`: where all actuators are alike, one answers for all."""
+    def radial_worth(self, group: Group, places: Array, worth: Worth) -> Array | None:
+        """Returns what forces are worth by the laws of a group at some places; see `Group.radial_worth`.
+        Where all actuators are alike, one answers for all."""
+        ahead, back = worth.ahead[:, places], worth.back[:, places]
+        ends = np.stack([worth.low[0, places], worth.high[0, places]], axis=-1)
         for alike, one in self._alike:
             if alike is group:
-                worth = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1))
-                return None if worth is None else worth.reshape(ahead.shape)
-        return group.radial_worth(ahead, back)
+                most = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1), None)
+                return None if most is None else most.reshape(ahead.shape)
+        return group.radial_worth(ahead, back, ends)
 
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
@@ -107,13 +124,19 @@ def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
     return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
 
 
-def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
-    """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
-    ahead, back, worth = np.moveaxis(compiled.robot.core.worth(price), -1, 0)
+def proved_power(compiled: Compiled, wrench: Array, price: Array, now: Now = STILL) -> Array:
+    """Returns the power (N,) [W] that no answer undercuts which gives wrenches (N, 6) with what may be given
+    now, by prices (N, 6) [W/N, W/(N m)]."""
+    worth = compiled.robot.core.worth(price, now)
+    most = worth.most.copy()
     for places, group in compiled.groups:
-        for own in (compiled.radial_worth(group, ahead[:, places], back[:, places]), group.worth(price)):
+        for own in (compiled.radial_worth(group, places, worth), group.worth(price)):
             if own is not None:
-                worth[:, places] = np.where(np.isnan(own), worth[:, places], own)
-    paid = price * (wrench - compiled.beside)
-    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=1))
-    return np.asarray(paid.sum(axis=1) - worth.sum(axis=1) - rounding)
+                most[:, places] = np.where(np.isnan(own), most[:, places], own)
+    beside = compiled.beside
+    if now.lost is not None:
+        most[:, now.lost] = 0.0
+        beside = compiled.beside_of_working(~now.lost)
+    paid = price * (wrench - beside)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(most).sum(axis=1))
+    return np.asarray(paid.sum(axis=1) - most.sum(axis=1) - rounding)

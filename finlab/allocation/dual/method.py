@@ -1,19 +1,20 @@
 """The default method: least watts by the dual, exact by the actuators' own laws.
 
-The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has compiled. What its
-tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the commands.
+The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has compiled, within
+what may be given now: limits, rates from the command before, losses. What its tables leave undone, by the
+actuators' own laws, is removed by Levenberg-Marquardt steps on the commands, within the same limits.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.price_ascent import raised_price
-from finlab.allocation.dual.rates import Rates
 from finlab.allocation.dual.turns import settled, whole_of
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
@@ -21,16 +22,16 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.axes import axes_in, mask_of
-from finlab.core.calls import Found
+from finlab.axes import axes_in
+from finlab.core.calls import STILL, Found, Now
 from finlab.core.whole import Whole
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the yardstick, up to which commands need no further step."""
-TICK_STEPS = 5
-"""Steps of a command of a tick that is not exact."""
+MOST_SPANS = 32
+"""States of losses and free axes whose driven directions are kept."""
 _ENDED = "the search for a better answer was ended by its limit of steps"
 
 
@@ -42,6 +43,9 @@ class DualSettings(Settings):
         0.0, 0.0, 1e9, "what an expected miss of 1 % of the yardstick is worth, growing with its square", "W"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
+    calm: float = number(
+        2.0, 0.0, 10.0, "what turning costs in a tick: 0 nothing, 2 a few percent of power for half the turning"
+    )
 
 
 class Dual(Method):
@@ -52,6 +56,7 @@ class Dual(Method):
     # only push it on.
     policy_under_way = "direction"
     begins_at_prices = True
+    takes_losses = True
     settings_class = DualSettings
     settings: DualSettings
 
@@ -59,15 +64,12 @@ class Dual(Method):
         doubt = price_of_doubt(self.layout, self.scale, self.settings.robust)
         self.compiled = Compiled(self.layout, self.plant, self.scale, self.settings.period_s, doubt)
         self._last: tuple[bytes, Self] | None = None
+        self._spans: dict[bytes, Array] = {}
 
     @cached_property
     def problem(self) -> CommandProblem:
         """The robot by its own laws."""
         return CommandProblem.of(self.plant, self.scale)
-
-    @cached_property
-    def rates(self) -> Rates:
-        return Rates(self.plant, self.layout.rates * self.settings.period_s)
 
     @cached_property
     def whole(self) -> Whole:
@@ -82,6 +84,7 @@ class Dual(Method):
         other = super().at(flow)
         if other is not self:
             other.compiled, other._last = self.compiled.at(other.plant.inflow(None)), None
+            other._spans = {}
             self._last = key, other
         return other
 
@@ -94,100 +97,149 @@ class Dual(Method):
         flow: Array | None = None,
         seed: int = 0,
         prices: Array | None = None,
+        lost: NDArray[np.bool_] | None = None,
+        free: NDArray[np.bool_] | None = None,
     ) -> Solution:
-        """See `Method`. For a single target, Newton's method may begin at `prices` (6,) [W/N, W/(N m)]."""
+        """Solves for targets; see `Method.solve`.
+
+        Args:
+            targets: as for `Method`.
+            policy: as for `Method`.
+            previous: as for `Method`.
+            flow: as for `Method`.
+            seed: as for `Method`.
+            prices: (6,) [W/N, W/(N m)] at which Newton's method begins, for a single target.
+            lost: which actuators (n,) do not work; None where all do.
+            free: which axes (6,) may take any wrench; None for none.
+        """
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
+            known = {"previous": previous, "prices": prices, "lost": lost, "free": free}
+            return moved.solve(targets, policy=policy, seed=seed, **known)
+        now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
         if self.plant.interaction is not None:
-            return settled(self, targets, policy, previous, prices)
-        found = self.forces(targets, policy, self.begin(prices), previous)
+            return settled(self, targets, policy, now, prices)
+        found = self.forces(targets, policy, prices, now)
         # A search of bytes, in a third of the time of numpy's `all`.
-        beyond = self._beyond(found, targets) if 0 in found.within.tobytes() else []
-        command, aim = self.exact(found, previous), found.aim if beyond else targets
+        beyond = self._beyond(found, targets, now) if 0 in found.within.tobytes() else []
+        aim = found.aim if beyond else targets
         notes = {_ENDED} if found.ended else set()
+        command = self.exact(found, now)
         if policy.kind == "direction":
             for row in beyond:
-                notes.add(self._kept_on_the_ray(targets[row], row, found, command))
+                notes.add(self._kept_on_the_ray(targets[row], row, found, command, now))
         if beyond:
-            notes |= self.not_held(targets[beyond])
-        bound: Callable[[Array], Array] = partial(self.bound, aim, found.price, found.value)
-        return Solution(
-            command, None if self.unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
-        )
+            notes |= self.not_held(targets[beyond], now)
+        return self.solution(command, aim, found.price, found.value, notes, now)
 
-    def _beyond(self, found: Found, targets: Array) -> list[int]:
+    def solution(
+        self, command: Array, aim: Array, price: Array, value: Array, notes: set[str], now: Now
+    ) -> Solution:
+        """Returns commands (N, n, 3) for wrenches (N, 6) as a solution, with the bound that prices (N, 6) and
+        values (N,) [W] prove, and sentences."""
+        if now.lost is not None:
+            command[:, now.lost] = np.nan
+        bound: Callable[[Array], Array] = partial(self.bound, aim, price, value, now)
+        proof = None if self.unproved else bound
+        return Solution(command, proof, prices=price, notes=tuple(sorted(notes - {""})))
+
+    def problem_now(self, now: Now) -> CommandProblem:
+        """Returns the problem of steps on commands within what may be given now."""
+        problem = self.problem
+        if now.lost is not None or now.free is not None:
+            works = None if now.lost is None else ~now.lost
+            counts = None if now.free is None else ~now.free
+            problem = problem.standing(works, counts)
+        return problem if now.previous is None else problem.after(self.rates.box(now.previous))
+
+    def _beyond(self, found: Found, targets: Array, now: Now) -> list[int]:
         """Places of the targets (N, 6) out of reach. Those that take the last share of a force, which tables
         leave out, are met first: steps by the laws lead there from what is nearest."""
         beyond = np.flatnonzero(~found.within)
         near = beyond[_sizes((found.aim[beyond] - targets[beyond]) / self.scale) <= 10.0 * CLOSE]
         if len(near):
-            ends = refine(self.problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
+            problem = self.problem_now(now)
+            ends = refine(problem, targets[near] / self.scale, found.command[near], ROUNDS, EXACT)
             met = ends.error <= NEARLY
             rows = near[met]
             found.command[rows], found.aim[rows] = ends.command[met], targets[rows]
             found.value[rows], found.within[rows] = 0.0, True
         return np.flatnonzero(~found.within).tolist()
 
-    def begin(self, prices: Array | None) -> Array | None:
-        """Prices (6,) [W/N, W/(N m)] in the robot's basis (6,)."""
-        robot = self.compiled.robot
-        return None if prices is None else np.asarray(robot.rows.dot(robot.scale * prices))
-
-    def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array) -> str:
+    def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array, now: Now) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
         along, aim = target / self.scale, found.aim
-        low, high, size = 0.0, float(aim[row] / self.scale @ along), max(float(along @ along), 1e-300)
-        if self.error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
+        size = max(float(along @ along), 1e-300)
+        low, high = 0.0, float(aim[row] / self.scale @ along)
+        given = self.error(command[row : row + 1], aim[row : row + 1], now)[0]
+        aside = aim[row] / self.scale - high / size * along
+        if given <= NEARLY and np.abs(aside).max() <= NEARLY:
             return ""
+        if now.previous is not None:
+            return ""  # what the drives' rates leave is nearest to the ray already
         kept = False
         while high > low + NEARLY * size:
             share = 0.5 * (low + high)
             tried = share / size * target[None]
-            one = self.forces(tried, None)
-            its = self.exact(one)
-            if self.error(its, tried)[0] <= NEARLY:
+            one = self.forces(tried, None, None, now)
+            its = self.exact(one, now)
+            if self.error(its, tried, now)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
                 found.price[row], found.value[row] = one.price[0], one.value[0]
             else:
                 high = share
-        if not kept and (rest := self._cancelled) is not None:
+        if not kept and (rest := self._cancelled(now)) is not None:
             kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
         return "" if kept else "no share of the target was found that the actuators can give alone"
 
-    @cached_property
-    def _cancelled(self) -> Array | None:
+    def _cancelled(self, now: Now) -> Array | None:
         """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None without
         any."""
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
         start = lower + share * (upper - lower)
-        return self._meeting(np.zeros(6), start)
+        return self._meeting(self.problem_now(now), np.zeros(6), start)
 
-    def _meeting(self, wrench: Array, starts: Array) -> Array | None:
+    def _meeting(self, problem: CommandProblem, wrench: Array, starts: Array) -> Array | None:
         """The cheapest command (n, 3) that gives a normalized wrench (6,) where steps from starts (R, n, 3)
         lead; None where none does."""
-        ends = refine(self.problem, wrench[None], starts, 2 * ROUNDS, EXACT)
+        ends = refine(problem, wrench[None], starts, 2 * ROUNDS, EXACT)
         met = ends.command[ends.error <= NEARLY]
         return met[self.plant.power(met).sum(axis=-1).argmin()] if len(met) else None
 
-    def not_held(self, targets: Array) -> set[str]:
+    def _span(self, now: Now) -> Array:
+        """Directions (6, r) of scaled wrenches that the actuators drive now, orthonormal."""
+        robot = self.compiled.robot
+        if now.lost is None and now.free is None:
+            return robot.basis
+        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
+        counts = np.ones(6, bool) if now.free is None else ~now.free
+        key = works.tobytes() + counts.tobytes()
+        if key not in self._spans:
+            while len(self._spans) >= MOST_SPANS:
+                self._spans.pop(next(iter(self._spans)), None)
+            self._spans[key] = robot.span(works, counts)
+        return self._spans[key]
+
+    def not_held(self, targets: Array, now: Now) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
         robot = self.compiled.robot
-        if not len(targets):
-            return set()
+        basis = self._span(now)
         scaled = targets / robot.scale
-        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T)
-        left = left > NEARLY * np.abs(scaled).max(initial=0.0)
-        axes = axes_in(left.any(axis=0) & ~mask_of(self.undriven))
+        if now.free is not None:
+            scaled = np.where(now.free, 0.0, scaled)
+        left = np.abs(scaled - (scaled @ basis) @ basis.T)
+        beside = (left > NEARLY * np.abs(scaled).max(initial=0.0)).any(axis=0)
+        driven = np.abs(basis).max(axis=1, initial=0.0) > NOTHING
+        axes = axes_in(np.asarray(beside & driven))
         if not axes:
             return set()
         return {
             f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not count, leave "
-            "it out of the layout's axes, or ask nan of it"
+            "it out of the layout's axes, or name it in free"
         }
 
     @cached_property
@@ -195,20 +247,27 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=(0, 1))
         return axes_in(size <= NOTHING * size.max())
 
-    def bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
-        """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
-        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
-        bound = proved_power(self.compiled, wrench, price)
-        power = self.plant.power(command).sum(axis=-1)
+    def bound(self, aim: Array, price: Array, value: Array, now: Now, command: Array) -> Array:
+        """Power (N,) [W] that no answer undercuts which gives, with what may be given now, the wrenches that
+        commands (N, n, 3) give."""
+        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
+        command = np.where(works[:, None], command, self.plant.lower)
+        force = np.where(works[:, None], self.plant.force(command), 0.0)
+        wrench = wrench_of_forces(force, self.plant.effectiveness)
+        if now.free is not None:  # its price is 0
+            wrench = np.where(now.free, 0.0, wrench)
+        price = np.where(np.isfinite(price).all(axis=-1, keepdims=True), price, 0.0)
+        power = self.plant.power(command)[:, works].sum(axis=-1)
+        at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
+        bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
         if not self._measured:
             bound = np.where(_sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, value), bound)
-        elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)):
+        elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)) and works.all():
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
             raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])
-            for tried in (raised, np.zeros_like(raised)):  # the latter prove the power at rest
-                other = proved_power(self.compiled, wrench[rows], tried)
-                bound[rows] = np.maximum(0.0, np.maximum(bound[rows], other))
+            bound[rows] = np.maximum(bound[rows], proved_power(self.compiled, wrench[rows], raised, now))
+        bound = np.maximum(bound, 0.0)
         slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
@@ -223,59 +282,45 @@ class Dual(Method):
         return self.compiled.doubt is not None
 
     def forces(
-        self, targets: Array, policy: Policy | None, inner: Array | None = None, previous: Array | None = None
+        self, targets: Array, policy: Policy | None, prices: Array | None = None, now: Now = STILL
     ) -> Found:
-        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place; for a
-        single one the search begins at prices `inner` (6,) in the basis, and commands may follow `previous`
-        ones (n, 3)."""
+        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place, of
+        what may be given now; for a single one the search begins at prices (6,) of the wrench."""
         core = self.compiled.robot.core
         if len(targets) == 1:
-            return core.one(targets[0], policy, inner, previous)
-        return core.many(targets, policy)
+            return core.one(targets[0], policy, prices, now)
+        return core.many(targets, policy, now)
 
-    def exact(self, found: Found, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give what was found exactly, by the plant; from tick to tick as near as
-        what may follow the `previous` ones (n, 3) comes."""
-        command, missing = found.command, self._missing(found.command, found.aim)
+    def exact(self, found: Found, now: Now = STILL) -> Array:
+        """Commands (N, n, 3) that give what was found exactly, by the plant, within what may be given now; or
+        as near to it as they come."""
+        command = found.command
+        problem = self.problem_now(now)
+        missing = problem.wrench(command) - found.aim / self.scale
+        if problem.counts is not None:
+            missing = np.where(problem.counts, missing, 0.0)
         if (each := missing.ravel()).dot(each) <= EXACT**2:
             return command
         rough = np.flatnonzero(_sizes(missing) > EXACT)
         if not len(rough):
             return command
-        if previous is not None:
-            return self._follow(found, previous)
-        ends = refine(self.problem, found.aim[rough] / self.scale, command[rough], ROUNDS, EXACT)
+        ends = refine(problem, found.aim[rough] / self.scale, command[rough], ROUNDS, EXACT)
         command[rough] = ends.command
+        if now.previous is not None:
+            return self.rates.box(now.previous).held(command, self.plant)
         for row in rough[(ends.error > NEARLY) & found.within[rough]].tolist():
             # Such as idle fins in line, or a least force: no small change of these commands helps.
             draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
             shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
             starts = command[row] + shares * draw * self.problem.width
-            other = self._meeting(found.aim[row] / self.scale, starts)
+            other = self._meeting(problem, found.aim[row] / self.scale, starts)
             command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
-    def _follow(self, found: Found, previous: Array) -> Array:
-        """Steps by the laws on a command of a tick, in the box of what may follow the previous one (n, 3)."""
-        if self.rates.allow(previous, found.command[0]):
-            free = self.exact(found._replace(command=found.command.copy()))
-            if self.rates.allow(previous, free[0]):
-                return free
-        box = self.rates.box(previous)
-        full = box.free[:, 2] & self.plant.full_turn
-        problem = replace(self.problem, lower=box.lower, upper=box.upper, full_turn=full)
-        start = box.clipped(found.command)
-        command = refine(problem, found.aim / self.scale, start, TICK_STEPS, EXACT).command
-        command = self.plant.feasible(box.clipped(command))
-        rested = self.plant.rested(command)
-        return np.where(box.clipped(rested) == rested, rested, command)
-
-    def error(self, command: Array, aim: Array) -> Array:
-        return _sizes(self._missing(command, aim))
-
-    def _missing(self, command: Array, aim: Array) -> Array:
-        """What commands (N, n, 3) give beside wrenches (N, 6) that they are to give, normalized."""
-        return np.asarray(self.problem.wrench(command) - aim / self.scale)
+    def error(self, command: Array, aim: Array, now: Now = STILL) -> Array:
+        """Distance (N,), on the yardstick, of what commands (N, n, 3) give now from wrenches (N, 6)."""
+        missing = self.problem_now(now).wrench(command) - aim / self.scale
+        return _sizes(missing if now.free is None else np.where(now.free, 0.0, missing))
 
 
 def _sizes(missing: Array) -> Array:

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
@@ -27,13 +28,15 @@ class DualRobot:
         yardstick: Array,
         beside: Array | None = None,
         doubt: Array | None = None,
+        counts: Array | None = None,
     ) -> None:
         """Takes what the actuators offer, how forces become commands, least and largest commands, largest
         changes in a tick and free angles (n, 3), the wrench (n, 3, 6) per newton along their own axes, the
-        yardstick (6,) of errors, the wrench (6,) on top of that of the forces [N, N m], and what a squared
-        force of each foil costs beside its power (n,) [W/N^2]."""
+        yardstick (6,) of errors, the wrench (6,) on top of that of the forces [N, N m], what a squared
+        force of each foil costs beside its power (n,) [W/N^2], and 1 of axes (6,) that count, else 0."""
         self.responses, self._forms, self._limits = responses, forms, limits
         self.yardstick, self.beside = yardstick, np.zeros(6) if beside is None else beside
+        self._counts = np.ones(6) if counts is None else counts
         self._doubt = np.zeros(len(responses)) if doubt is None else doubt
         self.ends = np.array([each.ends for each in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
@@ -64,8 +67,7 @@ class DualRobot:
         size = np.sqrt((scaled**2).sum(axis=0))
         self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
-        left, values, _ = np.linalg.svd((scaled / self.scale).T, full_matrices=False)
-        self.basis = left[:, values > NOTHING * max(values[0], 1e-300)]
+        self.basis = self.span(np.ones(len(responses), bool), np.ones(6, bool))
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
         self.rows = np.pad(self.basis.T, ((0, 6 - self.basis.shape[1]), (0, 0)))
         """The same (6, 6) as rows, zeros behind them."""
@@ -73,6 +75,14 @@ class DualRobot:
         """The numbers of finlab/core/core.h."""
         self.core = Core(self.block, len(responses))
         """The robot in the core."""
+
+    def span(self, works: NDArray[np.bool_], counts: NDArray[np.bool_]) -> Array:
+        """Returns directions (6, r) of scaled wrenches, orthonormal, that the actuators which work (n,) drive
+        in the axes that count (6,)."""
+        scaled = self.effectiveness * self._sizes[..., None] / self.scale
+        columns = np.where(works[:, None, None] & counts, scaled, 0.0).reshape(-1, 6).T
+        left, values, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(left[:, values > NOTHING * max(values[0], 1e-300)])
 
     @cached_property
     def largest_power(self) -> float:
@@ -97,7 +107,7 @@ class DualRobot:
         matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
         length = HEAD + EACH * len(self.responses) + len(self._tables)
         head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
-        parts: list[Any] = [head, self.scale, self.yardstick, self.beside, self.rows.T.ravel()]
+        parts: list[Any] = [head, self.scale, self.yardstick, self._counts, self.beside, self.rows.T.ravel()]
         for i, (each, form, places) in enumerate(zip(self.responses, self._forms, self._places, strict=True)):
             ahead, back, gauge, law, beat = places
             low, high = self.ends[i]

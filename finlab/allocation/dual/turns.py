@@ -17,7 +17,7 @@ from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.core.calls import Found
+from finlab.core.calls import Found, Now
 from finlab.core.whole import Beside, Ended, Whole
 from finlab.interaction.jets import JetInteraction
 from finlab.precision import CLOSE, NEARLY, ROUNDS
@@ -44,44 +44,46 @@ def whole_of(dual: Any) -> Whole:
     return Whole(robot.block, Beside(frames, plant.counts, inflow, jets, known.effect))
 
 
-def settled(
-    dual: Any, targets: Array, policy: Policy, previous: Array | None, prices: Array | None
-) -> Solution:
-    """Returns the answers of method `dual` to targets (N, 6); arguments as for `Dual.solve`."""
-    parts, notes = [], set()
+def settled(dual: Any, targets: Array, policy: Policy, now: Now, prices: Array | None) -> Solution:
+    """Returns the answers of method `dual` to targets (N, 6), with what may be given now; arguments as for
+    `Dual.solve`."""
+    parts: list[tuple[Array, Array, Array]] = []
+    notes: set[str] = set()
     for target in targets:
-        found = _settled(dual, target, policy, previous, prices)
-        command, aim = dual.exact(found, previous), found.aim
+        found = _settled(dual, target, policy, now, prices)
+        command, aim = dual.exact(found, now), found.aim
         if policy.kind == "direction" and not found.within.all():
-            command, aim = _on_the_ray(dual, target[None], command)
-        if dual.error(command, target[None])[0] > NEARLY:
-            notes |= dual.not_held(target[None])
+            command, aim = _on_the_ray(dual, target[None], command, now)
+        if dual.error(command, target[None], now)[0] > NEARLY:
+            notes |= dual.not_held(target[None], now)
         parts.append((command, aim, found.price))
     command, aim, price = map(np.concatenate, zip(*parts, strict=True))
-    bound = None if dual.unproved else partial(dual.bound, aim, price, np.zeros(len(aim)))
-    return Solution(command, bound, prices=price, notes=tuple(sorted(notes - {""})))
+    solution: Solution = dual.solution(command, aim, price, np.zeros(len(aim)), notes, now)
+    return solution
 
 
-def _settled(dual: Any, target: Array, policy: Policy, previous: Array | None, prices: Array | None) -> Found:
+def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array | None) -> Found:
     """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
     whole: Whole = dual.whole
-    if previous is not None:
-        return whole.settled(target, None, IN_A_TICK, policy, prices, previous).found
-    laws: Found = dual.forces(target[None], policy, dual.begin(prices))
-    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0])
+    if now.previous is not None:
+        return whole.settled(target, None, IN_A_TICK, policy, prices, now).found
+    laws: Found = dual.forces(target[None], policy, prices, now)
+    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0], now)
 
     def better(starts: Array, followed: int) -> bool:
         """Whether some of other forces (K, n, 2) come to less; then the best is that."""
         nonlocal best
         before = best
-        tried = [whole.settled(target, start, 0, worth=best.worth) for start in starts]
+        tried = [whole.settled(target, start, 0, now=now, worth=best.worth) for start in starts]
         merits = [one.power + one.worth * one.error for one in tried]
         for k in np.argsort(merits)[:followed]:
-            other = whole.settled(target, tried[k].found.force[0], ROUNDS, policy, laws.price[0])
+            force = tried[k].found.force[0]
+            other = whole.settled(target, force, ROUNDS, policy, laws.price[0], now)
             best = other if _beats(other, best) else best
         return best.power < (1.0 - 10.0 * CLOSE) * before.power
 
-    dearer = (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command).sum())
+    works = slice(None) if now.lost is None else ~now.lost
+    dearer = (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command)[:, works].sum())
     if best.power > dearer:
         back, lines = 1.0 - 2.0 * np.eye(len(laws.force[0]))[..., None], dual.compiled.robot.lines
         for _ in range(ROUNDS):
@@ -97,23 +99,24 @@ def _beats(one: Ended, other: Ended) -> bool:
     return nearer > NEARLY or (nearer >= -NEARLY and one.power < other.power)
 
 
-def _on_the_ray(dual: Any, target: Array, command: Array) -> tuple[Array, Array]:
+def _on_the_ray(dual: Any, target: Array, command: Array, now: Now) -> tuple[Array, Array]:
     """The command (1, n, 3) near to another one that gives the largest share of a target (1, 6) that steps
     come to, and that wrench."""
     along = target / dual.scale
-    share = float(
-        (dual.plant.wrench(command) / dual.scale * along).sum() / max((along * along).sum(), 1e-300)
-    )
+    problem = dual.problem_now(now)
+    share = float((problem.wrench(command) * along).sum() / max((along * along).sum(), 1e-300))
     low, high, best = 0.0, min(max(share * (1.0 + CLOSE), 0.0), 1.0), command
     for k in range(ROUNDS):
         tried = high if k == 0 else 0.5 * (low + high)
-        ends = refine(dual.problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
+        ends = refine(problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
         if ends.error[0] <= NEARLY:
             low, best = tried, ends.command
         else:
             high = tried
         if high - low <= CLOSE * high:
             break
+    if now.previous is not None:
+        best = dual.rates.box(now.previous).held(best, dual.plant)
     return best, low * target
 
 

@@ -23,6 +23,11 @@ class Box(NamedTuple):
     turns: NDArray[np.bool_]
     """Angles (n, 3) that are counted around the circle."""
 
+    def held(self, command: Array, plant: Plant) -> Array:
+        """Returns commands (..., n, 3) brought into the box, their angles within the limits of a robot; NaN
+        of a lost actuator stays."""
+        return plant.feasible(self.clipped(command))
+
     def clipped(self, command: Array) -> Array:
         """Commands (..., n, 3) brought into the box."""
         middle = 0.5 * (self.lower + self.upper)

@@ -1,0 +1,140 @@
+/* What may be given now: commands within limits and rates, and the forces that these give.
+
+   A tick is the same question as any other, asked of smaller sets: a command changes by its rate times the period at
+   most, which leaves a box around the command before, and what forces the box gives is the actuator's set. Limits,
+   losses and rates are all sets; nothing else of the core knows of them. */
+#include "inner.h"
+
+#define LEAST_POWER R(1e-3) /* of full power, that counts as the mean power of the commands before, for turning */
+
+int is_known(const real *command) {
+  return command[0] == command[0] && command[1] == command[1] && command[2] == command[2];
+}
+
+/* The limits of all commands of an actuator. */
+static void whole_box(const real *block, fl_box *box, int i) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  memcpy(box->low[i], a->lower, sizeof a->lower);
+  memcpy(box->high[i], a->upper, sizeof a->upper);
+  box->free[i] = a->turns != 0;
+}
+
+/* The commands of an actuator that may follow one before; an angle that turns freely is counted from there. */
+static void box_after(const real *block, fl_box *box, int i, const real *before) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  for (int k = 0; k < 3; k++) {
+    const int turns = k == angle_of(a) && a->turns != 0;
+    if (turns && !(a->step[k] < PI)) continue;
+    if (turns) {
+      box->low[i][k] = before[k] - a->step[k];
+      box->high[i][k] = before[k] + a->step[k];
+      box->free[i] = 0;
+      continue;
+    }
+    const real middle = (a->lower[k] + a->upper[k]) / 2;
+    real center = before[k];
+    if (k == angle_of(a)) center = middle + wrapped(center - middle); /* an arc may be told a turn off */
+    center = CLIP(center, a->lower[k], a->upper[k]);
+    box->low[i][k] = MAX(center - a->step[k], a->lower[k]);
+    box->high[i][k] = MIN(center + a->step[k], a->upper[k]);
+  }
+}
+
+/* Commands in the box of a tick, their angles within the limits of the actuators: the last look at all that leaves. */
+void into_box(const real *block, const fl_box *box, real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const int angle = angle_of(a);
+    for (int k = 0; k < 3; k++) {
+      real value = command[i][k];
+      if (!(k == angle && box->free[i])) value = held_in(box, i, k, angle, value);
+      if (k == angle) {
+        const real middle = (a->lower[k] + a->upper[k]) / 2;
+        value = middle + wrapped(value - middle);
+      }
+      command[i][k] = CLIP(value, a->lower[k], a->upper[k]);
+    }
+  }
+}
+
+/* Mean power [W] of the actuators at the commands before, and a little of full power, as there is none at rest. */
+static real mean_power(const real *block, const fl_work *work, const real *previous) {
+  real power = 0;
+  real full = 0;
+  int count = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const real *before = previous + 3 * i;
+    if (work->span.lost[i]) continue;
+    count++;
+    full += MAX(cost_at(block, i, a->high), cost_at(block, i, a->low));
+    if (!is_known(before)) continue;
+    real force[3];
+    force_of(block, i, before, force, 0);
+    real size = is_plane(a) ? size_of(force + 1) : a->sign * force[0];
+    if (a->form == FL_POD && before[1] < 0) size = -size;
+    if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(force[2], force[1]));
+    power += cost_at(block, i, CLIP(size, a->low, a->high));
+  }
+  return MAX(power, LEAST_POWER * full) / MAX(count, 1);
+}
+
+/* Whether rates leave a number of a command all of its range. */
+static int is_free(const real *block, const fl_box *box, int i, int k) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  return box->low[i][k] <= a->lower[k] && box->high[i][k] >= a->upper[k];
+}
+
+/* The set of an actuator in a tick, and what turning costs there. */
+static void tick_set(const real *block, fl_work *work, int i, const real *before, real kappa) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  fl_set *set = work->set + i;
+  const int all_sizes = is_free(block, &work->box, i, 0) && is_free(block, &work->box, i, 1);
+  const int all_angles = is_free(block, &work->box, i, 2);
+  reach own = reach_of(block, i, &work->box);
+  if (a->form == FL_FIN && all_sizes) {
+    own.low = a->low;
+    own.high = a->high;
+  }
+  if (all_sizes && all_angles && !(kappa > 0)) own = (reach){a->least, a->high, a->middle, a->half, 0};
+  const real low = CLIP(own.low, a->low, a->high);
+  const real high = CLIP(own.high, a->low, a->high);
+  limit(block, i, set, low, high, own.middle, own.half);
+  if (!is_plane(a) || !(kappa > 0)) return;
+  const real at = before[angle_of(a)] + own.lean + (set->flipped ? PI : 0);
+  set->turn = kappa;
+  set->at = set->middle + wrapped(at - set->middle);
+}
+
+/* Limits of commands and sets of forces: those of a tick after commands (n, 3) of which rows may be NaN, or all. Turning
+   costs kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn of a tick. */
+void set_limits(const real *block, fl_work *work, const real *previous, real calm) {
+  real power = 0;
+  if (previous && calm > 0) power = mean_power(block, work, previous);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    whole_box(block, &work->box, i);
+    if (work->span.lost[i]) {
+      leave_out(block, i, work->set + i);
+      continue;
+    }
+    if (!previous || !is_known(previous + 3 * i)) {
+      limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
+      continue;
+    }
+    const int angle = angle_of(a);
+    real kappa = 0;
+    if (angle >= 0 && a->step[angle] > 0 && a->step[angle] < R(1e6)) kappa = calm * power / a->step[angle];
+    box_after(block, &work->box, i, previous + 3 * i);
+    tick_set(block, work, i, previous + 3 * i, kappa);
+  }
+  work->is_whole = !previous;
+  sums_of(block, work);
+}
+
+/* Prepares the work area for what holds now; 0 where its numbers are out of range. */
+int stand_as(const real *block, fl_work *work, const fl_now *now) {
+  if (!span_now(block, work, now->lost, now->free)) return 0;
+  if (now->previous || !work->is_whole) set_limits(block, work, now->previous, now->calm);
+  return 1;
+}

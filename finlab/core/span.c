@@ -1,0 +1,185 @@
+/* What the actuators that work span in the axes that count.
+
+   Scaled wrenches are w / scale; their range is spanned by the columns of an orthonormal basis Q (6 x r), in which an
+   actuator's effectiveness is the matrix Q' B. An axis that does not count has no row in B, so its price is held at 0; an
+   actuator that is lost has no column. Python has prepared all of it for a whole robot; any other state follows here, in
+   a few microseconds, and is kept until the next question asks for another one. */
+#include "inner.h"
+
+/* Squared length, over that of the longest column, below which nothing is left of the columns. */
+#define DEPENDENT (NOTHING * NOTHING)
+
+/* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be commanded against their force. */
+static const real *law_axis(const fl_actuator *a, int row) {
+  const int first = is_plane(a) ? 1 : 0;
+  return a->own[first + row];
+}
+
+/* Wrench [N, N m] per newton of a row of an actuator, 0 in axes that do not count. */
+static void column_of(const real *block, const fl_span *span, int i, int row, real *column) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *yard = HEAD(block)->yard;
+  const real *axis = law_axis(a, row);
+  real sign = 1;
+  if (a->form == FL_THRUSTER) sign = a->sign;
+  if (row >= a->rows) sign = 0;
+  if (span->lost[i]) sign = 0;
+  for (int k = 0; k < 6; k++) {
+    column[k] = 0;
+    if (span->counts[k]) column[k] = sign * yard[k] * axis[k];
+  }
+}
+
+/* Size of what the robot can push along each axis; 1 where it cannot. */
+static void scale_of(const real *block, fl_span *span) {
+  real size[6] = {0};
+  real most = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    for (int row = 0; row < 2; row++) {
+      real column[6];
+      column_of(block, span, i, row, column);
+      for (int k = 0; k < 6; k++) {
+        const real largest = column[k] * ACTUATOR(block, i)->most[row];
+        size[k] += largest * largest;
+      }
+    }
+  }
+  for (int k = 0; k < 6; k++) most = MAX(most, size[k]);
+  for (int k = 0; k < 6; k++) {
+    span->scale[k] = 1;
+    if (size[k] > DEPENDENT * most) span->scale[k] = SQRT(size[k]);
+  }
+}
+
+/* The orthonormal basis of all columns, by Gram and Schmidt, the longest first. */
+static void basis_of(const real *block, fl_span *span) {
+  const int n = COUNT(block);
+  real rest[2 * FL_MOST][6];
+  real longest = 0;
+  for (int p = 0; p < 2 * n; p++) {
+    column_of(block, span, p / 2, p % 2, rest[p]);
+    for (int k = 0; k < 6; k++) rest[p][k] *= ACTUATOR(block, p / 2)->most[p % 2] / span->scale[k];
+  }
+  memset(span->basis, 0, sizeof span->basis);
+  span->range = 0;
+  while (span->range < 6) {
+    int best = 0;
+    for (int p = 1; p < 2 * n; p++)
+      if (dot(rest[p], rest[p], 6) > dot(rest[best], rest[best], 6)) best = p;
+    const real square = dot(rest[best], rest[best], 6);
+    if (span->range == 0) longest = square;
+    if (!(square > DEPENDENT * longest)) return;
+    real q[6];
+    for (int k = 0; k < 6; k++) {
+      q[k] = rest[best][k] / SQRT(square);
+      span->basis[k][span->range] = q[k];
+    }
+    for (int p = 0; p < 2 * n; p++) {
+      const real along = dot(rest[p], q, 6);
+      for (int k = 0; k < 6; k++) rest[p][k] -= along * q[k];
+    }
+    span->range++;
+  }
+}
+
+static void matrices_of(const real *block, fl_span *span) {
+  for (int i = 0; i < COUNT(block); i++) {
+    for (int row = 0; row < 2; row++) {
+      real column[6];
+      column_of(block, span, i, row, column);
+      for (int j = 0; j < 6; j++) {
+        real sum = 0;
+        for (int k = 0; k < 6; k++) sum += span->basis[k][j] * (column[k] / span->scale[k]);
+        span->matrix[i][row][j] = sum;
+      }
+    }
+  }
+}
+
+/* As Python has prepared it: of a robot all of whose actuators work and all of whose axes count. */
+static void take_prepared(const real *block, fl_span *span) {
+  const fl_head *h = HEAD(block);
+  memcpy(span->scale, h->scale, sizeof span->scale);
+  memcpy(span->basis, h->basis, sizeof span->basis);
+  for (int i = 0; i < COUNT(block); i++) memcpy(span->matrix[i], ACTUATOR(block, i)->matrix, sizeof span->matrix[i]);
+  span->range = (int)h->range;
+}
+
+/* The wrench beside the forces, less the drag at rest of foils that are lost. */
+void beside_of(const real *block, fl_span *span) {
+  const fl_head *h = HEAD(block);
+  for (int k = 0; k < 6; k++) {
+    real sum = h->beside[k];
+    for (int i = 0; i < COUNT(block); i++) {
+      const fl_actuator *a = ACTUATOR(block, i);
+      if (span->lost[i] && a->form == FL_FOIL) sum -= a->pressure * a->rest * a->own[1][k] * h->yard[k];
+    }
+    span->beside[k] = span->counts[k] ? sum : 0;
+  }
+}
+
+/* What follows from the matrices for Newton's method: the Hessian of quadratic costs, and its factor. */
+static int prepare_newton(const real *block, fl_work *work) {
+  const fl_span *span = &work->span;
+  real(*h)[6] = work->factor;
+  memset(work->factor, 0, sizeof work->factor);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    for (int row = 0; row < (int)a->rows; row++) add_square(h, span->matrix[i][row], a->gain[row]);
+  }
+  const real trace = trace_of(h);
+  for (int j = 0; j < 6; j++)
+    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * span->range / MAX(trace, TINY) + (j == k ? NEARLY : 0);
+  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
+  work->least_trace = NEARLY * trace;
+  return span->range == 0 || factor(h);
+}
+
+/* Prepares the state of a robot anew; 0 where its numbers are out of range. */
+int span_anew(const real *block, fl_work *work, int is_as_prepared) {
+  fl_span *span = &work->span;
+  if (is_as_prepared)
+    take_prepared(block, span);
+  else {
+    scale_of(block, span);
+    basis_of(block, span);
+    matrices_of(block, span);
+  }
+  beside_of(block, span);
+  work->is_whole = 0;
+  if (prepare_newton(block, work)) return 1;
+  memset(span->lost, 2, sizeof span->lost); /* so that no question is taken for one of this state */
+  return 0;
+}
+
+/* Prepares the state in which some actuators (n,) are lost and some axes (6,) free, each 0 for none, unless the last
+   question had the same; 0 where its numbers are out of range. */
+int span_now(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free) {
+  fl_span *span = &work->span;
+  int is_same = 1;
+  int is_as_prepared = 1;
+  for (int i = 0; i < COUNT(block); i++) {
+    const unsigned char gone = lost && lost[i];
+    is_same &= span->lost[i] == gone;
+    is_as_prepared &= !gone;
+    span->lost[i] = gone;
+  }
+  for (int k = 0; k < 6; k++) {
+    const unsigned char prepared = HEAD(block)->counts[k] != 0;
+    const unsigned char counts = prepared && !(free && free[k]);
+    is_same &= span->counts[k] == counts;
+    is_as_prepared &= counts == prepared;
+    span->counts[k] = counts;
+  }
+  if (is_same) return 1;
+  return span_anew(block, work, is_as_prepared);
+}
+
+/* Prepares a work area for the whole robot; an error code. */
+int fl_prepare(const real *block, fl_work *work) {
+  memset(&work->span, 0, sizeof work->span);
+  for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
+  if (!span_anew(block, work, 1)) return FL_BAD_NUMBER;
+  set_limits(block, work, 0, 0);
+  return 0;
+}
