@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
-from finlab.allocation.policy import CLOSEST, Policy, limits_reached
+from finlab.allocation.binding import what_binds
+from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.rates import USUAL_PERIOD_S
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
@@ -262,13 +264,15 @@ class Allocation(Answer[float]):
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits that keep the robot from delivering the target.
+        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering the target.
 
         None where it does, nor where its networks do not know the fins: then limits are not what keeps it.
         """
         if self.reachable or self.unknown_fins:
             return ()
-        return limits_reached(self.layout, self.command)
+        period_s = float(self.settings.get("period_s", USUAL_PERIOD_S))
+        missing = self.unallocated / self.scale
+        return what_binds(self.layout, self.command, missing, self.previous, period_s)
 
     def with_command(self, command: Array) -> Self:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""

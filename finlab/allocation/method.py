@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from finlab.allocation.policy import Policy
-from finlab.allocation.rates import Rates
+from finlab.allocation.rates import USUAL_PERIOD_S, Rates
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -19,8 +19,6 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import following_delay
 
-USUAL_PERIOD_S = 0.1
-"""Time between ticks of methods for which it is no setting [s]."""
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
 

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import Array
 from finlab.axes import AXES as AXES
-from finlab.axes import is_full_turn, mask_of
+from finlab.axes import mask_of
 from finlab.errors import CommandError
-from finlab.layout import Layout
 
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
@@ -73,43 +71,6 @@ CLOSEST = Policy()
 def as_policy(policy: Policy | str) -> Policy:
     """A policy from its name."""
     return policy if isinstance(policy, Policy) else Policy(policy)
-
-
-def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
-    """Sentences about the actuators of a robot that a command (n, 3), NaN for a failed one, has at their
-    limits."""
-    full, ended = at_limits(layout, command)
-    return limit_words(layout, full, ended)
-
-
-def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which actuators commands (..., n, 3) have at full thrust (..., n), and which at the end of their arc,
-    within a thousandth of each range; a failed one (NaN) is at neither."""
-    full, ended = (np.zeros(command.shape[:-1], bool) for _ in range(2))
-    for i, part in enumerate(layout.actuators):
-        row, low, high = command[..., i, :], np.array(part.lower), np.array(part.upper)
-        pushes, angle = not part.BY_FLOW, -1 if part.ANGLE is None else part.ANGLE
-        angle = angle if pushes else 0  # all that a foil is told
-        slack = 1e-3 * (high - low) + 1e-9
-        at_low, at_high = row <= low + slack, row >= high - slack
-        sizes = np.arange(3) != angle
-        if pushes:
-            full[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)
-        if angle >= 0 and not is_full_turn(high[angle] - low[angle]):
-            rests = at_low[..., sizes].all(-1) if pushes else False
-            ended[..., i] = ~np.asarray(rests) & (at_low | at_high)[..., angle]
-    return full, ended
-
-
-def limit_words(layout: Layout, full: NDArray[np.bool_], ended: NDArray[np.bool_]) -> tuple[str, ...]:
-    """The same flags (n,) as sentences."""
-    pairs = zip(layout.names, full, ended, strict=True)
-    return tuple(
-        f"{name} at {what}"
-        for name, *flags in pairs
-        for what, flag in zip(("full thrust", "the end of its arc"), flags, strict=True)
-        if flag
-    )
 
 
 def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None) -> Policy:

@@ -147,7 +147,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = a->form == FL_POD ? 1 : 0;
-    const real inside = a->band * (1 - NEARLY);
+    const real inside = a->band * (1 - 10 * NEARLY);
     real wanted[3];
     if (work->span.lost[i] || !is_in_band(a, command[i]) || size_of(later.force[i]) < inside) continue;
     command_for(block, i, &box, later.force[i], q->now.previous + 3 * i, wanted);

@@ -25,19 +25,23 @@ static int force_number(const fl_actuator *a) {
   return -1;
 }
 
-/* Whether a command lies in the dead band of its actuator, where it gives no force. */
+/* Whether a command lies in the dead band of its actuator, where it gives no force; on its edge but for rounding it
+   does not. */
 int is_in_band(const fl_actuator *a, const real *command) {
   const int k = force_number(a);
-  return k >= 0 && FABS(command[k]) < a->band;
+  return k >= 0 && FABS(command[k]) < a->band * (1 - NEARLY);
 }
 
-/* Has commands inside a dead band rest, where the box allows. */
+/* Has commands inside a dead band rest, where the box allows, and puts those that rounding took from the edge there. */
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    if (!is_in_band(a, command[i])) continue;
     const int k = force_number(a);
-    if (box->low[i][k] <= 0 && box->high[i][k] >= 0) command[i][k] = 0;
+    if (k < 0 || !(FABS(command[i][k]) < a->band)) continue;
+    if (!is_in_band(a, command[i]))
+      command[i][k] = command[i][k] < 0 ? -a->band : a->band;
+    else if (box->low[i][k] <= 0 && box->high[i][k] >= 0)
+      command[i][k] = 0;
   }
 }
 

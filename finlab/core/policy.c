@@ -228,6 +228,6 @@ void in_its_place(const real *block, fl_work *work, const real *wrench, const fl
     memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
   else if (gap >= 0 && least_power(block, work, target, status, &value)) {
     memcpy(out->force, work->best, COUNT(block) * sizeof out->force[0]);
-    out->value = value * (1 - FINE);
+    out->value = work->turns ? 0 : value * (1 - FINE); /* with turning it is more than power */
   }
 }

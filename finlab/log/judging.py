@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import Allocator
-from finlab.allocation.policy import CLOSEST, Policy, at_limits, limit_words
+from finlab.allocation.binding import at_limits, limit_words
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
 from finlab.axes import AXES, axes_in

@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from finlab.allocation import Allocation
-from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, limits_reached, policy_from
+from finlab.allocation.binding import limits_reached
+from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, policy_from
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits, load_layout
