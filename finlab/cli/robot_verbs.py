@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from math import isnan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,6 +16,7 @@ def allocate(
     layout: shared_options.Robot,
     wrench: Annotated[shared_options.Wrench, arg(metavar="FX FY FZ TX TY TZ")],
     lost: shared_options.Lost = (),
+    free: shared_options.Free = (),
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     robust: Annotated[float | None, arg(metavar="W")] = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
@@ -35,8 +35,9 @@ def allocate(
     """Find the command of each fin that gives a target wrench.
 
     Args:
-        wrench: target in the body frame [N, N m]; nan for an axis that does not count.
+        wrench: target in the body frame [N, N m].
         lost: name of an actuator that does not work.
+        free: an axis that may take any wrench, such as Ty.
         method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
@@ -56,14 +57,14 @@ def allocate(
     from finlab.layout.damage import Damage
 
     shared_options.check_json_file(json)
-    if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
-        raise FinlabError("wrench: asks for nothing, since every axis is 0 or free; expected a value on one")
     robot, gone = shared_options.open_robot(layout, lost)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Damage.parse(gone, weak, torn, stuck, running)
-    result = allocator.allocate(wrench, damage=damage, policy=answer, flow=flow, seed=seed)
+    result = allocator.allocate(
+        wrench, damage=damage, free=free, policy=answer, flow=flow, seed=seed
+    )
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")

@@ -25,6 +25,7 @@ Wrench = tuple[float, float, float, float, float, float]
 Flow = Annotated[Wrench | None, arg(metavar="VX VY VZ WX WY WZ", help=FLOW)]
 Robot = Annotated[Positional[str], arg(metavar="LAYOUT", help=LAYOUT)]
 Lost = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME", aliases=["--failed"])]
+Free = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXIS")]
 Count = Annotated[int, arg(metavar="N")]
 Cluster = Annotated[str | None, arg(metavar="ADDRESS", help=CLUSTER)]
 

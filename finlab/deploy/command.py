@@ -70,6 +70,7 @@ def allocate(arguments: argparse.Namespace) -> int:
     answer = _robot(arguments).allocate(
         arguments.wrench,
         failed=arguments.failed,
+        free=arguments.free,
         policy=arguments.policy,
         flow=arguments.flow,
         seed=arguments.seed,
@@ -142,6 +143,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="actuator that is lost",
     )
+    axes = "axis that may take any wrench, such as Ty"
+    one("--free", action="append", default=[], metavar="AXIS", help=axes)
     one("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
     through = "velocity relative to the water [m/s, rad/s]"

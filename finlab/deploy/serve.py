@@ -1,8 +1,8 @@
 """`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any more.
 
-A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed`, `policy`, `reference`, the
-wrenches that are expected at the next ticks of 0.1 s, and `flow`, the velocity of the body relative to the
-water [m/s, rad/s], if wanted. Each answer says in `status` what it is:
+A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free` (names of
+axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at the next ticks, and
+`flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted. Each answer says in `status` what it is:
 
 =========  ============================================================================================
 status     meaning
@@ -13,7 +13,7 @@ status     meaning
            `neutral`; `error` holds one sentence and there are no commands
 =========  ============================================================================================
 
-From one answer to the next, commands change no faster than the servos' rates allow in a tick of 0.1 s.
+From one answer to the next, commands change no faster than the drives' rates allow in a tick.
 Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
 the past; one that is older than the watchdog allows, as after a pause of the process, is dropped. However the
 service ends, a neutral command is the last that it sends.
@@ -52,6 +52,8 @@ class Request(Struct, forbid_unknown_fields=True):
     wrench: Any
     id: Any = None
     failed: list[str] = []
+    lost: list[str] = []
+    free: list[str] = []
     policy: str = "closest"
     reference: Any = None
     flow: Any = None
@@ -75,7 +77,7 @@ class Server:
     def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
         """Takes the robot, and the longest silence before its fins rest [s]; without one they never do."""
         self._robot, self._watchdog = robot, watchdog
-        self._sent: Allocation | None = None  # the last answer, None while the fins rest
+        self._sent: Allocation | Array | None = None  # the last answer, or commands of rest (n, 3)
         self._sent_at = 0.0
         self._failed: tuple[str, ...] = ()
 
@@ -124,9 +126,11 @@ class Server:
         try:
             request = parse_request(line)
             name = request.id
+            lost = (*request.lost, *request.failed)
             answer = self._robot.allocate(
                 request.wrench,
-                failed=request.failed,
+                failed=lost,
+                free=request.free,
                 previous=self._sent if fresh else None,
                 reference=request.reference,
                 policy=request.policy,
@@ -143,13 +147,16 @@ class Server:
                 self._rest(),
                 _error(name, f"the target could not be answered ({what}); the robot rests, ask again"),
             ]
-        self._failed = tuple(request.failed)
+        self._failed = lost
         self._sent, self._sent_at = answer, time.monotonic()
         return [reply]
 
     def _rest(self) -> dict[str, Any]:
-        now, self._sent = None if self._sent is None else self._sent.command, None
-        return self._reply(None, "neutral", self._robot.neutral(self._failed, now))
+        now = self._sent.command if isinstance(self._sent, Allocation) else self._sent
+        rest = self._robot.neutral(self._failed, now)
+        if self._sent is not None:  # what follows begins at rest
+            self._sent, self._sent_at = rest, time.monotonic()
+        return self._reply(None, "neutral", rest)
 
     def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
         """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""

@@ -13,6 +13,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.log.answers import answers_to
 from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log, robot_rest
 from finlab.log.recorded import Event
@@ -124,7 +125,7 @@ class Account:
             if log.unmet is not None:
                 return self.demand - log.unmet
             method = "dual" if log.form == "ros" else log.form
-            command = Allocator(log.robot, method).allocate_batch(log.demand).command
+            command = answers_to(Allocator(log.robot, method), log.demand).command
         self.full, self.ended = at_limits(log.robot, command)
         plant, delivered, energy = plant_of(log.robot), np.empty((len(log), 6)), 0.0
         for k in range(0, len(log), CHUNK):
@@ -217,7 +218,7 @@ def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
 def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
     """The layout that a search proposes for the demands that miss most, or else are largest."""
     demands = demands_of(log.demand, log.span, scale, 10 * HARDEST)
-    answer = Allocator(log.robot).allocate_batch(demands.wrench)
+    answer = answers_to(Allocator(log.robot), demands.wrench)
     size = np.linalg.norm(np.nan_to_num(demands.wrench) / scale, axis=1)
     order = np.lexsort((-size * demands.span, -np.round(answer.err_norm, 3) * demands.span))
     mission = np.nan_to_num(demands.wrench[order[:HARDEST]])

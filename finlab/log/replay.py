@@ -10,6 +10,7 @@ from finlab.allocation import Allocator
 from finlab.allocation.methods import method_class
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
+from finlab.log.answers import answers_to
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED, yardstick
 
@@ -91,9 +92,8 @@ def replay(
     for lost in (None, *gone):
         demands = intact if lost is None else rough
         for name, policy in questions:
-            answer = made[name].allocate_batch(
-                demands.wrench, lost=() if lost is None else (lost,), policy=policy
-            )
+            gone_now = () if lost is None else (lost,)
+            answer = answers_to(made[name], demands.wrench, gone_now, policy=policy)
             missing = demands.span @ np.abs(answer.unallocated)
             yield Replay(
                 robot="improved" if improved else "as it is",
