@@ -15,8 +15,8 @@ from typing import Any
 
 from finlab.errors import LayoutError
 
-MAX_LENGTH = 2000
-"""Longest expression [characters]; an ordinary one has fewer than 200."""
+MAX_LENGTH, MAX_DEPTH = 2000, 100
+"""Longest expression [characters], and deepest; ordinary ones have fewer than 200, and than 20."""
 MAX_BITS, MAX_TEXT, MAX_ITEMS = 256, 10_000, 1000
 """Largest whole number [bits], longest text [characters], most values in a list of lists."""
 MAX_DIGITS = 30
@@ -27,11 +27,11 @@ Lookup = Callable[[str], Any]
 """Returns the value that has a name; a KeyError where nothing has it."""
 
 
-def _rounded(number: float, digits: int = 0) -> float:
+def _rounded(number: float, digits: int | None = None) -> float:
     """As `round`, which takes a whole number to as many digits as it is told."""
-    if abs(digits) > MAX_DIGITS:
+    if digits is not None and abs(digits) > MAX_DIGITS:
         raise ValueError(f"more than {MAX_DIGITS} digits")
-    return round(number, digits) if digits else round(number)
+    return round(number, digits)
 
 
 def _counted(*ends: int) -> list[int]:
@@ -210,7 +210,7 @@ def _parsed(expression: str) -> ast.Expression:
 
 def _judge(tree: ast.Expression) -> None:
     """Refuses a tree that holds what is not listed, also where it would not be reached."""
-    nodes = list(ast.walk(tree))
+    nodes = _nodes(tree)
     for node in nodes:
         if not isinstance(node, _ALLOWED):
             called = _CALLED.get(type(node), type(node).__name__)
@@ -229,6 +229,23 @@ def _judge(tree: ast.Expression) -> None:
                 raise _Refused(f"holds a value of type {kind.__name__}; {EXPECTED}")
         elif isinstance(node, ast.Dict) and None in node.keys:
             raise _Refused(f"holds two stars (**); {EXPECTED}")
+
+
+def _nodes(tree: ast.Expression) -> list[ast.AST]:
+    """All nodes of a tree; refused where it is too deep to be worked out."""
+    nodes: list[ast.AST] = []
+    level: list[ast.AST] = [tree]
+    depth = 0
+    while level:
+        nodes += level
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise _Refused(f"is nested more than {MAX_DEPTH} deep; split it into properties")
+        below: list[ast.AST] = []
+        for node in level:
+            below += ast.iter_child_nodes(node)
+        level = below
+    return nodes
 
 
 def _judge_call(node: ast.Call) -> None:

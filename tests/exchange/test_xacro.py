@@ -150,7 +150,7 @@ HOSTILE = [
 def test_a_hostile_expression_is_a_sentence(folder: Path, expression: str) -> None:
     part = f"<link name={quoteattr('a${' + expression + '}')}/>"
     sentence = sentence_of(written(folder, robot(screw("s", "-1 0 0"), part)))
-    assert "${" in sentence or "nested too deep" in sentence
+    assert "${" in sentence
 
 
 CODE = f"${{(lambda: [c for c in {WALK}][0])()}}"
@@ -415,6 +415,7 @@ def test_another_xacro_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPa
         ("{'a': [1, (2, 3)]}['a'][1]", (2, 3)),
         ("1 if 'a' not in 'b' else 1 / 0", 1),
         ("math.atan2(0, 1) + python.abs(-2)", 2.0),
+        ("round(2.6, 0) / round(2.6)", 1.0),
         ("round(2.345, 2) + int('3') + float('1e3')", 1005.35),
         ("[0] + range(3)", [0, 0, 1, 2]),
         ("str(x) + '_link'", "5_link"),
