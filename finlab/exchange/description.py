@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.xml_models import Drives, Named, chosen, expanded, is_xacro, parts_of, root_of
+from finlab.exchange.xacro_files import expanded
+from finlab.exchange.xml_models import Drives, Named, chosen, is_xacro, parts_of, root_of
 
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""

@@ -1,10 +1,6 @@
-"""XML of strangers, read in linear time and without entities, xacro, and which model in it is the robot."""
+"""XML of strangers, read in linear time and without entities, and which model in it is the robot."""
 
-import subprocess
-import sys
 from collections.abc import Callable
-from importlib.util import find_spec
-from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
@@ -14,9 +10,6 @@ from finlab.exchange.labels import listed
 
 MAX_DEPTH, MAX_ELEMENTS = 100, 200_000
 """Deepest nesting and most elements that are read."""
-SECONDS, BYTES = 20, 1_000_000_000
-"""Most time and memory that it may take."""
-_PROGRAM = f"import resource, xacro; resource.setrlimit(resource.RLIMIT_AS, ({BYTES},) * 2); xacro.main()"
 Drives = Callable[[Element], bool]
 """Whether a plugin drives a thruster."""
 Named = dict[str, tuple[str, Element]]
@@ -60,23 +53,6 @@ def is_xacro(root: Element) -> bool:
     return any(each.tag.startswith("xacro:") for each in root.iter()) or any(
         "${" in text or "$(" in text for text in texts
     )
-
-
-def expanded(path: Path | None) -> str:
-    """Returns the text that xacro makes of a file. Raises LayoutError: xacro is not installed, or refuses the
-    file; or it came without a path, from a browser: expanding opens other files."""
-    if path is None or find_spec("xacro") is None:
-        why = "`finlab layout convert` expands it" if path is None else "pip install finlab-marine[xacro]"
-        raise LayoutError(f"is a xacro file, not a description; run `xacro FILE > robot.urdf` first ({why})")
-    command = [sys.executable, "-c", _PROGRAM, str(path.absolute())]
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL)
-    except subprocess.TimeoutExpired:
-        raise LayoutError(f"is a xacro file that takes over {SECONDS} s to expand") from None
-    if done.returncode:
-        words = done.stderr.decode(errors="replace").split()
-        raise LayoutError(f"is a xacro file that xacro refuses: {' '.join(words)[:300] or 'it says nothing'}")
-    return done.stdout.decode(errors="replace")
 
 
 def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
