@@ -122,11 +122,13 @@ def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np
     """Returns one solution for `count` targets and all n actuators, of which some are alive (n,), of
     solutions for some targets and those that are alive."""
     command = np.full((count, len(alive), 3), np.nan)
-    places = slice(None) if alive.all() else np.flatnonzero(alive)
+    places = np.flatnonzero(alive)
+    all_rows = True
     bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
     wrench: Array | None = None
     notes: dict[str, None] = {}
     for rows, part in parts:
+        all_rows = part.command.shape[-2] == len(alive)
         command[rows] = among_all(part.command, alive)
         notes |= dict.fromkeys(part.notes)
         if part.bound is not None:
@@ -138,7 +140,8 @@ def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np
     def bound(command: Array) -> Array:
         result = np.empty(count)
         for rows, part in bounds:
-            result[rows] = part(command[rows][:, places])
+            own = command[rows]
+            result[rows] = part(own if all_rows else own[:, places])
         return result
 
     return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))

@@ -28,7 +28,7 @@ real cost_at(const real *block, int i, real force) {
 
 /* What follows from the limits of a set, but for its angles. */
 static void set_ends(int plane, fl_set *set) {
-  real least = NOTHING * set->high_cost / MAX(set->high, TINY);
+  real least = set->high > 0 ? NOTHING * set->high_cost / set->high : 0;
   if (set->low > 0) least = MAX(least, (set->half <= NARROW ? CLOSE : TURNING) * set->low_cost / set->low);
   set->gap2 = least * least + TINY;
   set->forked = plane && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
@@ -250,7 +250,18 @@ real farthest_of(const real *block, int i, const fl_set *set, const real *price,
     farthest_foil(block, i, set, price, force);
     return price[0];
   }
-  fan f = direction_of(set, a->gauge > 0 ? block + (int)a->gauge : 0, price, TINY);
+  const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
+  fan f = direction_of(set, gauge, price, TINY);
+  if (f.beyond) { /* of an uneven fin the farther end may be worth more */
+    const real rho = gauge_or_one(gauge, f.other);
+    const real other[2] = {rho * COS(f.other), rho * SIN(f.other)};
+    const real along = dot(price, other, 2);
+    if (along > f.along) {
+      f.along = along;
+      f.x = other[0];
+      f.y = other[1];
+    }
+  }
   real size = f.along > 0 ? set->high : set->low;
   force[0] = f.x, force[1] = f.y;
   wide length = a->gauge > 0 ? 1 : product(force, force, 2); /* 1 but for rounding, which would be that of the set */

@@ -7,9 +7,10 @@ force that the same cost gives in each direction.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,8 @@ PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no end."""
 
 
-class FinTable(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FinTable:
     """How a fin answers a price, and by which commands."""
 
     table: RadialTable
@@ -50,6 +52,12 @@ class FinTable(NamedTuple):
     deflection: Array
     """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
     same."""
+
+    @cached_property
+    def rises(self) -> bool:
+        """Whether the force is largest at the largest amplitude and frequency."""
+        corner = self.box.command(self.box.upper[None, :2])
+        return float(self.box.force(corner)[0]) >= self.box.largest() * (1.0 - NEARLY)
 
     @property
     def largest(self) -> float:
@@ -77,17 +85,23 @@ class FinGroup(Group):
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law; of fins that
-        were measured nothing."""
+        were measured nothing. Where a price is below 0, or the force falls again towards its limits, from
+        a grid of commands."""
         result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
             if isinstance(table.box.law, TableLaw):
                 continue
-            paid = np.maximum(price[:, i], 0.0)
-            place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
+            own = price[:, i]
+            place = np.interp(own, price_grid(table.table.top), table.table.force) / self._largest[i]
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
-            command = table.box.best(paid, starts)
-            result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+            command = table.box.best(own, starts)
+            worth = own * table.box.force(command) - table.box.power(command)
+            if not table.rises or (own < 0.0).any():
+                command = table.box.best(own)
+                other = own * table.box.force(command) - table.box.power(command)
+                worth = np.maximum(worth, other)
+            result[:, i] = worth
         return result
 
     def worth(self, price: Array) -> Array:

@@ -261,7 +261,7 @@ class Dual(Method):
         at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
         bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
         if not self._measured:
-            bound = np.where(_sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, value), bound)
+            bound = np.where(_sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, (1.0 - CLOSE) * value), bound)
         elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)) and works.all():
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
