@@ -73,9 +73,10 @@ class Faults(NamedTuple):
     torn: float | None = None
     """Share of its force that it gives at every command, as one with a torn blade does."""
     stuck: float | None = None
-    """Angle [rad] at which it no longer turns; it still pushes."""
-    running: axes.Vector | None = None
-    """Command that it keeps whatever is asked."""
+    """Where it stays: the angle [rad] at which one that turns no longer turns, though it still pushes; the
+    force [N] at which a thruster hangs."""
+    running: tuple[float, ...] | None = None
+    """Command that it keeps whatever is asked, the kind's `NUMBERS` in order."""
 
 
 class Box(NamedTuple):

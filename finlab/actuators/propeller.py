@@ -3,16 +3,19 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from msgspec import Meta
 
 from finlab.actuators.actuator import Actuator, Box, Command
+from finlab.actuators.form import Form
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.arrays import AnyArray, Array, Values
+from finlab.errors import AllocationError
+from finlab.precision import NEARLY, NOTHING
 
 ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
 Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
@@ -20,6 +23,8 @@ T200 = PowerLaw(0.997, 1.449)
 """Power of a T200 of Blue Robotics at 16 V."""
 T200_FORCE, T200_DIAMETER = 51.44, 0.076
 """Its largest force [N], and the diameter of its propeller [m]."""
+LEAST_DIAMETER = 1e-3
+"""The smallest diameter that a propeller may have [m]."""
 OpenWater = tuple[Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]]
 LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
 
@@ -52,6 +57,7 @@ class Propeller(Actuator):
     )
 
     MODELS = ("power_law",)
+    UNSAID: ClassVar[tuple[str, ...]] = ("hangs",)
 
     force: tuple[float, float]
     model: ThrustModel
@@ -59,6 +65,25 @@ class Propeller(Actuator):
     rate: float | None
     diameter: float | None
     open_water: tuple[float, float] | None
+    hangs: bool
+
+    def hung(self, force: float) -> Self:
+        """Returns it with a force [N] as its only one, at which it hangs whatever is asked.
+
+        The propeller is the same: a jet that was guessed from the largest force stays as it is. Raises
+        AllocationError: it cannot give that force, which is not clipped, since then the others would make up
+        for a force that is not there.
+        """
+        least, most = self.force
+        rounding = NEARLY * max(-least, most)
+        if not least - rounding <= force <= most + rounding:
+            raise AllocationError(
+                f"damage of {self.name!r}: expected a force from {least:g} to {most:g} N, which is what this "
+                f"{self.type} can give, got {force:g} N"
+            )
+        held = min(max(force, least), most)
+        diameter = self.diameter or max(self.jet, LEAST_DIAMETER)
+        return replace(self, force=(held, held), diameter=diameter, hangs=True)
 
     @property
     def jet(self) -> float:
@@ -115,6 +140,22 @@ def input_of(model: ThrustModel, force: float) -> float | None:
         return float(0.5 * (inputs[first] + inputs[last - 1]))
     side = slice(max(last - 1, 0), None) if force > 0.0 else slice(0, first + 1)
     return float(np.interp(force, forces[side], inputs[side]))
+
+
+def given_force(part: Any) -> tuple[float, float]:
+    """Returns the least and the most force [N] that one gives of `force` with its `dead_band`: none where all
+    of its commands lie in the band."""
+    least, most = part.force
+    largest = max(-least, most)
+    return (least, most) if largest >= part.dead_band * (1.0 - NOTHING) else (0.0, 0.0)
+
+
+def form_of(kind: Literal["thruster", "pod"], given: Array, sign: float = 1.0) -> Form:
+    """Returns how the forces of one become commands, by the least and most force (2,) that it gives [N] and
+    the sign of a thruster's command: the law of one whose commands all lie in its dead band gives nothing."""
+    usual = Form(kind)
+    axes = None if given.any() else np.zeros((3, 3))
+    return usual._replace(axes=axes, numbers=(sign, *usual.numbers[1:]))
 
 
 def _law_of(table: PowerTable) -> PowerLaw:
