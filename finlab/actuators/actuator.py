@@ -259,6 +259,10 @@ class Actuator(Checked, ABC):
         """Returns a row (3,) as the kind's own type; None for a failed one, whose row is NaN."""
         return None if np.isnan(row[0]) else self.COMMAND(*row[: len(self.NUMBERS)].tolist())
 
+    def commands(self, rows: Array) -> Command:
+        """Returns N rows (N, 3) as the kind's own type, with an array (N,) in place of each number."""
+        return self.COMMAND(*rows[:, : len(self.NUMBERS)].T)
+
     def neutral(self, now: Array | None = None) -> Array:
         """Returns the command (3,) that pushes least, given the present one (3,)."""
         row: Array = np.clip(0.0, np.array(self.lower), np.array(self.upper))

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from msgspec import Meta
+from numpy.typing import ArrayLike
 
 from finlab.actuators.actuator import Actuator, Box, Command
 from finlab.actuators.form import Form
@@ -124,22 +125,38 @@ class Propeller(Actuator):
         if np.isnan(row[0]):
             return None
         numbers = row[: len(self.NUMBERS)].tolist()
-        return self.COMMAND(*numbers, input_of(self.model, numbers[-1]))
+        sent = input_of(self.model, row[len(self.NUMBERS) - 1])
+        return self.COMMAND(*numbers, None if sent is None else float(sent))
+
+    def commands(self, rows: Array) -> Command:
+        """See `Actuator`: with what its table says to send for each."""
+        numbers = rows[:, : len(self.NUMBERS)].T
+        sent = input_of(self.model, numbers[-1])
+        if sent is not None:
+            sent.setflags(write=False)
+        return self.COMMAND(*numbers, sent)
 
 
-def input_of(model: ThrustModel, force: float) -> float | None:
-    """Returns what a table says to send for a force [N], in the table's unit; None for a power law.
+def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
+    """Returns what a table says to send for forces (...) [N], in the table's unit; None for a power law.
 
     Where several inputs give no force, the middle of them stops the propeller.
     """
     if not isinstance(model, PowerTable):
         return None
+    force = np.asarray(force, np.float64)
     inputs, forces, _ = model.columns
     first, last = np.searchsorted(forces, 0.0, "left"), np.searchsorted(forces, 0.0, "right")
-    if force == 0.0 and first < last:
-        return float(0.5 * (inputs[first] + inputs[last - 1]))
-    side = slice(max(last - 1, 0), None) if force > 0.0 else slice(0, first + 1)
-    return float(np.interp(force, forces[side], inputs[side]))
+    ahead = slice(max(last - 1, 0), None)
+    astern = slice(0, first + 1)
+    sent: Array = np.where(
+        force > 0.0,
+        np.interp(force, forces[ahead], inputs[ahead]),
+        np.interp(force, forces[astern], inputs[astern]),
+    )
+    if first < last:
+        sent = np.where(force == 0.0, 0.5 * (inputs[first] + inputs[last - 1]), sent)
+    return sent
 
 
 def given_force(part: Any) -> tuple[float, float]:
