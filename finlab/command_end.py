@@ -1,9 +1,11 @@
 """Output of a command: tables as plain text, its exit code, and one sentence on stderr where it fails."""
 
+import errno
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 
 from finlab.errors import FinlabError
 
@@ -29,15 +31,32 @@ BROKEN_PIPE = 141
 """128 + SIGPIPE, as shells report it."""
 
 
+class ClosedOutput(io.TextIOBase):
+    """Standard output of a command that was started without it, as by `>&-`: Python has None in its place,
+    and `print` then says nothing and succeeds, as if somebody had read it."""
+
+    def writable(self) -> bool:
+        return False
+
+    def write(self, text: str, /) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
 def exit_code(program: str, work: Callable[[], int]) -> int:
     """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
 
-    Standard output that is full, or that is no longer read, is an error like any other.
+    Standard output that is full or closed is an error like any other; a reader that ended early, such as
+    `head`, has what it wanted, and gets no words.
     """
+    output = nullcontext() if sys.stdout is not None else redirect_stdout(ClosedOutput())
+    with output:
+        return _code_of(program, work)
+
+
+def _code_of(program: str, work: Callable[[], int]) -> int:
     try:
         code = work()
-        if sys.stdout is not None:  # else the command was started without it, and prints nothing
-            sys.stdout.flush()
+        sys.stdout.flush()
         return code
     except FinlabError as error:
         return _fail(program, str(error))
@@ -48,7 +67,6 @@ def exit_code(program: str, work: Callable[[], int]) -> int:
             return _fail(program, f"{error.filename}: {error.strerror}")
         _drop_output()
         if isinstance(error, BrokenPipeError):
-            _fail(program, "cannot print: whoever read the output has ended")
             return BROKEN_PIPE
         return _fail(program, f"cannot print: {error.strerror or error}; write the output to another place")
 

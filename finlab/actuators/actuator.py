@@ -73,9 +73,10 @@ class Faults(NamedTuple):
     torn: float | None = None
     """Share of its force that it gives at every command, as one with a torn blade does."""
     stuck: float | None = None
-    """Angle [rad] at which it no longer turns; it still pushes."""
-    running: axes.Vector | None = None
-    """Command that it keeps whatever is asked."""
+    """Where it stays: the angle [rad] at which one that turns no longer turns, though it still pushes; the
+    force [N] at which a thruster hangs."""
+    running: tuple[float, ...] | None = None
+    """Command that it keeps whatever is asked, the kind's `NUMBERS` in order."""
 
 
 class Box(NamedTuple):
@@ -257,6 +258,10 @@ class Actuator(Checked, ABC):
     def command(self, row: Array) -> Command | None:
         """Returns a row (3,) as the kind's own type; None for a failed one, whose row is NaN."""
         return None if np.isnan(row[0]) else self.COMMAND(*row[: len(self.NUMBERS)].tolist())
+
+    def commands(self, rows: Array) -> Command:
+        """Returns N rows (N, 3) as the kind's own type, with an array (N,) in place of each number."""
+        return self.COMMAND(*rows[:, : len(self.NUMBERS)].T)
 
     def neutral(self, now: Array | None = None) -> Array:
         """Returns the command (3,) that pushes least, given the present one (3,)."""

@@ -22,6 +22,8 @@ from finlab.actuators.propeller import (
     PropellerLaw,
     Threshold,
     force_words,
+    form_of,
+    given_force,
 )
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
@@ -60,11 +62,10 @@ class AzimuthGroup(Group):
 
     def __init__(self, azimuths: Sequence["Azimuth"], effectiveness: Array) -> None:
         """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
-        self._lower = np.array([azimuth.lower for azimuth in azimuths])
-        self._upper = np.array([azimuth.upper for azimuth in azimuths])
+        low, high = np.array([azimuth.arc for azimuth in azimuths]).T
+        self._given = np.array([given_force(azimuth) for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
-        self._band = np.array([azimuth.dead_band for azimuth in azimuths])
-        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
+        middle, half = _arcs(low, high)
         self.responses = [
             _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
             for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
@@ -72,25 +73,24 @@ class AzimuthGroup(Group):
 
     @property
     def forms(self) -> list[Form]:
-        return [Form("pod")] * len(self.responses)
+        return [form_of("pod", given) for given in self._given]
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
-        least, most = (self._lower[:, 1], self._upper[:, 1]) if ends is None else ends.T
-        least = np.where(least > self._band, least, np.minimum(least, 0.0))  # within its band it rests
+        least, most = (self._given if ends is None else ends).T
         ahead = self._power.worth(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
-        astern = self._power.worth(-back, least, np.minimum(most, 0.0))
-        worth = np.where(most < 0.0, astern, ahead)
-        return np.where((least < 0.0) & (most >= 0.0), np.maximum(ahead, astern), worth)
+        astern = self._power.worth(-back, np.minimum(least, 0.0), np.minimum(most, 0.0))
+        either = np.maximum(ahead, astern)
+        return np.where(least >= 0.0, ahead, np.where(most < 0.0, astern, either))
 
 
 def _plane(azimuth: "Azimuth", matrix: Array, middle: float, half: float) -> Plane:
     """What one offers; `matrix` (2, 6) is the wrench per newton."""
-    least, most = azimuth.force
+    least, most = given_force(azimuth)
     if 0.0 < least < azimuth.dead_band:
         least = 0.0  # what it is told then gives no force, and takes no power
-    table = radial_table(azimuth.model, 1, max(least, 0.0), most)
-    reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
-    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)
+    table = radial_table(azimuth.model, 1, max(least, 0.0), max(most, 0.0))
+    reverse = radial_table(azimuth.model, -1, max(-most, 0.0), -least) if least < 0.0 else None
+    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse, high=most)
 
 
 def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
@@ -125,7 +125,7 @@ class Azimuth(Propeller):
     NUMBERS, COMMAND = (("angle", "rad"), ("force", "N")), AzimuthCommand
     LIMITS, RATES, AXES = ("arc", "force"), ("turn_rate", "rate"), ("turn_axis", "zero")
     POINTED, PUSHES, LAGS, THRUST, ANGLE, ARC = 1, (1, 2), 1, 1, 0, "arc"
-    FAULTS, LOOKS, OTHER = ("weak", "stuck"), "pod", "Turns about"
+    FAULTS, LOOKS, OTHER = ("weak", "stuck", "running"), "pod", "Turns about"
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
     BOXES = (
         actuator.Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
@@ -168,17 +168,20 @@ class Azimuth(Propeller):
     """Of the propeller [m], for its jet; None where it is guessed from the force."""
     open_water: OpenWater | None = None
     """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
+    hangs: bool = False
+    """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         least, most = self.force
-        if not (least < most and most > 0.0):
+        hangs = self.hangs and least == most
+        if not hangs and not (least < most and most > 0.0):
             raise LayoutError(
                 f"expected a most force above 0 and above the least, got {least:g} and {most:g}; turn `zero` "
                 "round where it only pulls",
                 "force_n",
             )
-        if self.dead_band > self.force[1]:
+        if not hangs and self.dead_band > self.force[1]:
             raise LayoutError(
                 f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band_n"
             )
@@ -207,7 +210,9 @@ class Azimuth(Propeller):
     def damaged(self, faults: actuator.Faults) -> Self:
         left, (low, high) = faults.weak, self.force
         force = self.force if left is None else actuator.weakened((max(low, left * low), high), left)
-        return replace(self, force=force, arc=actuator.held_limits(faults.stuck, self.arc))
+        angle = faults.stuck if faults.running is None else faults.running[0]
+        held = replace(self, force=force, arc=actuator.held_limits(angle, self.arc))
+        return held if faults.running is None else held.hung(faults.running[1])
 
     @property
     def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:

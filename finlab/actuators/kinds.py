@@ -1,7 +1,7 @@
 """The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here.
 
 Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds its own to
-`KINDS`.
+`KINDS`, which refuses what is no kind. A module that cannot be imported is a `FinlabError`.
 """
 
 import os
@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from finlab.actuators.actuator import Actuator, Places
 from finlab.actuators.azimuth import Azimuth, Tilt
 from finlab.actuators.fin.fin import Fin
+from finlab.actuators.kind_check import Kinds
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import Rudder
 from finlab.actuators.thruster import Thruster
 from finlab.arrays import Array
+from finlab.errors import FinlabError
 
-KINDS: dict[str, type[Actuator]] = {kind.type: kind for kind in (Fin, Thruster, Azimuth, Tilt, Rudder)}
+KINDS = Kinds({kind.type: kind for kind in (Fin, Thruster, Azimuth, Tilt, Rudder)})
 """Type of an actuator in a layout -> its class."""
 
 
@@ -53,5 +55,21 @@ def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
     return np.array([[k == part.ANGLE for k in range(3)] for part in actuators])
 
 
-for _module in filter(None, os.environ.get("FINLAB_KINDS", "").split(",")):
-    import_module(_module)
+def import_kinds(module: str) -> None:
+    """Imports a module that `FINLAB_KINDS` names, which adds its kinds. Raises FinlabError: it cannot be
+    imported, or one of its kinds is none."""
+    try:
+        import_module(module)
+    except FinlabError as error:
+        raise FinlabError(f"FINLAB_KINDS: {error}") from error
+    except Exception as error:  # whatever somebody else's module does
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise FinlabError(
+            f"FINLAB_KINDS: the module {module!r} cannot be imported ({said:.200}); put it where Python "
+            "finds it, such as in PYTHONPATH, mend it, or leave it out"
+        ) from error
+
+
+for _module in os.environ.get("FINLAB_KINDS", "").split(","):
+    if _module.strip():
+        import_kinds(_module.strip())

@@ -3,16 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from msgspec import Meta
+from numpy.typing import ArrayLike
 
 from finlab.actuators.actuator import Actuator, Box, Command
+from finlab.actuators.form import Form
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.arrays import AnyArray, Array, Values
+from finlab.errors import AllocationError
+from finlab.precision import NEARLY, NOTHING
 
 ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
 Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
@@ -20,6 +24,8 @@ T200 = PowerLaw(0.997, 1.449)
 """Power of a T200 of Blue Robotics at 16 V."""
 T200_FORCE, T200_DIAMETER = 51.44, 0.076
 """Its largest force [N], and the diameter of its propeller [m]."""
+LEAST_DIAMETER = 1e-3
+"""The smallest diameter that a propeller may have [m]."""
 OpenWater = tuple[Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]]
 LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
 
@@ -52,6 +58,7 @@ class Propeller(Actuator):
     )
 
     MODELS = ("power_law",)
+    UNSAID: ClassVar[tuple[str, ...]] = ("hangs",)
 
     force: tuple[float, float]
     model: ThrustModel
@@ -59,6 +66,25 @@ class Propeller(Actuator):
     rate: float | None
     diameter: float | None
     open_water: tuple[float, float] | None
+    hangs: bool
+
+    def hung(self, force: float) -> Self:
+        """Returns it with a force [N] as its only one, at which it hangs whatever is asked.
+
+        The propeller is the same: a jet that was guessed from the largest force stays as it is. Raises
+        AllocationError: it cannot give that force, which is not clipped, since then the others would make up
+        for a force that is not there.
+        """
+        least, most = self.force
+        rounding = NEARLY * max(-least, most)
+        if not least - rounding <= force <= most + rounding:
+            raise AllocationError(
+                f"damage of {self.name!r}: expected a force from {least:g} to {most:g} N, which is what this "
+                f"{self.type} can give, got {force:g} N"
+            )
+        held = min(max(force, least), most)
+        diameter = self.diameter or max(self.jet, LEAST_DIAMETER)
+        return replace(self, force=(held, held), diameter=diameter, hangs=True)
 
     @property
     def jet(self) -> float:
@@ -99,22 +125,54 @@ class Propeller(Actuator):
         if np.isnan(row[0]):
             return None
         numbers = row[: len(self.NUMBERS)].tolist()
-        return self.COMMAND(*numbers, input_of(self.model, numbers[-1]))
+        sent = input_of(self.model, row[len(self.NUMBERS) - 1])
+        return self.COMMAND(*numbers, None if sent is None else float(sent))
+
+    def commands(self, rows: Array) -> Command:
+        """See `Actuator`: with what its table says to send for each."""
+        numbers = rows[:, : len(self.NUMBERS)].T
+        sent = input_of(self.model, numbers[-1])
+        if sent is not None:
+            sent.setflags(write=False)
+        return self.COMMAND(*numbers, sent)
 
 
-def input_of(model: ThrustModel, force: float) -> float | None:
-    """Returns what a table says to send for a force [N], in the table's unit; None for a power law.
+def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
+    """Returns what a table says to send for forces (...) [N], in the table's unit; None for a power law.
 
     Where several inputs give no force, the middle of them stops the propeller.
     """
     if not isinstance(model, PowerTable):
         return None
+    force = np.asarray(force, np.float64)
     inputs, forces, _ = model.columns
     first, last = np.searchsorted(forces, 0.0, "left"), np.searchsorted(forces, 0.0, "right")
-    if force == 0.0 and first < last:
-        return float(0.5 * (inputs[first] + inputs[last - 1]))
-    side = slice(max(last - 1, 0), None) if force > 0.0 else slice(0, first + 1)
-    return float(np.interp(force, forces[side], inputs[side]))
+    ahead = slice(max(last - 1, 0), None)
+    astern = slice(0, first + 1)
+    sent: Array = np.where(
+        force > 0.0,
+        np.interp(force, forces[ahead], inputs[ahead]),
+        np.interp(force, forces[astern], inputs[astern]),
+    )
+    if first < last:
+        sent = np.where(force == 0.0, 0.5 * (inputs[first] + inputs[last - 1]), sent)
+    return sent
+
+
+def given_force(part: Any) -> tuple[float, float]:
+    """Returns the least and the most force [N] that one gives of `force` with its `dead_band`: none where all
+    of its commands lie in the band."""
+    least, most = part.force
+    largest = max(-least, most)
+    return (least, most) if largest >= part.dead_band * (1.0 - NOTHING) else (0.0, 0.0)
+
+
+def form_of(kind: Literal["thruster", "pod"], given: Array, sign: float = 1.0) -> Form:
+    """Returns how the forces of one become commands, by the least and most force (2,) that it gives [N] and
+    the sign of a thruster's command: the law of one whose commands all lie in its dead band gives nothing."""
+    usual = Form(kind)
+    axes = None if given.any() else np.zeros((3, 3))
+    return usual._replace(axes=axes, numbers=(sign, *usual.numbers[1:]))
 
 
 def _law_of(table: PowerTable) -> PowerLaw:

@@ -199,6 +199,8 @@ class Plane:
     """Forces smaller than this one, other than 0, cannot be held [N]."""
     reverse: RadialTable | None = None
     """Answer of forces against the directions of the arc, from rest on; None where it pushes one way."""
+    high: float = np.inf
+    """Largest force [N], below 0 in reverse, where that is less than the tables give."""
 
     @property
     def rows(self) -> Array:
@@ -208,7 +210,8 @@ class Plane:
     @property
     def ends(self) -> tuple[float, float]:
         """Least and largest force [N], below 0 in reverse."""
-        return -self.reverse.largest if self.reverse else float(self.table.force[0]), self.table.largest
+        low = -self.reverse.largest if self.reverse else float(self.table.force[0])
+        return low, min(self.high, self.table.largest)
 
 
 Response = Line | Plane

@@ -170,5 +170,8 @@ def radial_table(model: ThrustModel | PowerCurve, sign: int, least: float, most:
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     top = abs(float(own.marginal(ends)[1, 0]))
+    if least == most:
+        # The force is the same at any price, but a table needs prices.
+        top = max(top, NOTHING)
     force = np.clip(sign * own.answer(sign * price_grid(top)[:, None])[:, 0], least, most)
     return RadialTable.of_forces(top, force, float(own.watts(ends)[0, 0]))

@@ -20,6 +20,8 @@ from finlab.actuators.propeller import (
     PropellerLaw,
     Threshold,
     force_words,
+    form_of,
+    given_force,
 )
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
@@ -57,12 +59,13 @@ class ThrusterGroup(Group):
             _line(thruster, sign * matrix[0])
             for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
         ]
-        self._limits = np.array([thruster.force for thruster in thrusters])
+        self._limits = np.array([given_force(thruster) for thruster in thrusters])
         self._power = ThrustPower([thruster.model for thruster in thrusters])
 
     @property
     def forms(self) -> list[Form]:
-        return [Form("thruster", numbers=(sign, *Form("thruster").numbers[1:])) for sign in self._sign]
+        pairs = zip(self._limits, self._sign, strict=True)
+        return [form_of("thruster", given, sign) for given, sign in pairs]
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
         if ends is None:
@@ -73,11 +76,12 @@ class ThrusterGroup(Group):
 
 def _line(thruster: "Thruster", along: Array) -> Line:
     """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in reverse."""
-    least, most = thruster.force
+    least, most = given_force(thruster)
     if most <= 0.0:
-        return Line(along, radial_table(thruster.model, -1, 0.0, -least), band=thruster.dead_band)
+        return Line(along, radial_table(thruster.model, -1, -most, -least), band=thruster.dead_band)
     reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
-    return Line(along, radial_table(thruster.model, 1, 0.0, most), reverse, thruster.dead_band)
+    ahead = radial_table(thruster.model, 1, max(least, 0.0), most)
+    return Line(along, ahead, reverse, thruster.dead_band)
 
 
 class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
@@ -100,7 +104,7 @@ class Thruster(Propeller):
     LAW, GROUP = ThrusterLaw, ThrusterGroup
     NUMBERS, COMMAND = (("force", "N"),), ThrusterCommand
     LIMITS, RATES, AXES, PUSHES = ("force",), ("rate",), ("axis",), (0,)
-    THRUST, TURNS, FAULTS, LOOKS = 0, False, ("weak",), "thruster"
+    THRUST, TURNS, FAULTS, LOOKS = 0, False, ("weak", "stuck", "running"), "thruster"
     BOXES = (
         Box("Force [N]", "force", "Least and most along the axis; astern it is negative.", 1.0, pair=True),
         *Propeller.BOXES,
@@ -131,18 +135,22 @@ class Thruster(Propeller):
     """Of the propeller [m], for its jet; None where it is guessed from the force."""
     open_water: OpenWater | None = None
     """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
+    hangs: bool = False
+    """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "axis", unit_vector("axis", self.axis))
+        check_force(self.model, self.force)
         least, most = self.force
+        if self.hangs and least == most:
+            return
         if not least <= 0.0 <= most or least == most:
             raise LayoutError(f"must include 0, and more than that, got {least:g} and {most:g}", "force_n")
         if self.dead_band > max(-least, most):
             raise LayoutError(
                 f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
             )
-        check_force(self.model, self.force)
 
     @classmethod
     def sample(cls) -> Self:
@@ -151,4 +159,6 @@ class Thruster(Propeller):
 
     def damaged(self, faults: Faults) -> Self:
         left, (low, high) = faults.weak, self.force
-        return self if left is None else replace(self, force=(left * low, left * high))
+        weak = self if left is None else replace(self, force=(left * low, left * high))
+        force = faults.stuck if faults.running is None else faults.running[0]
+        return weak if force is None else weak.hung(force)

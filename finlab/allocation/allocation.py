@@ -13,7 +13,7 @@ from finlab.allocation.binding import what_binds
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.rates import USUAL_PERIOD_S
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
-from finlab.allocation.solution import Candidates, PlainData
+from finlab.allocation.solution import ARRAYS, Candidates, PlainData
 from finlab.arrays import Array
 from finlab.display import blocks
 from finlab.display.pictures import robot_picture
@@ -43,17 +43,26 @@ class Later(Protocol):
     def bound(self) -> Array | None: ...
 
 
+def read_only(array: Array) -> Array:
+    """Returns an array, which nobody else writes to, after it was made read-only."""
+    array.setflags(write=False)
+    return array
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many share, as plain data; many have N rows of each array.
 
-    Properties that take time are computed when they are first read, and kept; copies have all of them.
+    Arrays are read-only, and nobody else's: no figure changes because an array was written to. Properties
+    that take time are computed when they are first read, and kept; copies have all of them.
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (
         *("forces", "wrench", "err_norm", "power", "effort", "bound", "expected_miss", "notes"),
     )
     """Properties that are computed when they are first read."""
+    HELD: ClassVar[tuple[str, ...]] = ("target", "command", "scale", "flow", "wrench_expected")
+    """Fields with arrays."""
 
     layout: Layout
     """The whole layout, failed actuators included, with the limits that damage has left."""
@@ -82,6 +91,26 @@ class Answer(PlainData, Generic[Number]):
     later: Later | None = field(default=None, compare=False)
     """Gives the lazy properties; None in copies, which have them all."""
 
+    def __post_init__(self) -> None:
+        for name, value in self.__dict__.items():
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                object.__setattr__(self, name, read_only(value.copy()))
+
+    @classmethod
+    def of(cls, **values: Any) -> Self:
+        """See `PlainData`; the arrays, which are to be the answer's own, are made read-only."""
+        made = super().of(**values)
+        made._keep()
+        return made
+
+    def _keep(self) -> None:
+        """Makes the arrays read-only that the answer has; named, since every tick pays for it."""
+        own = self.__dict__
+        for name in self.HELD:
+            value = own.get(name)
+            if value is not None:
+                value.setflags(write=False)
+
     @property
     def failed(self) -> tuple[str, ...]:
         """Names of the actuators that were left out."""
@@ -95,7 +124,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def unallocated(self) -> Array:
         """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
-        return np.nan_to_num(self.target - self.wrench)
+        return read_only(np.nan_to_num(self.target - self.wrench))
 
     @cached_property
     def forces(self) -> Array:
@@ -157,7 +186,9 @@ class Answer(PlainData, Generic[Number]):
 
     def _number(self, values: Array) -> Number:
         """A figure of each row; of one answer a plain number."""
-        return values if self.command.ndim == 3 else float(np.ravel(values)[0])  # type: ignore[return-value]
+        if self.command.ndim == 3:
+            return read_only(values)  # type: ignore[return-value]
+        return float(np.ravel(values)[0])  # type: ignore[return-value]
 
     @property
     def _plant(self) -> Plant:
@@ -167,10 +198,11 @@ class Answer(PlainData, Generic[Number]):
         """Figures of commands, a few at a time."""
         plant = self._plant
         if self.command.ndim == 2:
-            return np.asarray(judge(plant, self.command[None])[0])
+            return read_only(np.asarray(judge(plant, self.command[None])[0]))
         if len(self.command) <= CHUNK:
-            return judge(plant, self.command)
-        return np.concatenate([judge(plant, self.command[rows]) for rows in chunks(len(self.command))])
+            return read_only(judge(plant, self.command))
+        parts = [judge(plant, self.command[rows]) for rows in chunks(len(self.command))]
+        return read_only(np.concatenate(parts))
 
     def _equal_names(self) -> list[str]:
         return [*super()._equal_names(), *self.LAZY]
@@ -181,15 +213,33 @@ class Answer(PlainData, Generic[Number]):
         return {**self.__dict__, "later": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)  # a pickle does not keep that
+            self.__dict__[name] = _kept(value) if isinstance(value, Candidates) else value
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BatchAllocation(Answer[Array]):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
+    HELD: ClassVar[tuple[str, ...]] = (*Answer.HELD, "solve_ms")
+
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
+
+    @cached_property
+    def commands(self) -> dict[str, Command | None]:
+        """Commands of each actuator by its name, in a type of its own whose numbers are arrays (N,), such as
+        `commands["lift"].force`; with `input`, what a table of thrust says to send. None for a failed one."""
+        lost = set(self.failed)
+        parts = zip(self.layout.actuators, np.moveaxis(self.command, 1, 0), strict=True)
+        return {part.name: None if part.name in lost else part.commands(rows) for part, rows in parts}
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = super().__getstate__()
+        state.pop("commands", None)  # quickly made again
+        return state
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -216,6 +266,7 @@ class Allocation(Answer[float]):
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "candidates", "samples")
+    HELD: ClassVar[tuple[str, ...]] = (*Answer.HELD, "previous", "prices")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -235,12 +286,12 @@ class Allocation(Answer[float]):
     @cached_property
     def candidates(self) -> Candidates | None:
         """Refined candidates, best first; None for methods that have a single answer."""
-        return self.later.candidates() if self.later is not None else None
+        return None if self.later is None else _kept(self.later.candidates())
 
     @cached_property
     def samples(self) -> Candidates | None:
         """Raw candidates before refinement, best first; None for methods that draw none."""
-        return self.later.samples() if self.later is not None else None
+        return None if self.later is None else _kept(self.later.samples())
 
     def _doubts(self) -> tuple[str, ...]:
         return doubts(self)
@@ -264,7 +315,8 @@ class Allocation(Answer[float]):
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering the target.
+        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering the
+        target.
 
         None where it does, nor where its networks do not know the fins: then limits are not what keeps it.
         """
@@ -300,6 +352,16 @@ class Allocation(Answer[float]):
 
     def _repr_html_(self) -> str:
         return blocks.html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
+
+
+def _kept(candidates: Candidates | None) -> Candidates | None:
+    """Candidates whose arrays are read-only."""
+    if candidates is None:
+        return None
+    arrays: dict[str, Any] = {}
+    for name in ARRAYS:
+        arrays[name] = read_only(getattr(candidates, name).view())
+    return replace(candidates, **arrays)
 
 
 def chunks(n: int) -> Iterator[slice]:

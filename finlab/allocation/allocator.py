@@ -341,7 +341,7 @@ class Allocator:
     ) -> BatchAllocation:
         """Commands for many targets (N, 6); arguments and errors as in `allocate`.
 
-        The answer keeps the targets as they are, not a copy, and the commands; what else there is to tell is
+        The answer keeps a copy of the targets, and the commands; what else there is to tell is
         computed when it is asked for.
         """
         values = check_wrenches(wrenches)

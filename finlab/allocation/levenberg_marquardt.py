@@ -53,9 +53,7 @@ class CommandProblem:
         own = None if plant.interaction is None else sigma
         return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own)
 
-    def standing(
-        self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None
-    ) -> Self:
+    def standing(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
         """Returns the problem of the same robot where some actuators (n,) work and some axes (6,) count."""
         effectiveness = self.effectiveness
         if works is not None:

@@ -24,6 +24,7 @@ MAX_FLOW = 100.0
 FEW = 100
 """Numbers that are checked in the interpreter."""
 
+
 @dataclass(frozen=True, eq=False)
 class Usable:
     """The actuators of a robot, and which of them an allocator may use."""
@@ -76,15 +77,27 @@ def usable(layout: Layout, damage: Damage) -> Usable:
     return Usable(left, damage, alive)
 
 
-def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> Array:
-    """What is called `name` as float64, or a `CommandError` that says what was expected."""
+def _numbers(values: ArrayLike, name: str, expected: str) -> Array:
+    """A copy of what is called `name` as float64, or a `CommandError` that says what was expected; truth
+    values and text are no numbers, also where they could be read as such."""
     try:
-        array = np.array(values) if copy else np.asarray(values)
-        if array.dtype.kind == "c":
-            raise TypeError("complex")
+        array = np.array(values)
+        if array.dtype.kind not in "iufO" or _has_others(values):
+            raise TypeError("no numbers")
         return array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise CommandError(f"{name}: expected {expected}, got {values!r:.100}") from error
+
+
+def _has_others(values: object) -> bool:
+    """Whether truth values or text are among numbers, in lists of any depth: numpy reads `True` beside
+    numbers as 1."""
+    if isinstance(values, np.ndarray):
+        return _has_others(values.tolist()) if values.dtype.kind == "O" else values.dtype.kind not in "iuf"
+    if isinstance(values, list | tuple):
+        # Most are plain numbers, and every tick asks.
+        return any(type(value) is not float and _has_others(value) for value in values)
+    return isinstance(values, bool | np.bool_ | str | bytes)
 
 
 def _size(array: Array) -> float:
@@ -96,7 +109,7 @@ def _size(array: Array) -> float:
 def _wrenches(wrench: ArrayLike, name: str, single: bool) -> Array:
     """Checked wrenches; see `check_wrenches`."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
-    array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
+    array = _numbers(wrench, name, f"{expected} in N and N m")
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
     if _size(array) <= MAX_WRENCH:
@@ -113,7 +126,7 @@ def _wrenches(wrench: ArrayLike, name: str, single: bool) -> Array:
 
 
 def check_wrenches(wrench: ArrayLike) -> Array:
-    """Wrenches (N, 6) as finite float64, not copied, or a `CommandError` that says what is wrong."""
+    """Wrenches (N, 6) as finite float64, a copy, or a `CommandError` that says what is wrong."""
     return _wrenches(wrench, "wrench", single=False)
 
 

@@ -25,8 +25,8 @@ def allocate(
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
     weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE", aliases=["--health"])] = (),
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
-    stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
-    running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
+    stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG|N")] = (),
+    running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG|DEG,N|N")] = (),
     flow: shared_options.Flow = None,
     bound: bool = False,
     seed: shared_options.Count = 0,
@@ -46,8 +46,10 @@ def allocate(
         priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
         weak: an actuator of less strength: share that is left of its limits, such as bow=0.5.
         torn: a fin or rudder that gives a share of its force at every command.
-        stuck: a fin or azimuth that no longer turns: the angle at which it stays [deg].
-        running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
+        stuck: where one stays: the angle at which a fin or azimuth no longer turns [deg], or the force at
+            which a thruster hangs [N].
+        running: the command that one keeps whatever is asked: of a fin A,F,DEG [rad, Hz, deg], of an azimuth
+            DEG,N [deg, N], of a thruster N [N].
         bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
     """
@@ -61,10 +63,8 @@ def allocate(
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
-    damage = Damage.parse(gone, weak, torn, stuck, running)
-    result = allocator.allocate(
-        wrench, damage=damage, free=free, policy=answer, flow=flow, seed=seed
-    )
+    damage = Damage.parse(robot, gone, weak, torn, stuck, running)
+    result = allocator.allocate(wrench, damage=damage, free=free, policy=answer, flow=flow, seed=seed)
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")

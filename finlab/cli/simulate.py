@@ -218,5 +218,7 @@ def monitored(loop: ClosedLoop) -> str:
     if loop.monitor is not None and not loop.monitor.tells:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
-    words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in damage.stuck.items()]
+    for name, held in damage.stuck.items():
+        turns = loop.layout.part(name).TURNS
+        words.append(f"{name} stuck at " + (f"{math.degrees(held):.0f} deg" if turns else f"{held:.3g} N"))
     return ", ".join(words) or "all fins whole"

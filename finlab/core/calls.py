@@ -136,7 +136,9 @@ class Core:
         self._flags = answer[5 * most + 20 :].view(np.int32)  # status, within, steps, ended, placed
         self._at, self._area = block.ctypes.data, ctypes.addressof(self._work)
         if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area):
-            raise DataError(f"the core takes the robot for {CODES[error]}; check its forces, powers and sizes")
+            raise DataError(
+                f"the core takes the robot for {CODES[error]}; check its forces, powers and sizes"
+            )
 
     def _stand(self, now: Now) -> None:
         """Writes what holds now into the question."""
@@ -155,8 +157,8 @@ class Core:
 
     def one(self, wrench: Array, policy: Any, price: Array | None = None, now: Now = STILL) -> Found:
         """Returns the answer to one wrench (6,) for what holds now, from prices (6,) [W/N, W/(N m)] of the
-        wrench on, if there are any; a policy is served out of reach. Raises CommandError: the core cannot work
-        with these numbers."""
+        wrench on, if there are any; a policy is served out of reach. Raises CommandError: the core cannot
+        work with these numbers."""
         with self._lock:  # question and answer lie in one place for all threads
             question = self._question
             self._wrench[:] = wrench

@@ -87,7 +87,7 @@ def serve(arguments: argparse.Namespace) -> int:
     robot = _robot(arguments)
     from finlab.deploy.serve import Server
 
-    if sys.stdin is None or sys.stdout is None:
+    if sys.stdin is None or not sys.stdout.writable():
         raise FinlabError("standard input or output is closed; connect both")
     streams.open(sys.stdin.fileno(), sys.stdout.fileno())
     Server(robot, None if arguments.no_watchdog else arguments.watchdog_s).run(streams)

@@ -2,7 +2,8 @@
 
 A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free` (names of
 axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at the next ticks, and
-`flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted. Each answer says in `status` what it is:
+`flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted. Each answer says in `status`
+what it is:
 
 =========  ============================================================================================
 status     meaning

@@ -150,6 +150,8 @@ class Checked:
     """Fields in radians -> their keys and types in a file, in degrees."""
     WRITTEN: ClassVar[Collection[str]] = ()
     """Fields that a file is given even where they are as usual."""
+    UNSAID: ClassVar[Collection[str]] = ()
+    """Fields that no file has."""
     type: ClassVar[str] = ""
     """What a file calls it under the key `type`, where it may hold one of several."""
 

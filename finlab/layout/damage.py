@@ -8,22 +8,21 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from finlab.actuators.actuator import Faults
-from finlab.actuators.fin.fin_model import Amplitude, Frequency
-from finlab.axes import Vector
-from finlab.errors import AllocationError
+from finlab.actuators.actuator import Actuator, Faults
+from finlab.errors import AllocationError, LayoutError
 from finlab.files.schema import checked
 from finlab.layout.layout import Layout
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of an actuator."""
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
-Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Kept = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""A number of a command, such as an angle [rad] or a force [N]."""
 _VALUES: Mapping[str, Any] = {
     "weak": Share,
     "torn": Share,
-    "stuck": Angle,
-    "running": tuple[Amplitude, Frequency, Angle],
+    "stuck": Kept,
+    "running": Annotated[tuple[Kept, ...], Meta(min_length=1, max_length=3)],
 }
 
 
@@ -42,8 +41,10 @@ class Damage:
     """What is known of damaged actuators, by name; those that are not named are whole.
 
     All but `lost` is a layout with other limits, or with a smaller fin, so that every method accounts for it
-    and limits hold as always. Not to be changed. Raises AllocationError: a share out of range, an angle that
-    is no number, names that are no list.
+    and limits hold as always: what hangs at a command has that one alone, and the others make up for it. Not
+    to be changed. Raises AllocationError: a share out of range, an angle that is no number, names that are no
+    list. How many numbers a command has, and which forces there are, is known with the layout: see
+    `applied_to`.
     """
 
     lost: Sequence[str] = ()
@@ -53,9 +54,11 @@ class Damage:
     torn: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Share of its law's thrust that one gives at every command, as a fin with a torn blade does."""
     stuck: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Angle [rad] at which one no longer turns; it still pushes."""
-    running: Mapping[str, Vector] = field(default_factory=dict, hash=False)
-    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
+    """Where one stays: the angle [rad] at which a fin, an azimuth or a tilt no longer turns, though it still
+    pushes; the force [N] at which a thruster hangs."""
+    running: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
+    """Command that one keeps whatever is asked: of a fin (amplitude [rad], frequency [Hz], zero direction
+    [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a thruster (force [N],)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lost", lost_names(self.lost))
@@ -103,41 +106,65 @@ class Damage:
     def known(
         cls, layout: Layout, lost: Sequence[str], torn: Mapping[str, float], stuck: Mapping[str, float]
     ) -> "Damage":
-        """What actuators that are lost, torn (the share of their force that is left) and stuck (where) leave.
+        """What actuators that are lost, torn (the share of their force that is left) and stuck (where: an
+        angle [rad], of a thruster its force [N]) leave.
 
-        What cannot be used any more counts as lost: a stuck rudder or thruster, whose force is no choice. A
-        torn thruster is weak: it gives the force that it is allocated where it is asked for more.
+        What cannot be used any more counts as lost: a stuck rudder. A torn thruster is weak: it gives the
+        force that it is allocated where it is asked for more; one that is stuck as well gives its share.
         """
         may = {part.name: part.FAULTS for part in layout.actuators}
-        turning = {name: at for name, at in stuck.items() if "stuck" in may[name]}
+        known = {name: at for name, at in stuck.items() if "stuck" in may[name]}
         blades = {name: share for name, share in torn.items() if "torn" in may[name]}
         weak = {name: share for name, share in torn.items() if name not in blades}
-        return cls((*lost, *(name for name in stuck if name not in turning)), weak, blades, turning)
+        for name in set(weak) & set(known):
+            if not layout.part(name).TURNS:
+                known[name] *= weak.pop(name)
+        return cls((*lost, *(name for name in stuck if name not in known)), weak, blades, known)
 
     @classmethod
     def parse(
         cls,
+        layout: Layout,
         lost: Sequence[str] = (),
         weak: Sequence[str] = (),
         torn: Sequence[str] = (),
         stuck: Sequence[str] = (),
         running: Sequence[str] = (),
     ) -> "Damage":
-        """Returns damage from texts, angles in degrees: `bow=0.5` for a share, `bow=20` for an angle,
-        `bow=0.3,1.0,20` for a command. Raises AllocationError: a text that says something else."""
-        kept = _named("running", running, 3).items()
-        return cls(
-            lost,
-            {name: share for name, (share,) in _named("weak", weak, 1).items()},
-            {name: share for name, (share,) in _named("torn", torn, 1).items()},
-            {name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
-            {name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
-        )
+        """Returns damage of a layout from texts, directions in degrees: `bow=0.5` for a share; `bow=20` for
+        where one is stuck, a fin or a pod at 20 deg, a thruster at 20 N; for a command `bow=0.3,1.0,20` of a
+        fin [rad, Hz, deg], `bow=20,5` of a pod [deg, N], `bow=5` of a thruster [N].
+
+        Raises AllocationError: a text that says something else; LayoutError: there is no actuator of a name.
+        """
+        shares = {
+            kind: {name: share for name, (share,) in _named(kind, texts, 1).items()}
+            for kind, texts in (("weak", weak), ("torn", torn))
+        }
+        held: dict[str, float] = {}
+        for name, (value,) in _named("stuck", stuck, 1).items():
+            held[name] = math.radians(value) if layout.part(name).TURNS else value
+        kept: dict[str, tuple[float, ...]] = {}
+        for name, values in _named("running", running, None).items():
+            part = layout.part(name)
+            turns = part.HELD if part.TURNS else None
+            # Of a kind that cannot run on, that is said where the damage is applied.
+            if "running" in part.FAULTS and len(values) != len(part.NUMBERS):
+                units = ["deg" if k == turns else unit for k, (_, unit) in enumerate(part.NUMBERS)]
+                numbers = zip(part.NUMBERS, units, strict=True)
+                wanted = ",".join(f"{number} [{unit}]" for (number, _), unit in numbers)
+                got = ",".join(f"{value:g}" for value in values)
+                raise AllocationError(
+                    f"running: expected NAME={wanted} of the {part.type} {name!r}, got '{name}={got}'"
+                )
+            kept[name] = tuple(math.radians(v) if k == turns else v for k, v in enumerate(values))
+        return cls(lost, shares["weak"], shares["torn"], held, kept)
 
     def applied_to(self, layout: Layout) -> Layout:
         """Returns the layout with the limits that are left; the lost ones are still there. Raises
         LayoutError: there is no actuator of a name, or one whose law is a table is torn; AllocationError: its
-        kind cannot be damaged so."""
+        kind cannot be damaged so, its command has another number of values, or a thruster or a pod cannot
+        give the force at which it is said to hang."""
         return _applied(self, layout) if self.partly else layout
 
 
@@ -152,12 +179,32 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
             if kind not in part.FAULTS:
                 may = ", ".join((*part.FAULTS, "lost"))
                 raise AllocationError(f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}")
-    parts = (part.damaged(Faults(**damage.of(part.name))) for part in layout.actuators)
+    for name, command in damage.running.items():
+        _check_count(layout.part(name), command)
+    parts = []
+    for part in layout.actuators:
+        try:
+            parts.append(part.damaged(Faults(**damage.of(part.name))))
+        except LayoutError as error:
+            raise LayoutError(error.problem, error.key, f"damage of {part.name!r}") from None
     return replace(layout, actuators=tuple(parts))
 
 
-def _named(option: str, texts: Sequence[str], count: int) -> dict[str, tuple[float, ...]]:
-    """Numbers by name, of texts NAME=NUMBER,...; errors say which option."""
+def _check_count(part: Actuator, command: Sequence[float]) -> None:
+    """Refuses a command that an actuator is said to keep, if it has another number of values than its
+    kind's. Raises AllocationError."""
+    if len(command) != len(part.NUMBERS):
+        wanted = ", ".join(f"{name} [{unit}]" for name, unit in part.NUMBERS)
+        got = ", ".join(f"{value:g}" for value in command)
+        raise AllocationError(
+            f"damage of {part.name!r}: running: expected the command that {part.type}s have ({wanted}), "
+            f"{len(part.NUMBERS)} in all, got {len(command)} ({got})"
+        )
+
+
+def _named(option: str, texts: Sequence[str], count: int | None) -> dict[str, tuple[float, ...]]:
+    """Numbers by name, of texts NAME=NUMBER,..., so many of each, where that is not None; errors say which
+    option."""
     named = {}
     for text in texts:
         name, _, numbers = text.partition("=")
@@ -165,8 +212,8 @@ def _named(option: str, texts: Sequence[str], count: int) -> dict[str, tuple[flo
             values = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             values = ()
-        if not name or len(values) != count:
-            wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG"
+        if not name or not values or count not in (None, len(values)):
+            wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG of a fin, NAME=DEG,N of a pod, or NAME=N"
             raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
         named[name] = values
     return named

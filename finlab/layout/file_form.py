@@ -53,6 +53,7 @@ def _form(cls: type[Checked], **others: Any) -> Any:
     hints = get_type_hints(cls)
     for name in (field.name for field in fields(cls)):
         kinds |= {name: own for kind, own in _FORMS if hints[name] in (kind, kind | None)}  # noqa: B035
+    kinds |= dict.fromkeys(cls.UNSAID)
     return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
 
 
@@ -142,6 +143,8 @@ def plain(value: Any) -> Any:
     keys = {**value.KEYS, **{name: key for name, (key, _) in value.DEGREES.items()}}
     data = {}
     for field in fields(value):
+        if field.name in value.UNSAID:
+            continue
         own = getattr(value, field.name)
         if own != field.default or field.name in value.WRITTEN:
             own = degrees_of(own) if field.name in value.DEGREES else own

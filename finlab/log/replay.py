@@ -10,8 +10,8 @@ from finlab.allocation import Allocator
 from finlab.allocation.methods import method_class
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
-from finlab.log.answers import answers_to
 from finlab.layout import Layout
+from finlab.log.answers import answers_to
 from finlab.physics.objective import REACHED, yardstick
 
 MOST, MOST_LOST = 2000, 400

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.rates import Box
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.rates import Box
 from finlab.arrays import AnyArray, Array
 from finlab.mdn.descent import EffortProblem, descend, effort_problem, realize, wrench
 from finlab.mdn.effort_fins import EffortFins, Projected

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.rates import Rates
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
+from finlab.allocation.rates import Rates
 from finlab.allocation.settings import MdnSettings, Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array

@@ -114,11 +114,11 @@ LEAST_LEVER = 1e-3
 def yardstick(layout: Layout) -> Array:
     """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
 
-    F is the root of the sum of squares of the actuators' largest forces, and T is F times the root mean square
-    of their levers: each one's largest torque about the origin over its largest force. So how a force compares
-    with a torque is a matter of where actuators stand, and stays as it is while rates, damage or a tick leave
-    some of them less to give. A robot that gives nothing has F = 1 N. Raises DataError: a fin's force table
-    cannot be read."""
+    F is the root of the sum of squares of the actuators' largest forces, and T is F times the root mean
+    square of their levers: each one's largest torque about the origin over its largest force. So how a force
+    compares with a torque is a matter of where actuators stand, and stays as it is while rates, damage or a
+    tick leave some of them less to give. A robot that gives nothing has F = 1 N. Raises DataError: a fin's
+    force table cannot be read."""
     plant = Plant(layout)
     wrench = np.einsum("kni,niw->knw", plant.force(plant.grid(STEPS)), plant.effectiveness)
     forces = np.linalg.norm(wrench[..., :3], axis=-1).max(axis=0)

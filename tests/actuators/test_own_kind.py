@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.kinds import KINDS
+from finlab.actuators.kind_check import Kinds
+from finlab.actuators.kinds import KINDS, import_kinds
 from finlab.allocation import Allocator
 from finlab.deploy.command import main as runtime
+from finlab.errors import FinlabError
 from finlab.layout import Damage, Layout, load_layout, save_layout
 from finlab.physics import plant_of
 from tests.webapp.test_faults import Tab
@@ -110,6 +112,72 @@ def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[
     assert "water_jet" in shown and "Exact" in shown and "cannot be shown" not in shown
     tab.close()
     workers.stop()
+
+
+def test_all_kinds_keep_the_contract() -> None:
+    again = Kinds()
+    for name, kind in KINDS.items():
+        again[name] = kind
+    assert again == KINDS
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (
+            "from finlab.actuators.kinds import KINDS",
+            "import no_such_module",
+            "No module named 'no_such_module'",
+        ),
+        ("return price / 4", "return price / (4", "SyntaxError"),
+        ('    type = "water_jet"\n', '    type = "water_jet"\n    1 / 0\n', "ZeroDivisionError"),
+        ("    LAW, GROUP = AzimuthLaw, AzimuthGroup\n", "", "WaterJet lacks LAW, GROUP"),
+        ('(("angle", "rad"), ("force", "N")), JetCommand', "2 * ((),)", "expected a subclass of Command"),
+        ("    def damaged(self, faults):", "    def hurt(self, faults):", "WaterJet lacks damaged()"),
+        ("    sample = classmethod", "    other = classmethod", "WaterJet lacks sample()"),
+        ("    position: Place\n", "", "WaterJet lacks position"),
+        ('("arc", "force"), ()', '("arc", "push"), ()', "the field 'push' of its LIMITS"),
+        ('"pod"\n', '"boat"\n', "expected one of fin, thruster, pod, foil, got 'boat'"),
+        ('("weak",)', '("tired",)', "got 'tired'"),
+        (
+            "LAW, GROUP = AzimuthLaw, AzimuthGroup",
+            "LAW, GROUP = AzimuthLaw, Pump",
+            "a subclass of Group, got",
+        ),
+        ("@dataclass(frozen=True)\nclass WaterJet", "class WaterJet", "WaterJet is no dataclass"),
+        ("KINDS[WaterJet.type] = WaterJet", "KINDS['jet'] = WaterJet", "has the type 'water_jet'"),
+        ("KINDS[WaterJet.type] = WaterJet", "KINDS['jet'] = Pump()", "expected a subclass of Actuator"),
+    ],
+)
+def test_a_module_of_kinds_that_is_none_is_one_sentence(
+    before: str, after: str, said: str, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (home / "water_jet.py").read_text()
+    assert before in text
+    (tmp_path / "jet_of_mine.py").write_text(text.replace(before, after))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "jet_of_mine", raising=False)
+    known = dict(KINDS)
+    with pytest.raises(FinlabError, match="^FINLAB_KINDS: ") as caught:
+        import_kinds("jet_of_mine")
+    sentence = str(caught.value)
+    assert "jet_of_mine" in sentence and said in sentence and "\n" not in sentence
+    assert known == KINDS
+
+
+def test_a_module_of_kinds_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+    known = {**os.environ, "PYTHONPATH": str(ROOT), "FINLAB_KINDS": "nowhere"}
+    for module in ("finlab", "finlab.deploy.command"):
+        verb = ["layout", "check", "A"] if module == "finlab" else ["check", str(tmp_path)]
+        ask = [sys.executable, "-m", module, *verb]
+        done = subprocess.run(ask, env=known, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1
+        assert "FINLAB_KINDS: the module 'nowhere' cannot be imported" in done.stderr
+    script = "import finlab\ntry: finlab.load_layout\nexcept finlab.errors.FinlabError as error: print(error)"
+    done = subprocess.run(
+        [sys.executable, "-c", "import finlab.errors\n" + script], env=known, capture_output=True
+    )
+    assert done.returncode == 0 and b"nowhere" in done.stdout
 
 
 def test_only_the_page_knows_it() -> None:

@@ -109,7 +109,7 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": (1.0, 2.0)}}, {"weak": 3}]
+    "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": ()}}, {"weak": 3}]
 )
 def test_damage_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
     with pytest.raises(AllocationError, match="damage: .*expected .*, got "):

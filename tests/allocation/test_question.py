@@ -2,11 +2,12 @@
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 
-from finlab.allocation import question
+from finlab.allocation import Allocator, question
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Damage, Fin, Layout, Limits
 
@@ -75,6 +76,36 @@ def test_many_wrenches_are_rows_of_six(shape: tuple[int, ...]) -> None:
 def test_complex_numbers_are_no_wrench() -> None:
     with pytest.raises(CommandError, match="wrench: expected six numbers"):
         question.check_target([1j, 0, 0, 0, 0, 0], ROBOT)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [True, 0.0, 0.0, 0.0, 0.0, 0.0],
+        (1, 0, 0, 0, 0, np.False_),
+        ["1", "0", "0", "0", "0", "0"],
+        [1.0, "0", 0.0, 0.0, 0.0, 0.0],
+        "1",
+        True,
+        np.ones(6, dtype=bool),
+        np.array(["1"] * 6),
+        np.array([True, 1, 0, 0, 0, 0], dtype=object),
+        np.array(["2020-01-01"] * 6, dtype="datetime64[D]"),
+    ],
+)
+def test_truth_values_and_text_are_no_numbers(wrong: Any) -> None:
+    allocator = Allocator(ROBOT)
+    for name, ask in (
+        ("wrench", lambda: allocator.allocate(wrong)),
+        ("wrench", lambda: allocator.allocate_batch([wrong])),
+        ("flow", lambda: allocator.allocate([0.0] * 6, flow=wrong)),
+        ("reference", lambda: allocator.allocate([0.0] * 6, reference=[wrong])),
+        ("previous", lambda: allocator.allocate([0.0] * 6, previous=[wrong] * 3)),
+    ):
+        with pytest.raises(CommandError, match=f"^{name}: expected .*, got "):
+            ask()
+    for given in ([1, 0, 0, 0, 0, 0], np.ones(6, np.float32), np.ones(6, np.int16), (1.0, 0, 0, 0, 0, 0)):
+        assert allocator.allocate(given).target.dtype == np.float64
 
 
 def test_expected_wrenches_ask_nothing_of_a_free_axis() -> None:

@@ -210,14 +210,25 @@ def test_damage_leaves_the_other_actuators_as_they_are():
 @pytest.mark.parametrize(
     ("damage", "why"),
     [
-        ({"stuck": {"lift": 0.1}}, "'lift': thrusters may be weak, lost, got stuck"),
+        ({"stuck": {"rudder": 0.1}}, "'rudder': rudders may be torn, lost, got stuck"),
+        ({"stuck": {"lift": 60.0}}, "'lift': expected a force from -39.91 to 51.44 N.*, got 60 N"),
         ({"weak": {"rudder": 0.5}}, "'rudder': rudders may be torn, lost"),
-        ({"torn": {"lift": 0.5}}, "'lift': thrusters may be weak, lost"),
-        ({"running": {"pod": (0.1, 1.0, 0.0)}}, "'pod': azimuths may be weak, stuck, lost"),
+        ({"torn": {"lift": 0.5}}, "'lift': thrusters may be weak, stuck, running, lost"),
+        (
+            {"running": {"pod": (0.1, 1.0, 0.0)}},
+            r"'pod': running: .* azimuths have \(angle \[rad\], force \[N\]\), 2 in all, got 3",
+        ),
+        ({"running": {"side": (0.1, 1.0)}}, r"'side': running: expected the command that fins have .* got 2"),
+        ({"running": {"pod": (0.1, 30.0)}}, "'pod': expected a force from 0 to 20 N.*, got 30 N"),
+        (
+            {"weak": {"lift": 0.5}, "running": {"lift": (30.0,)}},
+            "'lift': expected a force from .* to 25.72 N",
+        ),
+        ({"running": {"side": (9.0, 1.0, 0.0)}}, "damage of 'side'"),
     ],
 )
 def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):
-    with pytest.raises(AllocationError, match=why):
+    with pytest.raises((AllocationError, LayoutError), match=why):
         Damage(**damage).applied_to(parse_layout(GOOD))
 
 

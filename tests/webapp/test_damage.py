@@ -67,13 +67,15 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
 
 
 VALUES = {"weak": 0.5, "torn": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
+NO_FIN = {"thruster": (0.3,), "azimuth": (0.3, 1.0), "tilt": (0.3, 1.0)}
+"""What those that are no fins keep."""
 
 
 @pytest.mark.parametrize("robot", ["ucat", "torpedo", "catamaran", "bluerov2"])
 def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> None:
     session = Session(load_layout(robot))
     for part in session.state.layout.actuators:
-        for kind, value in VALUES.items():
+        for kind, value in {**VALUES, "running": NO_FIN.get(part.type, VALUES["running"])}.items():
             if kind in part.FAULTS:
                 session.damage(part.name, kind, value)
                 assert session.state.damage.of(part.name)[kind] == value
@@ -93,6 +95,23 @@ def test_a_fin_that_runs_on_is_not_stuck_as_well(session: Session) -> None:
     session.damage("front_left", "running", (0.3, 1.0, 0.2))
     assert session.state.damage == Damage(running={"front_left": (0.3, 1.0, 0.2)})
     assert "--running front_left=0.3,1,11.4592" in command_line(session.state)
+
+
+def test_a_thruster_hangs_at_a_force_in_newtons() -> None:
+    session = Session(load_layout("bluerov2"))
+    first, second = session.state.layout.names[:2]
+    session.damage(first, "stuck", -12.0)
+    session.damage(second, "running", (7.5,))
+    words = command_line(session.state)
+    assert f"--stuck {first}=-12 " in words + " " and f"--running {second}=7.5 " in words + " "
+    assert damage_words(session.state.damage, first, turns=False) == "hangs at −12 N"
+    for wrong in (math.nan, "much", True, 1e4):
+        with pytest.raises(FinlabError):
+            session.damage(first, "stuck", wrong)
+    for wrong in ((1.0, 2.0), (math.nan,), ("x",)):
+        with pytest.raises(FinlabError):
+            session.damage(second, "running", wrong)
+    assert session.state.damage == Damage(stuck={first: -12.0}, running={second: (7.5,)})
 
 
 def test_the_page_may_send_anything(session: Session) -> None:

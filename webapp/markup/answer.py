@@ -104,7 +104,7 @@ def fin_table(
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (remark := damage_words(damage, fin.name)):
+        if not failed and (remark := damage_words(damage, fin.name, fin.TURNS)):
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5

@@ -221,12 +221,13 @@ def parts_word(layout: Layout) -> str:
     return "fins" if layout.is_of_fins else "actuators"
 
 
-def damage_words(damage: Damage, name: str) -> str:
-    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
+def damage_words(damage: Damage, name: str, turns: bool = True) -> str:
+    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a whole one.
+    `turns` says whether what sticks is an angle, else a force."""
     said: dict[str, Callable[[Any], str]] = {
         "weak": lambda share: f"weak {100 * share:.0f} %",
         "torn": lambda share: f"torn, {100 * share:.0f} % left",
-        "stuck": lambda angle: f"stuck at {math.degrees(angle):.0f}°",
+        "stuck": lambda at: f"stuck at {math.degrees(at):.0f}°" if turns else f"hangs at {at:.3g} N",
         "running": lambda command: "runs on",
     }
     known = {} if damage == WHOLE else damage.of(name)

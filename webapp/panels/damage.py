@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Actuator, Layout
+from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import Damage
 from webapp.markup.words import button_colors
 from webapp.page import Page
@@ -74,14 +74,19 @@ def add_damage(page: Page) -> None:
     def leave(kind: str, percent: float) -> None:
         damage(kind, percent / 100.0)
 
+    def held_now() -> list[float]:
+        """The command of that actuator, its angle within a turn."""
+        own = part()
+        command = [float(value) for value in at_now()[: len(own.NUMBERS)]]
+        if own.TURNS:
+            command[own.HELD] = math.remainder(command[own.HELD], math.tau)
+        return command
+
     def jam(stuck: bool) -> None:
-        angle = at_now()[part().HELD]
-        damage("stuck", math.remainder(float(angle), math.tau) if stuck else None)
+        damage("stuck", held_now()[part().HELD] if stuck else None)
 
     def run_on(running: bool) -> None:
-        amplitude, frequency, direction = map(float, at_now())
-        command = amplitude, frequency, math.remainder(direction, math.tau)
-        damage("running", command if running else None)
+        damage("running", tuple(held_now()) if running else None)
 
     about = "Also the one that is selected in the view."
     parts = gui.add_dropdown("Which", ("1",), hint=about)
@@ -97,7 +102,7 @@ def add_damage(page: Page) -> None:
         page.bind_number(slider, partial(leave, kind), _of(kind, 1.0, 100.0), digits=1)
         board.show(slider, visible=_may(kind))
     held = {
-        "stuck": ("Stuck", "It no longer turns from where it is.", jam),
+        "stuck": ("Stuck", "It no longer turns from where it is; a thruster hangs at its force.", jam),
         "running": ("Runs on", "It no longer listens: it keeps the command that it has.", run_on),
     }
     for kind, (label, hint, act) in held.items():
@@ -106,7 +111,10 @@ def add_damage(page: Page) -> None:
         board.show(box, visible=_may(kind))
     angle = gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint="Where it stays.", visible=False)
     page.bind_number(angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1)
-    board.show(angle, visible=_is("stuck"))
+    board.show(angle, visible=_is("stuck", lambda own: own.TURNS))
+    force = gui.add_number("Hangs at [N]", 0.0, step=1.0, hint="The force that it keeps.", visible=False)
+    page.bind_number(force, lambda at: damage("stuck", at), _of("stuck", 0.0, 1.0), digits=2)
+    board.show(force, visible=_is("stuck", lambda own: not own.TURNS))
     kept = gui.add_vector3(
         "A [°], f [Hz], φ [°]", (0.0, 0.0, 0.0), step=0.5, hint="The command that it keeps.", visible=False
     )
@@ -116,7 +124,7 @@ def add_damage(page: Page) -> None:
         _of("running", (0.0, 0.0, 0.0), (DEGREE, 1.0, DEGREE)),
         digits=2,
     )
-    board.show(kept, visible=_is("running"))
+    board.show(kept, visible=_is("running", lambda own: isinstance(own, Fin)))
     mends = {"This one": lambda: session.mend(part().name), "All": session.mend_all}
     page.add_buttons("Repair", mends, hint="Can be undone.")
 
@@ -134,15 +142,26 @@ def _may(kind: str) -> Callable[[str | None, Layout], bool]:
     return may
 
 
-def _is(kind: str) -> Callable[[str | None, Layout, Damage], bool]:
-    return lambda selected, layout, damage: kind in damage.of(_part(selected, layout).name)
+def _is(
+    kind: str, fits: Callable[[Actuator], bool] = lambda own: True
+) -> Callable[[str | None, Layout, Damage], bool]:
+    """Whether the actuator has a fault of a kind, and fits."""
+
+    def has(selected: str | None, layout: Layout, damage: Damage) -> bool:
+        own = _part(selected, layout)
+        return kind in damage.of(own.name) and fits(own)
+
+    return has
 
 
 def _of(kind: str, full: Any, unit: Any) -> Callable[[str | None, Layout, Damage], Any]:
     """What is known of it, in units for people; `full` where it has no such fault."""
 
     def value(selected: str | None, layout: Layout, damage: Damage) -> Any:
-        scaled = np.multiply(damage.of(_part(selected, layout).name).get(kind, full), unit)
+        known = damage.of(_part(selected, layout).name).get(kind, full)
+        if np.shape(known) != np.shape(full):  # the command of one that is no fin
+            known = full
+        scaled = np.multiply(known, unit)
         return tuple(scaled.tolist()) if scaled.ndim else float(scaled)
 
     return value

@@ -71,10 +71,15 @@ def command_line(state: State) -> str:
     for kind, shares in (("weak", damage.weak), ("torn", damage.torn)):
         for name, share in shares.items():
             words += [f"--{kind}", f"{name}={share:g}"]
-    for name, angle in damage.stuck.items():
-        words += ["--stuck", f"{name}={math.degrees(angle):g}"]
-    for name, (amplitude, frequency, angle) in damage.running.items():
-        words += ["--running", f"{name}={amplitude:g},{frequency:g},{math.degrees(angle):g}"]
+    for name, held in damage.stuck.items():
+        turns = layout.part(name).TURNS
+        words += ["--stuck", f"{name}={math.degrees(held) if turns else held:g}"]
+    for name, command in damage.running.items():
+        part = layout.part(name)
+        numbers = list(command)
+        if part.TURNS:
+            numbers[part.HELD] = math.degrees(numbers[part.HELD])
+        words += ["--running", f"{name}=" + ",".join(f"{number:g}" for number in numbers)]
     if state.flow is not None:
         words += ["--flow", *(f"{value:g}" for value in state.flow)]
     if state.method != "dual":

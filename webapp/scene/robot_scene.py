@@ -135,7 +135,7 @@ class RobotScene:
         edited = selected if task == "Design" and not swims else None
         stuck = () if swims else damage.stuck
         for i, part in enumerate(drawn.actuators):
-            remark = "" if swims or part.name in failed else damage_words(damage, part.name)
+            remark = "" if swims or part.name in failed else damage_words(damage, part.name, part.TURNS)
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])

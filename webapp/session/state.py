@@ -13,7 +13,7 @@ from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
 from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
 from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
@@ -100,7 +100,7 @@ class State:
         """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend that."""
         part = self.layout.part(name)
         chosen(kind, f"fault of {name}, a {part.type}", part.FAULTS)
-        checked = None if value is None else _checked_fault(name, kind, value)
+        checked = None if value is None else _checked_fault(part, kind, value)
         return self._with_damage(self.damage.with_fault(name, kind, checked))
 
     def _with_damage(self, damage: Damage) -> "State":
@@ -129,12 +129,17 @@ class State:
         return replace(self, temperature=replace(settings, temperature=value).temperature)
 
 
-def _checked_fault(name: str, kind: str, value: Any) -> Any:
+def _checked_fault(part: Actuator, kind: str, value: Any) -> Any:
+    name = part.name
     if kind in ("weak", "torn"):
         share = number(value, f"share left of {name}", *STRENGTH_RANGE)
         return None if share == 1.0 else share
+    if kind == "stuck" and not part.TURNS:
+        return number(value, f"force of {name}, stuck [N]", -math.inf, math.inf)
     if kind == "stuck":
         return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)
+    if not isinstance(part, Fin):  # the robot's own checks say what else is wrong
+        return tuple(number(one, f"command that {name} keeps", -math.inf, math.inf) for one in value)
     amplitude, frequency, angle = value
     return (
         _angle(amplitude, f"amplitude of {name} [°]", 0.0, MAX_AMPLITUDE),

@@ -11,7 +11,8 @@ Factors are those of the frame of ArduSub that the thrusters make; of any other 
 geometry suggests: shares of the strongest.
 
 Both are posed at full strength: thrusters give the newton that are asked of them, each within its own limits
-(PX4's thrust coefficient of each is its largest force), and failed thrusters are taken out.
+(PX4's thrust coefficient of each is its largest force), and failed thrusters are taken out, as are those that
+hang at a force, which the others make up for.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from finlab.allocation.baselines.held import held_of
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
@@ -67,9 +69,10 @@ class Px4(LeastErrorMethod):
 
     def prepare(self) -> None:
         lower, upper = self.plant.lower[:, 0], self.plant.upper[:, 0]
-        self._most = np.maximum(upper, -lower)
+        held, self._kept = held_of(self.plant)
+        self._most = np.where(held, 1.0, np.maximum(upper, -lower))
         self._low, self._high = lower / self._most, upper / self._most
-        effectiveness = SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most)[ROWS]
+        effectiveness = SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most * ~held)[ROWS]
         self.mix, self.setpoint_scale = normalised(np.linalg.pinv(effectiveness, rcond=ROUNDS_OFF))
         self.setpoint_unit: Array = np.empty(6)
         """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where nothing
@@ -77,7 +80,8 @@ class Px4(LeastErrorMethod):
         self.setpoint_unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        part = (self.setpoint_scale * SIGNS * targets[:, ROWS])[:, None, :] * self.mix
+        wanted = targets - self._kept
+        part = (self.setpoint_scale * SIGNS * wanted[:, ROWS])[:, None, :] * self.mix
         u, form = part.sum(axis=-1), self.settings.desaturation
         if form == "axes":
             for axis in (SWAY, SURGE, YAW, HEAVE, PITCH, ROLL):
@@ -145,10 +149,14 @@ class ArduSub(LeastErrorMethod):
 
     def prepare(self) -> None:
         effectiveness = self.plant.effectiveness[:, 0, COLUMNS] * SUB_SIGNS
-        self.factors = frame_factors(effectiveness)
-        """Factors (n, 6)."""
+        held, self._kept = held_of(self.plant)
+        self.factors = np.zeros(effectiveness.shape)
+        """Factors (n, 6); 0 of those that hang at a force."""
+        full = 1.0
+        if not held.all():
+            self.factors[~held] = frame_factors(effectiveness[~held])
+            full = 0.5 * (self.plant.upper - self.plant.lower)[~held, 0].mean()
         actual = (effectiveness * self.factors).sum(axis=0)
-        full = 0.5 * (self.plant.upper - self.plant.lower)[:, 0].mean()
         self.setpoint_unit: Array = np.empty(6)
         """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where nothing answers;
         full output counts as the mean of both ways of all thrusters."""
@@ -161,7 +169,8 @@ class ArduSub(LeastErrorMethod):
         force = np.zeros((len(targets), self.plant.n))
         for group in GROUPS:
             columns = list(group)
-            part = (SUB_SIGNS * targets[:, COLUMNS])[:, columns] @ self._per[:, columns].T
+            wanted = SUB_SIGNS * (targets - self._kept)[:, COLUMNS]
+            part = wanted[:, columns] @ self._per[:, columns].T
             room = np.where(part < 0.0, lower, upper)
             share = np.divide(room, part, out=np.full_like(part, np.inf), where=np.abs(part) > 1e-12)
             share[share <= 0.0] = np.inf  # a thruster that cannot reverse is clipped, and holds nobody back

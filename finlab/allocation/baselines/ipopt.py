@@ -48,10 +48,12 @@ class ForceProgram:
         share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
         per = np.repeat(self._most, 2)
         wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
-        self._parts: list[_Line | _Plane] = []
+        self._parts: list[_Line | _Plane | _Held] = []
         for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
             own, most = share[2 * i : 2 * i + 2], float(self._most[i])
-            if isinstance(response, Plane):
+            if inverse.held[i]:
+                self._parts.append(_Held())
+            elif isinstance(response, Plane):
                 self._parts.append(_Plane(casadi, response, own))
             else:
                 line = _Line(casadi, response, own, most, inverse.groups[group][1], place)
@@ -87,6 +89,21 @@ class ForceProgram:
         rng = np.random.default_rng(seed)
         drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
         return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._most[:, None]])
+
+
+class _Held:
+    """One actuator that has one command alone: what it gives is beside the forces, its variables are 0."""
+
+    limits = ()
+    convex = True
+    cost = full_cost = 0.0
+    """See `_Line`."""
+    ends = ((0.0, 0.0), (0.0, 0.0))
+    """See `_Line`."""
+
+    def random(self, rng: np.random.Generator) -> Array:
+        """Shares (2,) within the limits."""
+        return np.zeros(2)
 
 
 class _Line:

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from finlab.actuators.response import Line, Plane, Response
+from finlab.allocation.baselines.held import held_of
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
@@ -45,9 +46,12 @@ class PseudoInverse:
         """Of each actuator, in order: itself, its group, and its place there."""
         self.responses: list[Response] = compiled.robot.responses
         """What each offers."""
-        self.beside = compiled.beside
-        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils."""
+        self.held, kept = held_of(plant)
+        """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
+        self.beside = compiled.beside + kept
+        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is held."""
         along = compiled.robot.effectiveness * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
+        along[self.held] = 0.0
         self.effectiveness: Array = along.reshape(-1, 6).T
         """Wrench (6, 2 n) per newton along each actuator's directions."""
         self.largest = np.array([_largest(each) for each in self.responses])

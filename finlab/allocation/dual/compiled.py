@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.actuator import Places
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
@@ -34,7 +35,7 @@ class Compiled:
         `price_of_doubt`. Errors as for `FinGroup`."""
         self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
         self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
-        self._effectiveness, self._counts = plant.effectiveness, plant.counts
+        self._effectiveness, self._counts = plant.effectiveness, plant.counts.astype(np.float64)
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -102,7 +103,7 @@ class Compiled:
         """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own axes."""
         return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
-    def radial_worth(self, group: Group, places: Array, worth: Worth) -> Array | None:
+    def radial_worth(self, group: Group, places: Places, worth: Worth) -> Array | None:
         """Returns what forces are worth by the laws of a group at some places; see `Group.radial_worth`.
         Where all actuators are alike, one answers for all."""
         ahead, back = worth.ahead[:, places], worth.back[:, places]

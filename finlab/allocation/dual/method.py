@@ -44,7 +44,7 @@ class DualSettings(Settings):
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
     calm: float = number(
-        2.0, 0.0, 10.0, "what turning costs in a tick: 0 nothing, 2 a few percent of power for half the turning"
+        2.0, 0.0, 10.0, "what turning costs in a tick: 0 nothing, 2 some power for half the turning"
     )
 
 
@@ -115,8 +115,9 @@ class Dual(Method):
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
-            known = {"previous": previous, "prices": prices, "lost": lost, "free": free}
-            return moved.solve(targets, policy=policy, seed=seed, **known)
+            return moved.solve(
+                targets, policy=policy, previous=previous, seed=seed, prices=prices, lost=lost, free=free
+            )
         now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
         if self.plant.interaction is not None:
             return settled(self, targets, policy, now, prices)
@@ -261,7 +262,9 @@ class Dual(Method):
         at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
         bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
         if not self._measured:
-            bound = np.where(_sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, (1.0 - CLOSE) * value), bound)
+            bound = np.where(
+                _sizes((wrench - aim) / self.scale) <= NEARLY, np.maximum(bound, (1.0 - CLOSE) * value), bound
+            )
         elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)) and works.all():
             # The prices are those of the smooth shapes that stand for tables.
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)

@@ -7,7 +7,6 @@ gradient of the power lies in the range of the slope of the whole model: the con
 Tucker hold there (sequential convex programming). The turns themselves are in finlab/core/turns.c.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
