@@ -4,6 +4,7 @@
    solved, depth first; a part whose dual value proves that it is no cheaper is left out. */
 #include "inner.h"
 
+#define FLAT R(4e-3) /* half of an arc up to which nobody sees the chord beside the arc */
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
 
 /* Angle of a force from the middle of its arc. */
@@ -42,6 +43,7 @@ static real gap_of(const real *block, const fl_work *work, int i, const real *fo
   }
   real size = size_of(force), amount = in_band(a, set, force);
   if (set->reverse > 0 && !price) return MAX(between_ways(a, set, force, size), amount);
+  if (!price && set->half > FLAT && set->low > HOLLOW * largest && size < set->low * (1 - NEARLY)) amount += 1 - size / set->low;
   if (set->half > NARROW) {
     real off = FABS(off_middle(set, force)) - set->half;
     if (off > CLOSE && size > NEARLY * a->most[0]) amount += off;

@@ -173,7 +173,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *share, real *most_share) {
   real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
-  int n = COUNT(block), depth = 0, most = 2 * (ROUNDS + n), found = 0;
+  int n = COUNT(block), depth = 0, most = 20 * (ROUNDS + n), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
   serve(block, work, wrench, policy, own, score);

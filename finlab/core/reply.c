@@ -251,7 +251,10 @@ real farthest_of(const real *block, int i, const fl_set *set, const real *price,
     return price[0];
   }
   const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
-  fan f = direction_of(set, gauge, price, TINY);
+  const real middle[2] = {set->cos_middle, set->sin_middle};
+  const int is_free = size_of(price) * size_of(price) <= TINY; /* then any force will do, but it must be one of the set */
+  fan f = direction_of(set, gauge, is_free ? middle : price, TINY);
+  if (is_free) f.along = 0;
   if (f.beyond) { /* of an uneven fin the farther end may be worth more */
     const real rho = gauge_or_one(gauge, f.other);
     const real other[2] = {rho * COS(f.other), rho * SIN(f.other)};
