@@ -21,9 +21,10 @@ typedef double fl_wide; /* of points that are mixed, as their differences are sm
 #define FL_PARTS 1000 /* of sets with gaps that are looked at for one target */
 #endif
 /* Newton's steps of one answer at most: two searches of two parts, each a dive and two for each cut. Where foils drag,
-   steps of a start take FL_SETTLE more: starts of a part, of the foils' ends and of the shares of a ray. */
+   steps of a start take FL_SETTLE more: starts of a part, of the foils' ends, of a lattice of their angles (6) and of the
+   shares of a ray. */
 #define FL_SETTLE (12 * 60)
-#define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2) + 48)
+#define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
 #define FL_VERSION 3
 #define FL_MAGIC 41721 /* first number of a block */

@@ -2,7 +2,12 @@
    between the curve and its chord for it, too. Steps on the angles of the foils lead from its forces to commands that
    give a wrench by the curves. A step is the dual's answer where each curve is its tangent, curved as much as the cost
    less the worth of the force, whatever the sign (sequential quadratic programming); all other sets are whole.
-   Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper. */
+   Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper.
+
+   Steps lead to what is near. With few actuators what foils give is a curved sheet, which turns back where they stall:
+   a wrench on it is met at few commands, far from each other, and from elsewhere steps end at a least miss. Where the
+   starts that the dual has come to no cost that it proves, others are taken from a lattice over the angles of all
+   foils, each kept within the branches of the lifts on which it lies. */
 #include "inner.h"
 
 #define TRUST (R(3.0) / ROUNDS)      /* of its range that a foil turns in a step: all together may cross it thrice */
@@ -78,6 +83,7 @@ static void stepped(const real *block, const fl_work *work, const fl_box *box, r
     const real *t = work->tangent[i].slope, *there = work->now->force[i];
     real way[2] = {size * (there[0] - force[i][0]), size * (there[1] - force[i][1])};
     real wanted[2] = {force[i][0] + way[0], force[i][1] + way[1]};
+    if (work->span.lost[i]) continue;
     if (ACTUATOR(block, i)->speed > 0)
       command[i][0] = held_in(box, i, 0, -1, command[i][0] + dot(way, t, 2) / MAX(dot(t, t, 2), TINY));
     else
@@ -85,16 +91,46 @@ static void stepped(const real *block, const fl_work *work, const fl_box *box, r
   }
 }
 
-/* Whether Levenberg-Marquardt steps make commands within a box give work->aim, to rounding. */
-static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps) {
-  real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
-  return refine(block, work, box, work->aim, command, steps) <= EXACT + ROUNDING * size;
+/* Whether commands within a box are fewer than the directions in which the robot drives: what they give is a sheet,
+   and that of the tables lies beside that of the laws, by FINE at most. A wrench on the one is then met by no commands
+   of the other. */
+static int are_few(const real *block, const fl_work *work, const fl_box *box) {
+  int free = 0;
+  for (int i = 0; i < COUNT(block); i++)
+    for (int c = 0; c < 3; c++) free += !work->span.lost[i] && box->high[i][c] > box->low[i][c];
+  return free < work->span.range;
 }
 
-/* Makes commands give work->aim, in the basis `target`, and then cheaper; `price` becomes that of the last step. Their
-   forces along the rows, and their cost [W]; NONE where they do not come to give it. */
-static real settle(const real *block, fl_work *work, const real *target, real *price, real command[][3],
+/* Steps towards work->aim, of which so many in a row have to halve the miss: most starts end soon. */
+static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps) {
+  real before, miss = NONE;
+  for (int k = 0; k < 2 * ROUNDS; k += steps) {
+    before = miss;
+    miss = refine(block, work, box, work->aim, command, steps);
+    if (miss <= EXACT || miss > before / 2) return;
+  }
+}
+
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->aim, to a part of the yardstick and
+   to rounding. Where that is what tables leave, steps on their miss end soon. */
+static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps, real part) {
+  real size = 0;
+  for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
+  if (part > EXACT) {
+    approach(block, work, box, command, ROUNDS / 2);
+    steps = 0;
+  }
+  return refine(block, work, box, work->aim, command, steps) <= part + ROUNDING * size;
+}
+
+/* How far off the yardstick commands may be that are said to give a wrench: what tables leave where these are few. */
+static real allowed(const real *block, const fl_work *work, const fl_box *box) {
+  return are_few(block, work, box) ? FINE : EXACT;
+}
+
+/* Makes commands give work->aim, in the basis `target`, to a part of the yardstick, and then cheaper; `price` becomes
+   that of the last step. Their forces along the rows, and their cost [W]; NONE where they do not come to give it. */
+static real settle(const real *block, fl_work *work, const real *target, real part, real *price, real command[][3],
                    real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
@@ -102,13 +138,13 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
   memcpy(before, work->set, sizeof before);
   cost_of(block, work, command, force);
   take_sides(block, work, &box, command, force);
-  int met = come_to_give(block, work, &box, command, 2 * ROUNDS), moved = 1;
+  int met = come_to_give(block, work, &box, command, 2 * ROUNDS, part), moved = 1;
   real cost = met ? cost_of(block, work, command, force) : NONE;
   for (int k = 0; met && k < ROUNDS; k++) {
     for (int i = 0; moved && i < COUNT(block); i++) {
       real own[2];
       own_price(work, i, price, own);
-      if (ACTUATOR(block, i)->speed > 0)
+      if (ACTUATOR(block, i)->speed > 0 && !work->span.lost[i])
         draw_tangent(block, i, &box, command[i][0], own, work->tangent + i, work->set + i);
     }
     sums_of(block, work);
@@ -116,7 +152,8 @@ static real settle(const real *block, fl_work *work, const real *target, real *p
       memcpy(price, work->now->price, sizeof work->now->price);
     memcpy(tried, command, sizeof tried);
     stepped(block, work, &box, force, size, tried);
-    real gain = come_to_give(block, work, &box, tried, 2 * ROUNDS) ? cost - cost_of(block, work, tried, other) : -NONE;
+    int meets = come_to_give(block, work, &box, tried, 2 * ROUNDS, part);
+    real gain = meets ? cost - cost_of(block, work, tried, other) : -NONE;
     if ((moved = gain > 0)) {
       memcpy(command, tried, sizeof tried);
       memcpy(force, other, sizeof other);
@@ -134,7 +171,7 @@ static void place_from(const real *block, fl_work *work, const real *target, con
                        real *best) {
   real own[FL_MOST][2], near[6];
   memcpy(near, price, sizeof near);
-  real cost = settle(block, work, target, near, command, own);
+  real cost = settle(block, work, target, allowed(block, work, &work->box), near, command, own);
   if (!(cost < *best)) return;
   *best = cost;
   memcpy(work->placed, command, sizeof work->placed);
@@ -159,12 +196,251 @@ static const real *end_of(const real *block, const fl_actuator *a) {
 static int may_stall(const real *block, const fl_work *work, int i, int end, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   *command = (end ? work->box.high : work->box.low)[i][0];
-  return a->speed > 0 && FABS(*command - a->turned) > end_of(block, a)[1];
+  return a->speed > 0 && !work->span.lost[i] && FABS(*command - a->turned) > end_of(block, a)[1];
+}
+
+/* The dual's value at its prices, less what foils would be worth more there where they stall, which its sets leave out:
+   no commands give the target for less, as near as so many angles tell. `most` is what none cost more than. */
+static real proved_value(const real *block, const fl_work *work, real *most) {
+  real value = work->now->value;
+  *most = work->most_cost * (1 + CLOSE) + NOTHING;
+  for (int i = 0; i < COUNT(block); i++)
+    for (int end = 0; end < 2; end++) {
+      const fl_actuator *a = ACTUATOR(block, i);
+      real limit, own[2], more = 0;
+      if (!may_stall(block, work, i, end, &limit)) continue;
+      own_price(work, i, work->now->price, own);
+      reply known = reply_of(block, i, work->set + i, own);
+      real last = end_of(block, a)[1];
+      real begin = a->turned + (end ? last : -last);
+      for (int k = 1; k <= ROUNDS; k++) {
+        fl_tangent t;
+        foil_at(block, i, begin + (limit - begin) * k / ROUNDS, &t);
+        real worth = dot(own, t.force, 2) - t.cost;
+        more = MAX(more, worth - known.conjugate);
+      }
+      fl_tangent stalled;
+      foil_at(block, i, limit, &stalled);
+      value -= more;
+      *most += stalled.cost;
+    }
+  return value;
+}
+
+/* A lattice over the angles of foils. Each has some on every branch of its lift within the limits: stalled one way,
+   lift one way, lift the other way, stalled the other way. */
+enum { BRANCHES = 4, LAID = 6 }; /* branches of a foil; foils on the lattice, others begin at rest */
+#define LATTICE (1 << 2 * LAID)  /* points at most: one on each branch of so many foils */
+#define EACH_MOST (ROUNDS / 2)   /* angles on a branch */
+#define NODES (4 * ROUNDS)       /* angles of all foils at most: of 4 branches 24 of one foil, 16 of 3 foils, 8 of 4 */
+#define SPREAD (5 * ROUNDS)      /* points at which steps on the commands begin */
+#define FOLLOWED (ROUNDS / 2)    /* how many of these are made cheaper; FL_STARTS counts them */
+
+typedef struct {
+  int foils, foil[LAID];                            /* how many there are, and which actuators these are */
+  int branches[LAID], first[LAID];                  /* of each: branches, and its first node */
+  int each;                                         /* nodes on a branch */
+  real edge[LAID][BRANCHES + 1];                    /* ends of the branches [rad] */
+  real angle[NODES], cost[NODES], wrench[NODES][6]; /* of each node; the wrench in the basis */
+  real row[FL_MOST][2][6];                          /* forces of all other actuators by a wrench in the basis */
+} lattice;
+
+typedef struct {
+  unsigned char node[LAID]; /* of each foil */
+  real cost;                /* [W], with the price of a miss */
+} point;
+
+/* Foils, their branches, and how many nodes each branch has. */
+static void find_branches(const real *block, const fl_work *work, lattice *l) {
+  int all = 1, together = 0;
+  l->foils = 0;
+  for (int i = 0; i < COUNT(block) && l->foils < LAID; i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    if (!(a->speed > 0) || work->span.lost[i]) continue;
+    real low = work->box.low[i][0], high = work->box.high[i][0], last = end_of(block, a)[1];
+    real turn[BRANCHES - 1] = {a->turned - last, a->turned, a->turned + last};
+    real *edge = l->edge[l->foils];
+    int branches = 0;
+    edge[0] = low;
+    for (int k = 0; k < BRANCHES - 1; k++)
+      if (turn[k] > low && turn[k] < high) edge[++branches] = turn[k];
+    edge[++branches] = high;
+    l->branches[l->foils] = branches;
+    l->foil[l->foils++] = i;
+    all *= branches;
+    together += branches;
+  }
+  for (l->each = EACH_MOST; l->each > 1; l->each--) {
+    int points = all;
+    for (int f = 0; f < l->foils; f++) points *= l->each;
+    if (points <= LATTICE && together * l->each <= NODES) return;
+  }
+}
+
+/* The nodes of all foils. */
+static void lay_nodes(const real *block, const fl_work *work, lattice *l) {
+  int node = 0;
+  for (int f = 0; f < l->foils; f++) {
+    const real(*matrix)[6] = work->span.matrix[l->foil[f]];
+    l->first[f] = node;
+    for (int k = 0; k < l->branches[f] * l->each; k++, node++) {
+      const real *edge = l->edge[f] + k / l->each;
+      real share = (k % l->each + R(0.5)) / l->each;
+      fl_tangent t;
+      l->angle[node] = edge[0] + share * (edge[1] - edge[0]);
+      foil_at(block, l->foil[f], l->angle[node], &t);
+      l->cost[node] = t.cost;
+      for (int j = 0; j < 6; j++) l->wrench[node][j] = t.force[0] * matrix[0][j] + t.force[1] * matrix[1][j];
+    }
+  }
+}
+
+/* The other actuators by G^-1 of G = sum B g B', with their gains g: y = g B' G^-1 r are the forces for a wrench r that
+   are cheapest where power is quadratic and nothing has limits. */
+static void lay_rows(const real *block, const fl_work *work, lattice *l) {
+  real gram[6][6] = {{0}}, trace = 0;
+  memset(l->row, 0, sizeof l->row);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    for (int q = 0; q < (int)a->rows && !(a->speed > 0); q++)
+      for (int j = 0; j < 6; j++) {
+        const real *row = work->span.matrix[i][q];
+        const real own = a->gain[q] * row[j];
+        for (int k = 0; k <= j; k++) gram[j][k] += own * row[k];
+      }
+  }
+  for (int j = 0; j < 6; j++) trace += gram[j][j];
+  for (int j = 0; j < 6; j++) gram[j][j] += MAX(NOTHING, ROUNDING) * trace + TINY;
+  if (!factor(gram)) return;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    for (int q = 0; q < (int)a->rows && !(a->speed > 0); q++) {
+      solve(gram, work->span.matrix[i][q], l->row[i][q]);
+      for (int j = 0; j < 6; j++) l->row[i][q][j] *= a->gain[q];
+    }
+  }
+}
+
+/* Forces of the other actuators at a point for a target, held within their limits, and what all cost there: watts as
+   force^1.5, and ROUNDS times those of all actuators for a miss of one scaled wrench. */
+static real cost_at_point(const real *block, const fl_work *work, const lattice *l, const real *target,
+                          const unsigned char *node, real force[][2]) {
+  real left[6], miss[6], cost = 0;
+  memcpy(left, target, sizeof left);
+  for (int f = 0; f < l->foils; f++) {
+    cost += l->cost[node[f]];
+    for (int j = 0; j < 6; j++) left[j] -= l->wrench[node[f]][j];
+  }
+  memcpy(miss, left, sizeof miss);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const fl_set *set = work->set + i;
+    real *own = force[i], size;
+    own[0] = own[1] = 0;
+    if (a->speed > 0) continue;
+    for (int q = 0; q < (int)a->rows; q++) own[q] = dot(l->row[i][q], left, 6);
+    if (is_plane(a)) {
+      real most = MAX(set->high, set->reverse), wanted = size_of(own);
+      size = MIN(wanted, most);
+      for (int q = 0; q < 2; q++) own[q] *= size / MAX(wanted, TINY);
+    } else {
+      own[0] = CLIP(own[0], set->low, set->high);
+      size = FABS(own[0]);
+    }
+    real share = size / a->most[0];
+    cost += MAX(set->high_cost, set->low_cost) * share * SQRT(share);
+    for (int q = 0; q < (int)a->rows; q++)
+      for (int j = 0; j < 6; j++) miss[j] -= own[q] * work->span.matrix[i][q][j];
+  }
+  return cost + ROUNDS * work->most_cost * SQRT(dot(miss, miss, 6));
+}
+
+/* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there are then. */
+static int put_in_order(point *points, int count, const point *own) {
+  int at = MIN(count, SPREAD - 1);
+  if (count == SPREAD && !(own->cost < points[at].cost)) return count;
+  for (; at > 0 && own->cost < points[at - 1].cost; at--) points[at] = points[at - 1];
+  points[at] = *own;
+  return MIN(count + 1, SPREAD);
+}
+
+/* The cheapest point of each choice of branches, and of these the cheapest ones (SPREAD,); how many there are. */
+static int cheapest_points(const real *block, const fl_work *work, const lattice *l, const real *target,
+                           point *points) {
+  int choices = 1, within = 1, count = 0;
+  real force[FL_MOST][2];
+  for (int f = 0; f < l->foils; f++) {
+    choices *= l->branches[f];
+    within *= l->each;
+  }
+  for (int choice = 0; choice < choices; choice++) {
+    point best = {{0}, NONE}, own = {{0}, 0};
+    for (int k = 0; k < within; k++) {
+      int branches = choice, places = k;
+      for (int f = 0; f < l->foils; f++) {
+        int branch = branches % l->branches[f], place = places % l->each;
+        own.node[f] = (unsigned char)(l->first[f] + branch * l->each + place);
+        branches /= l->branches[f];
+        places /= l->each;
+      }
+      own.cost = cost_at_point(block, work, l, target, own.node, force);
+      if (own.cost < best.cost) best = own;
+    }
+    count = put_in_order(points, count, &best);
+  }
+  return count;
+}
+
+/* Commands at a point, after steps towards work->aim: first some that leave the foils on their branches. */
+static void begin_at(const real *block, fl_work *work, const lattice *l, const real *target, const point *own,
+                     real command[][3]) {
+  real force[FL_MOST][2];
+  fl_box box = work->box;
+  cost_at_point(block, work, l, target, own->node, force);
+  commands_for(block, &work->box, force, work->previous, command);
+  for (int f = 0; f < l->foils; f++) {
+    int node = own->node[f], i = l->foil[f], branch = (node - l->first[f]) / l->each;
+    command[i][0] = l->angle[node];
+    box.low[i][0] = l->edge[f][branch];
+    box.high[i][0] = l->edge[f][branch + 1];
+  }
+  approach(block, work, &box, command, ROUNDS / 2);
+  approach(block, work, &work->box, command, ROUNDS / 2);
+}
+
+/* Places what steps from a lattice come to: first exact commands from many points, then the cheapest of these are made
+   cheaper, but for those that cost half as much again as the best so far. */
+static void place_spread(const real *block, fl_work *work, const real *target, const real *price, real enough,
+                         real *best) {
+  lattice l;
+  point points[SPREAD];
+  real command[FL_MOST][3], force[FL_MOST][2], part = allowed(block, work, &work->box), last = 0;
+  find_branches(block, work, &l);
+  lay_nodes(block, work, &l);
+  lay_rows(block, work, &l);
+  int count = cheapest_points(block, work, &l, target, points);
+  for (int k = 0; k < count; k++) {
+    begin_at(block, work, &l, target, points + k, command);
+    int met = come_to_give(block, work, &work->box, command, 0, part);
+    points[k].cost = met ? cost_of(block, work, command, force) : NONE;
+  }
+  for (int tried = 0; tried < FOLLOWED && *best > enough; tried++) {
+    const point *next = 0;
+    for (int k = 0; k < count; k++) { /* commands that cost the same are the same */
+      int is_new = points[k].cost > last * (1 + NEARLY);
+      if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
+    }
+    if (!next || !(next->cost < MIN(*best * R(1.5), NONE))) return;
+    last = next->cost;
+    begin_at(block, work, &l, target, next, command);
+    place_from(block, work, target, price, command, best);
+  }
 }
 
 /* The same of several starts, as steps from a cheap one may end early: each has its own valley. */
 void place_starts(const real *block, fl_work *work, const real *target, real *best) {
-  real start[FL_MOST][3], command[FL_MOST][3], price[6], angle, ridge, enough = work->now->value * (1 + CLOSE);
+  real start[FL_MOST][3], command[FL_MOST][3], price[6], angle, ridge, most;
+  real proved = proved_value(block, work, &most), enough = proved * (1 + CLOSE);
   memcpy(price, work->now->price, sizeof price);
   commands_for(block, &work->box, work->now->force, work->previous, start);
   place(block, work, target, best);
@@ -180,6 +456,7 @@ void place_starts(const real *block, fl_work *work, const real *target, real *be
   first_price(block, work, target, price, &ridge);
   stand_at(block, work, target, price);
   place(block, work, target, best);
+  if (*best > enough && proved <= most) place_spread(block, work, target, price, enough, best);
 }
 
 /* Commands for forces that the dual is sure of: no foil drags more than its lift does, and none is in doubt. */
@@ -192,7 +469,7 @@ static int are_sure(const real *block, fl_work *work) {
   if (worst_gap(block, work, work->now->force, work->now->price) >= 0) return 0;
   memcpy(work->best, work->now->force, sizeof work->best);
   commands_for(block, &work->box, work->best, work->previous, work->placed);
-  return come_to_give(block, work, &work->box, work->placed, ROUNDS);
+  return come_to_give(block, work, &work->box, work->placed, ROUNDS, allowed(block, work, &work->box));
 }
 
 /* Commands that give work->aim, from what Newton's method came to; 0 where none are found. */
@@ -225,7 +502,7 @@ void on_ray(const real *block, fl_work *work, const real *wrench, real found, re
     for (int way = found > 0 ? 0 : 1; way < 2 && !met; way++) {
       memcpy(command, way ? start : out->command, sizeof command);
       memcpy(inner, out->inner, sizeof inner);
-      met = settle(block, work, target, inner, command, own) < NONE;
+      met = settle(block, work, target, EXACT, inner, command, own) < NONE;
     }
     if (!met)
       most = share, less *= found > 0 ? 1 : 10;

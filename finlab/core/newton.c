@@ -212,6 +212,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
       real square = 3 * (slope + end - 2 * rose), line = end - slope - square, root = line * line - 4 * square * slope;
       real share = root > 0 ? 2 * slope / (SQRT(root) - line) : R(0.5);
       ridge = MAX(ridge * MAX(growth, 1 / CLIP(share, R(1e-3), R(0.7))), ROUNDING), growth *= 2;
+      idle--; /* refused steps are not those that gain nothing but rounding: their ridge grows to an end of its own */
     }
   }
 }

@@ -24,7 +24,7 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
   }
   weigh(block, work, weight);
   work->mixture.count = 0;
-  score[0] = (real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture);
+  score[0] = rounded((real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture));
 }
 
 /* The largest share of a wrench that can be given alone. In a tick there may be none, as drives cannot stop or turn at

@@ -61,6 +61,19 @@ def test_self_test_holds(name: str, flow: tuple[float, ...] | None, compiler: st
     assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
 
+@pytest.mark.exhaustive
+def test_single_precision_chooses_the_same_parts_of_sets_with_gaps(tmp_path: Path) -> None:
+    """Of parts that all give a wrench, the miss is rounding, which is to choose no side."""
+    words = f"gcc -std=c99 -O1 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    assert ran(words, exported("torpedo", 2000, SPEED)).startswith("0 of 2000 ")
+
+
+def test_single_precision_goes_on_while_the_ridge_grows(tmp_path: Path) -> None:
+    """From the first prices of foils at a kink, eight steps in a row are refused."""
+    words = f"gcc -std=c99 -O1 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    assert ran(words, exported("torpedo", 24, (1.5, 0.0, 0.0, 0.0, 0.0, 0.0))).startswith("0 of 24 ")
+
+
 @pytest.mark.parametrize("single", SINGLE)
 def test_self_test_fails_where_a_number_is_another(single: str, tmp_path: Path) -> None:
     other, part = (
