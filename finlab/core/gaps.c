@@ -4,7 +4,7 @@
    solved, depth first; a part whose dual value proves that it is no cheaper is left out. */
 #include "inner.h"
 
-#define FLAT R(4e-3) /* half of an arc up to which nobody sees the chord beside the arc */
+#define FLAT R(1e-3) /* half of an arc [rad] up to which its chord is the arc, to half a millionth of the radius */
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
 
 /* Angle of a force from the middle of its arc. */

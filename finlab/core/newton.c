@@ -63,7 +63,7 @@ void sums_of(const real *block, fl_work *work) {
     }
     work->torn |= s->forked || s->reverse > 0;
     work->drags |= ACTUATOR(block, i)->speed > 0 && !work->span.lost[i];
-    if (work->torn || work->drags || ACTUATOR(block, i)->band > 0) work->quick = 0;
+    if (work->torn || work->drags || work->turns || ACTUATOR(block, i)->band > 0) work->quick = 0;
   }
 }
 
