@@ -107,7 +107,9 @@ class Answered(NamedTuple):
 
     def notes(self) -> tuple[str, ...]:
         (robot, method, _, free), _, flow, _ = self.question
-        wanted = self.wrenches if free is None else np.where(free, 0.0, self.wrenches)
+        wanted = self.wrenches
+        if free is not None:  # of an axis that the layout does not command a note tells
+            wanted = np.where(free & robot.layout.commanded, 0.0, wanted)
         return answer_notes(robot.healthy, method, flow, wanted, self.solution.notes)
 
     def candidates(self) -> Candidates | None:

@@ -39,6 +39,8 @@ class Found(NamedTuple):
     """Targets within reach (N,)."""
     command: Array
     """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
+    error: Array
+    """Distance (N,) of what the commands give from the aims, on the yardstick, by the laws' tables."""
     ended: bool
     """Whether a search ended at its bound of steps."""
 
@@ -178,6 +180,7 @@ class Core:
                 vectors[18:19],
                 self._flags[1:2].astype(bool),
                 self._command.copy(),
+                vectors[19:20],
                 bool(self._flags[3]),
             )
 
@@ -188,20 +191,20 @@ class Core:
     def many(self, wrenches: Array, policy: Any, now: Now = STILL) -> Found:
         """Returns the answers to wrenches (N, 6); see `one`."""
         wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
-        force, value = np.empty((count, self._count, 2)), np.empty(count)
+        force, value, error = np.empty((count, self._count, 2)), np.empty(count), np.empty(count)
         price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
         command = np.empty((count, self._count, 3))
-        outs = [values.ctypes.data for values in (force, price, aim, value, command, within)]
+        outs = [values.ctypes.data for values in (force, price, aim, value, command, within, error)]
         with self._lock:
             served = None if policy is None else _policy(policy)  # kept until the call ends
             self._question.policy = None if served is None else ctypes.addressof(served)
             self._question.price = None
             self._stand(now)
             ins = self._at, self._area, self._to, wrenches.ctypes.data, count
-            error = self._core.fl_answer_many(*ins, *outs)
-        if error > 0:
-            raise CommandError(_REFUSED.format(CODES[error]))
-        return Found(force, price, aim, value, within, command, error < 0)
+            code = self._core.fl_answer_many(*ins, *outs)
+        if code > 0:
+            raise CommandError(_REFUSED.format(CODES[code]))
+        return Found(force, price, aim, value, within, command, error, code < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Returns commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep `previous` ones

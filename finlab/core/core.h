@@ -82,6 +82,7 @@ typedef struct { /* what one actuator may give now */
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
   fl_real turn;     /* kappa: turning by d from `at` costs kappa / 2 d^2 [W/rad^2]; 0 where it costs nothing */
   fl_real at;       /* angle of the force before, within a turn of `middle` [rad] */
+  fl_real way;      /* of one that goes where it is worth most: what a radian of the way costs in a tick [W/rad]; else 0 */
   fl_real cut;      /* where it jumps: angle between the two answers [rad] */
   int flipped, forked;
   int jumps;        /* whether its answer jumps where Newton's method stood still */
@@ -190,7 +191,7 @@ typedef struct {
 int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
                    fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,
-                   unsigned char *within);
+                   unsigned char *within, fl_real *error);
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
 int fl_worth(const fl_real *block, fl_work *work, const fl_now *now, const fl_real *price, int count, fl_real *worth);

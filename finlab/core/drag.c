@@ -384,7 +384,7 @@ static int cheapest_points(const real *block, const fl_work *work, const lattice
         places /= l->each;
       }
       own.cost = cost_at_point(block, work, l, target, own.node, force);
-      if (own.cost < best.cost) best = own;
+      if (k == 0 || own.cost < best.cost) best = own;
     }
     count = put_in_order(points, count, &best);
   }

@@ -8,23 +8,25 @@ int fl_sizes(int which) {
 }
 
 /* Answers to wrenches (count, 6), all else as of a question: forces (count, n, 2), prices and aims (count, 6), values,
-   commands (count, n, 3), within reach; -1 where a search ended at its bound of steps. */
+   commands (count, n, 3), within reach, errors; -1 where a search ended at its bound of steps. */
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question, const real *wrench, int count,
-                   real *force, real *price, real *aim, real *value, real *command, unsigned char *within) {
+                   real *force, real *price, real *aim, real *value, real *command, unsigned char *within,
+                   real *error) {
   const int n = COUNT(block);
   int ended = 0;
   fl_question q = *question;
   fl_answer out;
   for (int k = 0; k < count; k++) {
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
-    const int error = fl_answer_one(block, work, &q, &out);
-    if (error) return error;
+    const int code = fl_answer_one(block, work, &q, &out);
+    if (code) return code;
     memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
     memcpy(price + 6 * k, out.price, sizeof out.price);
     memcpy(aim + 6 * k, out.aim, sizeof out.aim);
     memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
     value[k] = out.value;
     within[k] = out.within;
+    error[k] = out.error;
     ended |= out.ended;
   }
   return ended ? -1 : 0;

@@ -14,7 +14,7 @@ SIGNATURES = {
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
-    "fl_answer_many": "ippppipppppp",
+    "fl_answer_many": "ippppippppppp",
     "fl_commands": "vpppipp",
     "fl_look": "rppppp",
     "fl_worth": "ippppip",

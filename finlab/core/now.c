@@ -5,6 +5,7 @@
    losses and rates are all sets; nothing else of the core knows of them. */
 #include "inner.h"
 
+#define HORIZON 40 /* ticks over which what a fin is worth elsewhere has to pay for its way */
 #define LEAST_POWER R(1e-3) /* of full power, that counts as the mean power of the commands before, for turning */
 
 int is_known(const real *command) {
@@ -57,6 +58,18 @@ void into_box(const real *block, const fl_box *box, real command[][3]) {
   }
 }
 
+/* Power [W] of an actuator at a command. */
+static real power_at(const real *block, int i, const real *command) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real force[3];
+  force_of(block, i, command, force, 0);
+  real size = a->sign * force[0];
+  if (is_plane(a)) size = size_of(force + 1);
+  if (a->form == FL_POD && command[1] < 0) size = -size;
+  if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(force[2], force[1]));
+  return cost_at(block, i, CLIP(size, a->low, a->high));
+}
+
 /* Mean power [W] of the actuators at the commands before, and a little of full power, as there is none at rest. */
 static real mean_power(const real *block, const fl_work *work, const real *previous) {
   real power = 0;
@@ -64,17 +77,10 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
   int count = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const real *before = previous + 3 * i;
     if (work->span.lost[i]) continue;
     count++;
     full += MAX(cost_at(block, i, a->high), cost_at(block, i, a->low));
-    if (!is_known(before)) continue;
-    real force[3];
-    force_of(block, i, before, force, 0);
-    real size = is_plane(a) ? size_of(force + 1) : a->sign * force[0];
-    if (a->form == FL_POD && before[1] < 0) size = -size;
-    if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(force[2], force[1]));
-    power += cost_at(block, i, CLIP(size, a->low, a->high));
+    if (is_known(previous + 3 * i)) power += power_at(block, i, previous + 3 * i);
   }
   return MAX(power, LEAST_POWER * full) / MAX(count, 1);
 }
@@ -103,6 +109,7 @@ static void tick_set(const real *block, fl_work *work, int i, const real *before
   if (!is_plane(a) || !(kappa > 0)) return;
   const real at = before[angle_of(a)] + own.lean + (set->flipped ? PI : 0);
   set->turn = kappa;
+  if (a->form == FL_FIN) set->way = kappa * a->step[2] / (2 * HORIZON); /* of kappa / 2 d^2 in each tick at full rate */
   set->at = set->middle + wrapped(at - set->middle);
 }
 

@@ -178,6 +178,7 @@ int span_now(const real *block, fl_work *work, const unsigned char *lost, const 
 /* Prepares a work area for the whole robot; an error code. */
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
+  work->ray = 0;
   for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
   if (!span_anew(block, work, 1)) return FL_BAD_NUMBER;
   set_limits(block, work, 0, 0);

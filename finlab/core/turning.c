@@ -12,6 +12,10 @@
        Hessian   T' b b' + m m' / (-h'')   inside the window,  m = T' v' b + T b'
                  T' b b'                   at its ends
 
+   The cost is counted from a reference angle, mostly that before. Fins turn fast: one whose price points elsewhere goes
+   there at its rate where what it is worth there, over some ticks, pays for the way; else those that point away, which
+   give little and gain nothing from one tick's turn, would stay for ever and leave their work to others.
+
    Where kappa is large beside p T, h is concave and there is one answer: a pod that pushes either way passes through rest
    without turning. Else there may be two maxima, and the answer jumps between them as the price moves: newton.c sees it. */
 #include "inner.h"
@@ -27,6 +31,7 @@ typedef struct { /* one plane at one price */
   const fl_set *set;
   const real *gauge; /* 0 for none */
   real p, sigma;     /* size and angle of the price */
+  real reference;    /* angle from which turning is counted */
 } plane_at_price;
 
 typedef struct { /* what the plane gives at one angle */
@@ -74,7 +79,7 @@ static at_angle look_at(const plane_at_price *x, real alpha) {
   o.dv = o.drho * cosine - o.rho * sine;
   const along best = best_along(x, v);
   const real kappa = x->set->turn;
-  const real d = alpha - x->set->at;
+  const real d = alpha - x->reference;
   o.T = best.force;
   o.dT = best.slope;
   o.value = best.conjugate - kappa / 2 * d * d;
@@ -104,7 +109,19 @@ static real root_between(const plane_at_price *x, real low, real high) {
   return alpha;
 }
 
-/* The force of least and largest angles of the window, around the angle before. */
+/* The angle from which turning is counted: that before, or of a fin that is worth more elsewhere one on the way there. */
+static real reference_of(const plane_at_price *x, real low, real high) {
+  const fl_set *set = x->set;
+  const real at = CLIP(set->at, low, high);
+  if (!(set->way > 0) || !(x->p > 0)) return at;
+  const real way = wrapped(x->sigma - at);
+  const real worth_there = best_along(x, x->p).conjugate;
+  const real worth_here = best_along(x, x->p * COS(way)).conjugate;
+  if (!(worth_there - worth_here > set->way * FABS(way))) return at;
+  return CLIP(at + way, low, high);
+}
+
+/* The least and largest angles of the window, around the angle before. */
 static void window_of(const fl_set *set, real *low, real *high) {
   *low = set->middle - set->half;
   *high = set->middle + set->half;
@@ -116,13 +133,14 @@ static void window_of(const fl_set *set, real *low, real *high) {
 
 reply turned(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
-  plane_at_price x = {block, a, set, 0, size_of(price), 0};
+  plane_at_price x = {block, a, set, 0, size_of(price), 0, 0};
   if (x.p > 0) x.sigma = ATAN2(price[1], price[0]);
   if (a->gauge > 0) x.gauge = block + (int)a->gauge;
 
   real low, high;
   window_of(set, &low, &high);
-  real best_alpha = CLIP(set->at, low, high);
+  x.reference = reference_of(&x, low, high);
+  real best_alpha = x.reference;
   at_angle best = look_at(&x, best_alpha);
   const int cells = (int)CLIP((high - low) / CELL + 2, 2, MOST_CELLS);
   real from = low;

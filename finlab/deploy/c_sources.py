@@ -151,5 +151,6 @@ def _samples(layout: Layout, method: Dual, count: int) -> str:
             before.append(f"static const fl_real {last}[][3] = {_rows(tick)};")
         answered = f"{_row(given)}, {error!r}, {_rows(answer.command)}"
         rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {answered}, {last}}},")
-    about = f"enum {{ SAMPLES = {len(rows)} }};"
+    calm = method.settings.calm
+    about = f"#define CALM {calm!r}\nenum {{ SAMPLES = {len(rows)} }};"
     return "\n".join([*before, "static const sample samples[] = {", *rows, "};", about, ""])

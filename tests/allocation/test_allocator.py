@@ -52,9 +52,9 @@ def method() -> AnyRobot:
 @pytest.mark.parametrize(
     ("wrench", "sentence"),
     [
-        ([math.nan] * 6, "wrench: NaN on each axis that layout"),
-        ([1, 0, 0, 0, 0, -math.inf], "Tz must be at most 1e+06 in size, or NaN where it is free, got -inf"),
-        ([1, 2e6, 0, 0, 0, 0], "Fy must be at most 1e+06 in size, or NaN where it is free, got 2000000.0"),
+        ([math.nan] * 6, "wrench: Fx must be a number of at most 1e+06 in size, got nan"),
+        ([1, 0, 0, 0, 0, -math.inf], "Tz must be a number of at most 1e+06 in size, got -inf; an axis that may take"),
+        ([1, 2e6, 0, 0, 0, 0], "Fy must be a number of at most 1e+06 in size, got 2000000.0"),
         ([10**400, 0, 0, 0, 0, 0], "wrench: expected six numbers"),
         (
             [1, 0, 0],

@@ -1,6 +1,7 @@
-"""Axes that do not count: of a layout, and of one question by NaN."""
+"""Axes that do not count: of a layout, and of one question by their names."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,6 @@ from tests.mixed_robots import layout_of
 from tests.own_plant import OwnPlant
 
 POLICIES = ("closest", "direction", "priority")
-NAN = np.nan
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -32,14 +32,14 @@ def test_an_axis_that_nobody_commands_decides_nothing(name: str, surge: float, p
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_nan_frees_an_axis_for_one_question(policy: str) -> None:
+def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
     layout = load_layout("bluerov2_heavy")
-    allocator, surge = Allocator(layout), [20.0, NAN, NAN, NAN, NAN, NAN]
-    one = allocator.allocate(surge, policy=policy)
+    allocator, surge, free = Allocator(layout), [20.0, 1.0, 2.0, 3.0, 4.0, 5.0], AXES[1:]
+    one = allocator.allocate(surge, free=free, policy=policy)
     assert one.wrench[0] == pytest.approx(20.0) and one.reachable
-    np.testing.assert_array_equal(np.isnan(one.target), np.isnan(surge))
+    np.testing.assert_array_equal(np.isnan(one.target), [False] + 5 * [True])
     np.testing.assert_allclose(one.unallocated, 0.0, atol=1e-7)
-    held = allocator.allocate(np.nan_to_num(surge), policy=policy)
+    held = allocator.allocate([20.0, 0, 0, 0, 0, 0], policy=policy)
     assert one.power <= held.power * (1.0 + 1e-9)
     robot = Allocator(replace(layout, axes=("Fx",))).allocate([20.0, 1.0, 2.0, 3.0, 4.0, 5.0], policy=policy)
     np.testing.assert_allclose(robot.command, one.command, atol=1e-9)
@@ -47,8 +47,7 @@ def test_nan_frees_an_axis_for_one_question(policy: str) -> None:
 
 def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
     plant = OwnPlant(parts := layout_of("r", _three_thrusters()))
-    target = np.array([12.0, 0.0, 0.0, 0.0, 0.0, NAN])
-    answer = Allocator(parse_layout(parts)).allocate(target)
+    answer = Allocator(parse_layout(parts)).allocate([12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",))
     watts = [lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)]
     assert answer.power <= min(watts) * (1.0 + 1e-6)
     assert answer.power >= min(watts) * (1.0 - 1e-2)
@@ -64,24 +63,36 @@ def _three_thrusters() -> list[dict[str, object]]:
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_a_batch_of_different_free_axes_is_answered_as_each_alone(policy: str) -> None:
+def test_a_batch_with_free_axes_is_answered_as_each_alone(policy: str) -> None:
     rng = np.random.default_rng(7)
     for name in ("bluerov2", "A", "catamaran"):
         allocator = Allocator(load_layout(name))
         wrenches = rng.normal(size=(12, 6)) * allocator.scale * 10.0 ** rng.uniform(-1, 1, (12, 1))
-        wrenches[rng.random((12, 6)) < 0.3] = NAN
-        wrenches[:, 0] = np.nan_to_num(wrenches[:, 0])
-        batch = allocator.allocate_batch(wrenches, policy=policy)
+        free = tuple(rng.choice(AXES[1:], 2, replace=False))
+        batch = allocator.allocate_batch(wrenches, free=free, policy=policy)
         for k, wrench in enumerate(wrenches):
-            one = allocator.allocate(wrench, policy=policy)
+            one = allocator.allocate(wrench, free=free, policy=policy)
             assert batch.err_norm[k] == pytest.approx(one.err_norm, abs=1e-9)
             assert batch.power[k] == pytest.approx(one.power, rel=1e-7, abs=1e-9)
             np.testing.assert_array_equal(np.isnan(batch.target[k]), np.isnan(one.target))
 
 
 def test_a_question_that_asks_for_nothing_is_refused() -> None:
-    with pytest.raises(CommandError, match="NaN on each axis that layout torpedo commands"):
-        Allocator(load_layout("torpedo")).allocate([NAN, 0, 0, 0, NAN, NAN])
+    torpedo = load_layout("torpedo")
+    with pytest.raises(CommandError, match="names each axis that layout torpedo commands"):
+        Allocator(torpedo).allocate([1.0, 0, 0, 0, 0, 0], free=torpedo.axes)
+    for free, sentence in (("Tz", "a list of axes"), (("yaw",), "got 'yaw'"), ((1,), "got 1")):
+        with pytest.raises(CommandError, match=sentence):
+            Allocator(torpedo).allocate([1.0, 0, 0, 0, 0, 0], free=free)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None])
+def test_what_is_no_number_is_an_error_that_names_free(value: float | None) -> None:
+    allocator = Allocator(load_layout("A"))
+    wrench = [1.0, 0.0, 0.5, 0.0, 0.0, value]
+    for ask, asked in ((allocator.allocate, wrench), (allocator.allocate_batch, [wrench])):
+        with pytest.raises(CommandError, match=r'free=\("Tz",\)'):
+            ask(asked)
 
 
 def test_an_axis_that_cannot_be_held_is_named() -> None:
@@ -111,7 +122,7 @@ def test_axes_in_files() -> None:
 
 
 def test_the_command_line_and_json_say_which_axes_are_free(capsys: pytest.CaptureFixture[str]) -> None:
-    wrench = ["20", "0", "0", "0", "nan", "0"]
+    wrench = ["20", "0", "0", "0", "3", "0", "--free", "Ty"]
     assert main(["allocate", "bluerov2_heavy", "--wrench", *wrench, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["target"] == [20.0, 0.0, 0.0, 0.0, None, 0.0]

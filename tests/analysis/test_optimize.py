@@ -102,7 +102,7 @@ def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPa
         ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
         ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 6 directions after a loss"),
         ("A", "mission_power", [[1, 2, 3]], "wrench: expected an array of shape"),
-        ("A", "mission_power", [[1, 0, 0, 0, 0, float("inf")]], "wrench: Tz must be at most"),
+        ("A", "mission_power", [[1, 0, 0, 0, 0, float("inf")]], "wrench: Tz must be a number of at most"),
     ],
 )
 def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, message: str) -> None:

@@ -103,9 +103,9 @@ def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, st
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["A", "--wrench", "nan", "0", "0", "0", "0", "0"], "wrench: asks for nothing"),
-        (["A", "--wrench", "0", "0", "0", "0", "0", "-inf"], "wrench: Tz must be at most"),
-        (["A", "--wrench", "1e300", "0", "0", "0", "0", "0"], "wrench: Fx must be at most"),
+        (["A", "--wrench", "nan", "0", "0", "0", "0", "0"], "wrench: Fx must be a number"),
+        (["A", "--wrench", "0", "0", "0", "0", "0", "-inf"], "wrench: Tz must be a number of at most"),
+        (["A", "--wrench", "1e300", "0", "0", "0", "0", "0"], "wrench: Fx must be a number of at most"),
         (["A", "--wrench", "1", "0", "0"], "Expected 6 values"),
         (["A", "--wrench", "1", "0", "0", "0", "0", "0", "0"], "Unrecognized options: 0"),
         (["A", "--wrench", "1", "0", "0", "0", "0", "up"], "Error parsing --wrench"),

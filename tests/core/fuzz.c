@@ -27,7 +27,8 @@ static fl_real wild(fl_real old) {
   }
 }
 
-static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *previous, const fl_actuator *actuators) {
+static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *previous, unsigned char *flags,
+                const fl_actuator *actuators) {
   double size = exp(12 * (uniform() - 0.5));
   for (int k = 0; k < 6; k++) {
     q->wrench[k] = below(4) ? (fl_real)(size * (2 * uniform() - 1)) : 0;
@@ -44,7 +45,13 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
     previous[k] = a->lower[k % 3] + (a->upper[k % 3] - a->lower[k % 3]) * (fl_real)uniform();
     if (!below(50)) previous[k] = wild(previous[k]);
   }
-  q->policy = below(4) ? policy : 0, q->price = below(4) ? 0 : price, q->previous = below(2) ? previous : 0;
+  for (int k = 0; k < ROBOT_COUNT + 6; k++) flags[k] = (unsigned char)!below(4);
+  q->policy = below(4) ? policy : 0;
+  q->price = below(4) ? 0 : price;
+  q->now.previous = below(2) ? previous : 0;
+  q->now.lost = below(3) ? 0 : flags;
+  q->now.free = below(3) ? 0 : flags + ROBOT_COUNT;
+  q->now.calm = below(20) ? (fl_real)below(11) : wild(1);
 }
 
 static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators, int count) {
@@ -79,7 +86,8 @@ static int fuzz(int cases, fl_real *block, fl_work *work) {
       fl_policy policy;
       fl_answer out;
       fl_real price[6], previous[3 * ROBOT_COUNT];
-      ask(&q, &policy, price, previous, actuators);
+      unsigned char flags[ROBOT_COUNT + 6];
+      ask(&q, &policy, price, previous, flags, actuators);
       memset(&out, 0xff, sizeof out);
       int failed = fl_answer_one(block, work, &q, &out);
       const char *wrong = failed ? 0 : wrong_with(&out, actuators, (int)((fl_head *)block)->n);

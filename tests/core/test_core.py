@@ -8,8 +8,9 @@ import pytest
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.dual import robot
 from finlab.arrays import Array
-from finlab.core.calls import CODES, Core
+from finlab.core.calls import CODES, Core, Now
 from finlab.core.library import library
+from finlab.errors import CommandError, DataError
 from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
 
 BLOCK, NUMBER = 1, 3
@@ -47,7 +48,7 @@ def checked(block: Array) -> int:
         (3, 65.0, BLOCK),
         (4, 2.5, BLOCK),
         (5, 0.0, NUMBER),
-        (100, np.nan, NUMBER),
+        (110, np.nan, NUMBER),
         (robot.HEAD, 3.0, BLOCK),
         (robot.HEAD + 1, 1e9, BLOCK),
         (robot.HEAD + 1, 0.5, BLOCK),
@@ -58,7 +59,7 @@ def test_a_damaged_block_is_refused(heavy: Core, place: int, value: float, code:
     block = heavy._block.copy()
     block[place] = value
     assert checked(block) == code
-    with pytest.raises(ValueError, match=CODES[code]):
+    with pytest.raises(DataError, match=CODES[code]):
         Core(block, 8)
 
 
@@ -70,13 +71,13 @@ def test_a_block_cut_short_is_refused(heavy: Core) -> None:
 def test_what_is_no_number_is_refused(heavy: Core) -> None:
     wrench, prices = np.zeros(6), np.zeros(6)
     for bad in (np.nan, np.inf):
-        with pytest.raises(ValueError, match="argument"):
+        with pytest.raises(CommandError, match="argument"):
             heavy.one(np.where(np.arange(6) == 2, bad, wrench), None)
-        with pytest.raises(ValueError, match="argument"):
-            heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices))
-    with pytest.raises(ValueError, match="argument"):
-        heavy.one(wrench, None, previous=np.full((8, 3), np.inf))
-    assert heavy.one(wrench, None, previous=np.full((8, 3), np.nan)).within[0]  # of nothing is known
+        # Prices are where to begin: those of no use are left out.
+        assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).within[0]
+    with pytest.raises(CommandError, match="argument"):
+        heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.inf)))
+    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).within[0]  # nothing is known
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -228,9 +228,11 @@ def test_a_refused_request_does_not_decide_which_fins_beat(
 
 
 def test_axes_that_are_not_commanded_are_null(robot: DeployedRobot) -> None:
-    reply = served(robot, {"wrench": [0.5, None, 0.5, None, None, 0]})[0]
+    reply = served(robot, {"wrench": [0.5, 9, 0.5, 0, 0, 0], "free": ["Fy", "Tx", "Ty"]})[0]
     assert reply["target"] == [0.5, None, 0.5, None, None, 0.0]
     assert reply["err_norm"] < 1e-6 and reply["unallocated"][1] == 0.0
+    refused = served(robot, {"wrench": [0.5, None, 0.5, 0, 0, 0]})[0]
+    assert refused["status"] == "error" and 'free=("Fy",)' in refused["error"]
 
 
 def test_what_waited_longer_than_the_watchdog_allows_is_dropped(

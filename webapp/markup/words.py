@@ -73,7 +73,7 @@ CONTROLS = {
     "(flow)": f"({SPEED[:-6]})",
     "(--force LEAST MOST)": "(Force, at Limits of each)",
     "--robot LAYOUT": "This robot, at Log",
-    "leave it out of the layout's axes, or ask nan of it": "switch it off beside its slider",
+    "leave it out of the layout's axes, or name it in free": "switch it off beside its slider",
     "correct `force_n`": "correct Force at Limits of each",
     "as `model`": "at Model of each",
     "--scale": "finlab log --scale",

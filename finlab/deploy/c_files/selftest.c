@@ -69,7 +69,8 @@ static double farther(const sample *s) {
    little farther. */
 static int differs(const sample *s) {
   fl_policy policy = {s->policy, GROUPS, {1, 1, 1, 1, 1, 1}, {{0}}};
-  fl_question question = {{0}, &policy, 0, s->previous ? s->previous[0] : 0};
+  fl_question question = {.policy = &policy, .now = {.calm = CALM}};
+  if (s->previous) question.now.previous = s->previous[0];
   memcpy(policy.group, group, sizeof group);
   memcpy(question.wrench, s->wrench, sizeof question.wrench);
   if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
@@ -78,14 +79,13 @@ static int differs(const sample *s) {
   double size = fmax(1, apart(s->wrench, rest, all)), most = s->previous ? 1e-3 + 1.02 * (double)s->error : 0;
   fl_real command[ROBOT_COUNT][3]; /* the library's, by the laws of this block */
   memcpy(command, s->command, sizeof command);
-  all_limits(robot, &work.box);
   if (!(refine(robot, &work, &work.box, s->previous ? s->wrench : s->aim, command, 0) <= s->error + size * APART)) return 1;
   others += is_other(s);
   return !(farther(s) <= size * APART && (double)out.error <= size * APART + most);
 }
 
 int robot_selftest(void) {
-  fl_question broken = {{NAN}, 0, 0, 0};
+  fl_question broken = {.wrench = {NAN}};
   int wrong = others = 0;
   if (fl_check(robot, robot_length) || fl_prepare(robot, &work)) return SAMPLES;
   for (int k = 0; k < SAMPLES; k++) wrong += differs(samples + k);
