@@ -170,7 +170,10 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
   work->previous = q->now.previous;
   answer(block, work, wrench, q->policy, first_prices(work, q, inner), out);
   for (int k = 0; k < 6; k++) out->aim[k] = out->within ? asked[k] : out->aim[k] + span->beside[k];
-  if (!out->placed) commands_for(block, &work->box, out->force, q->now.previous, out->command);
+  if (!out->placed) {
+    commands_for(block, &work->box, out->force, q->now.previous, out->command);
+    leave_bands(block, out->force, out->command);
+  }
   out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
   rest_in_bands(block, &work->box, out->command);
   if (q->now.previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);

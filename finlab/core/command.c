@@ -32,6 +32,16 @@ int is_in_band(const fl_actuator *a, const real *command) {
   return k >= 0 && FABS(command[k]) < a->band * (1 - NEARLY);
 }
 
+/* Puts commands that gaps left a little inside their dead band at its edge: forces nearer to it than to rest. */
+void leave_bands(const real *block, real force[][2], real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const int k = force_number(a);
+    if (k < 0 || !is_in_band(a, command[i]) || size_of(force[i]) < R(0.9) * a->band) continue;
+    command[i][k] = command[i][k] < 0 ? -a->band : a->band;
+  }
+}
+
 /* Has commands inside a dead band rest, where the box allows, and puts those that rounding took from the edge there. */
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {

@@ -142,6 +142,7 @@ typedef struct {
   fl_real best[FL_MOST][2];                /* forces of the best part */
   fl_tangent tangent[FL_MOST];
   const fl_real *previous; /* commands of the tick before; 0 for none */
+  fl_wide close;           /* distance, on the yardstick, up to which a point is the nearest one */
   const fl_wide *ray;      /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
   fl_real aim[6], placed[FL_MOST][3], near[6]; /* wrench; commands of the best part where there are foils, prices there */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost;

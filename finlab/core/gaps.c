@@ -4,6 +4,7 @@
    solved, depth first; a part whose dual value proves that it is no cheaper is left out. */
 #include "inner.h"
 
+#define TICK_PARTS 60 /* of sets with gaps that are looked at where turning costs: the next tick goes on from there */
 #define FLAT R(1e-3) /* half of an arc [rad] up to which its chord is the arc, to half a millionth of the radius */
 #define HOLLOW R(1e-3) /* share of the largest force from which on a least force leaves a gap around rest */
 
@@ -124,8 +125,9 @@ static void narrow_by_band(const real *block, int i, fl_set *set, const real *fo
   }
 }
 
-/* Keeps one half of an arc: towards smaller (-1) or larger angles (1), of a full circle that away from or around a
-   force; where its answer jumps, the arc is cut between its two answers. */
+/* Keeps one part of an arc: towards smaller (-1) or larger angles (1), of a full circle that away from or around a
+   force. The arc is cut into halves, where its answer jumps between its two answers, and where a force lies on the chord
+   of the least ones at its angle, as the best one is mostly there. */
 static void narrow_by_angle(fl_set *set, const real *force, int side) {
   real low = set->middle - set->half;
   real high = set->middle + set->half;
@@ -143,6 +145,16 @@ static void narrow_by_angle(fl_set *set, const real *force, int side) {
     return;
   }
   const real angle = ATAN2(force[1], force[0]);
+  const real off = wrapped(angle - set->middle);
+  const int is_on_chord = set->low > 0 && set->half < PI / 2 && FABS(off) < R(0.8) * set->half;
+  if (is_on_chord) {
+    const real from = side < 0 ? -set->half : off;
+    const real to = side < 0 ? off : set->half;
+    set->middle = wrapped(set->middle + (from + to) / 2);
+    set->half = (to - from) / 2;
+    set->at = set->middle + wrapped(set->at - set->middle);
+    return;
+  }
   if (set->half >= PI)
     set->middle = wrapped(angle + (side > 0 ? 0 : PI));
   else
@@ -297,6 +309,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value) {
   real best = R(1e30), bound = R(1e30), price[6];
   int depth = 0, parts = 0, root = status;
+  const int most_parts = work->turns ? MIN(TICK_PARTS, FL_PARTS) : FL_PARTS;
   fl_node *node;
   memcpy(work->kept, work->set, sizeof work->kept);
   memcpy(price, work->now->price, sizeof price);
@@ -318,7 +331,7 @@ int least_power(const real *block, fl_work *work, const real *target, int status
       memcpy(work->set, before, sizeof before);
       bound = MIN(bound, own), status = FL_BEYOND, open = 0;
     }
-    if (open && ACTUATOR(block, gap)->speed == 0 && parts < FL_PARTS && (node = cut_at(work, &depth, gap, s->force[gap]))) {
+    if (open && ACTUATOR(block, gap)->speed == 0 && parts < most_parts && (node = cut_at(work, &depth, gap, s->force[gap]))) {
       status = cheaper_side(block, work, target, node), parts += 2;
       continue;
     }

@@ -180,6 +180,7 @@ int angle_of(const fl_actuator *a);
 real held_in(const fl_box *box, int i, int k, int angle, real value);
 void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
+void leave_bands(const real *block, real force[][2], real command[][3]);
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]);
 int is_in_band(const fl_actuator *a, const real *command);
 

@@ -6,6 +6,7 @@
    all lies in none. */
 #include "inner.h"
 
+#define ROUGHLY (NEARLY / 10) /* distance, on the yardstick, up to which the point of a part is the nearest one */
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
 #define PULL 2e-3     /* miss of a group for which held axes give way by a millionth at a curved rim */
@@ -24,7 +25,7 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
   }
   weigh(block, work, weight);
   work->mixture.count = 0;
-  score[0] = rounded((real)nearest_point(block, work, target, CLOSE_BY, 0, &work->mixture));
+  score[0] = rounded((real)nearest_point(block, work, target, work->close, 0, &work->mixture));
 }
 
 /* The largest share of a wrench that can be given alone. In a tick there may be none, as drives cannot stop or turn at
@@ -43,7 +44,7 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
     ray[k] = ranged ? out_of_basis(block, work, target, k) : 0;
   weigh(block, work, weight);
-  wide share = farthest_along(block, work, begin, ray, 0, 1, CLOSE_BY, m, plane);
+  wide share = farthest_along(block, work, begin, ray, 0, 1, work->close, m, plane);
   const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
   add(m->miss, -less, ray);
   score[0] = rounded((real)length_of(m->miss));
@@ -51,7 +52,7 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   if (share > 0 || !(score[0] > 0)) return;
   m->count = 0;
   work->ray = ray;
-  score[0] = rounded((real)nearest_point(block, work, begin, CLOSE_BY, 0, m));
+  score[0] = rounded((real)nearest_point(block, work, begin, work->close, 0, m));
   work->ray = 0;
   share = 0;
   for (int p = 0; p < m->count; p++) share += m->share[p] * m->along[p];
@@ -77,7 +78,7 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
       weigh(block, work, weight);
       m->done = 0; /* the points so far, in the axes of this group: */
       for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
-      nearest_point(block, work, target, CLOSE_BY, 0, m);
+      nearest_point(block, work, target, work->close, 0, m);
       for (int k = 0; k < 6; k++)
         if (group[k]) missing[k] = m->miss[k] / weight[k];
       missed = length_of(missing);
@@ -173,11 +174,13 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *share, real *most_share) {
   real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
-  int n = COUNT(block), depth = 0, most = 20 * (ROUNDS + n), found = 0;
+  int n = COUNT(block), depth = 0, most = 8 * (ROUNDS + n), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
+  work->close = CLOSE_BY;
   serve(block, work, wrench, policy, own, score);
   *most_share = 1 - score[1];
+  work->close = ROUGHLY;
   for (int parts = 0;; parts += 2) {
     int cut = worst_gap(block, work, own, 0);
     if (cut < 0 || !found) { /* of parts with a gap the last one, until there is one without */
@@ -196,6 +199,8 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
     serve(block, work, wrench, policy, own, score);
   }
   take_sets(block, work, work->best_set);
+  work->close = CLOSE_BY;
+  if (memcmp(work->best_set, work->kept, n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
   *share = 1 - best[1];
 }
 
