@@ -9,7 +9,7 @@ export async function loadCore(url) {
 
 // A robot's block (Float64Array) and n actuators, ready for questions.
 export function prepare(core, block, n) {
-  const most = core.fl_sizes(6), bytes = [8 * block.length, core.fl_sizes(3), core.fl_sizes(4), 64, core.fl_sizes(5)];
+  const most = core.fl_sizes(6), bytes = [8 * block.length, core.fl_sizes(3), core.fl_sizes(4), 80, core.fl_sizes(5)];
   let end = core.__heap_base.value;
   const places = bytes.map((size) => { const at = (end + 15) & ~15; end = at + size; return at; });
   const [robot, work, policy, question, answer] = places;
@@ -25,7 +25,7 @@ export function prepare(core, block, n) {
     doubles(policy + 8, 6).fill(1);
     new Uint8Array(core.memory.buffer, policy + 56, 36).set(groups.flat());
     doubles(question, 6).set(wrench);
-    whole(question + 48, 3).set([policy, 0, 0]);
+    whole(question + 48, 8).set([policy, 0, 0, 0, 0, 0, 0, 0]); // nothing lost, no axis free, no tick before
     const code = core.fl_answer_one(robot, work, question, answer);
     if (code) throw new Error(`the core refused the question: error ${code}`);
     const numbers = doubles(answer, 5 * most + 20), flags = whole(answer + 8 * (5 * most + 20), 5);

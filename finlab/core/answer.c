@@ -150,12 +150,30 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
     const real inside = a->band * (1 - 10 * NEARLY);
     real wanted[3];
     if (work->span.lost[i] || !is_in_band(a, command[i]) || size_of(later.force[i]) < inside) continue;
-    command_for(block, i, &box, later.force[i], q->now.previous + 3 * i, wanted);
+    command_for(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
     wanted[k] = CLIP(wanted[k], -inside, inside);
     memcpy(command[i], wanted, sizeof wanted);
   }
   work->box = box;
   work->is_whole = 0;
+}
+
+/* Meets a wrench a little beyond what the tables give by steps on commands: the last share of a force has no price that
+   a table could hold. */
+static void meet_by_laws(const real *block, fl_work *work, const real *asked, fl_answer *out) {
+  const real *yard = HEAD(block)->yard;
+  real missing[6];
+  real tried[FL_MOST][3];
+  for (int k = 0; k < 6; k++) missing[k] = (out->aim[k] - asked[k]) / yard[k];
+  if (out->within || SQRT(dot(missing, missing, 6)) > 10 * CLOSE) return;
+  memcpy(tried, out->command, COUNT(block) * sizeof *tried);
+  const real error = refine(block, work, &work->box, asked, tried, ROUNDS);
+  if (error > NEARLY) return;
+  memcpy(out->command, tried, COUNT(block) * sizeof *tried);
+  memcpy(out->aim, asked, sizeof out->aim);
+  out->within = 1;
+  out->value = 0;
+  out->error = error;
 }
 
 static void answered(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
@@ -167,16 +185,17 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
   real asked[6];
   memcpy(asked, work->aim, sizeof asked);
   work->steps = work->ended = 0;
-  work->previous = q->now.previous;
+  work->previous = q->previous;
   answer(block, work, wrench, q->policy, first_prices(work, q, inner), out);
   for (int k = 0; k < 6; k++) out->aim[k] = out->within ? asked[k] : out->aim[k] + span->beside[k];
   if (!out->placed) {
-    commands_for(block, &work->box, out->force, q->now.previous, out->command);
+    commands_for(block, &work->box, out->force, q->previous, out->command);
     leave_bands(block, out->force, out->command);
   }
   out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
+  meet_by_laws(block, work, asked, out);
   rest_in_bands(block, &work->box, out->command);
-  if (q->now.previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);
+  if (q->previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);
   into_box(block, &work->box, out->command);
   out->steps = work->steps;
   out->ended = work->ended;
@@ -186,15 +205,15 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
 int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_answer *out) {
   const fl_policy *policy = q->policy;
   if (!are_within(q->wrench, 6, LARGEST)) return FL_BAD_ARGUMENT;
-  if (!(q->now.calm >= 0 && q->now.calm <= MOST_CALM)) return FL_BAD_ARGUMENT;
+  if (!(q->calm >= 0 && q->calm <= MOST_CALM)) return FL_BAD_ARGUMENT;
   if (policy) {
     if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_CLOSEST && !are_within(policy->weight, 6, 1)) return FL_BAD_ARGUMENT;
   }
-  for (int k = 0; q->now.previous && k < 3 * COUNT(block); k++)
-    if (FABS(q->now.previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
-  if (!stand_as(block, work, &q->now)) return FL_BAD_NUMBER;
+  for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
+    if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
+  if (!stand_as(block, work, q)) return FL_BAD_NUMBER;
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
 }

@@ -69,21 +69,15 @@ class _Policy(ctypes.Structure):
     ]
 
 
-class _Now(ctypes.Structure):
-    _fields_ = [
-        ("previous", ctypes.c_void_p),
-        ("lost", ctypes.c_void_p),
-        ("free", ctypes.c_void_p),
-        ("calm", ctypes.c_double),
-    ]
-
-
 class _Question(ctypes.Structure):
     _fields_ = [
         ("wrench", ctypes.c_double * 6),
         ("policy", ctypes.c_void_p),
         ("price", ctypes.c_void_p),
-        ("now", _Now),
+        ("previous", ctypes.c_void_p),
+        ("lost", ctypes.c_void_p),
+        ("free", ctypes.c_void_p),
+        ("calm", ctypes.c_double),
     ]
 
 
@@ -124,7 +118,6 @@ class Core:
         self._work, self._lock, most = ctypes.create_string_buffer(core.fl_sizes(3)), Lock(), core.fl_sizes(6)
         self._question, answer = _Question(), np.zeros(5 * most + 23)
         self._to, self._from = ctypes.addressof(self._question), answer.ctypes.data
-        self._now_at = self._to + _Question.now.offset
         self._wrench = np.frombuffer(memoryview(self._question), np.float64, 6)
         self._price, self._previous = np.zeros(6), np.zeros((count, 3))
         self._lost, self._free = np.zeros(count, np.uint8), np.zeros(6, np.uint8)
@@ -144,7 +137,7 @@ class Core:
 
     def _stand(self, now: Now) -> None:
         """Writes what holds now into the question."""
-        own = self._question.now
+        own = self._question
         own.previous = own.lost = own.free = None
         own.calm = now.calm
         if now.previous is not None:
@@ -231,7 +224,7 @@ class Core:
         worth = np.empty((len(price), self._count, 5))
         with self._lock:
             self._stand(now)
-            ins = self._at, self._area, self._now_at, price.ctypes.data, len(price)
+            ins = self._at, self._area, self._to, price.ctypes.data, len(price)
             error = self._core.fl_worth(*ins, worth.ctypes.data)
         if error:
             raise CommandError(_REFUSED.format(CODES[error]))

@@ -177,17 +177,14 @@ int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
 int fl_check(const fl_real *block, int length);
 int fl_prepare(const fl_real *block, fl_work *work);
-typedef struct { /* what holds now; all zeros outside of ticks, where all actuators work and all axes count */
+typedef struct { /* behind the wrench all is zeros, where there is nothing to say */
+  fl_real wrench[6];         /* [N, N m] */
+  const fl_policy *policy;   /* what to give beyond reach; 0: nothing else */
+  const fl_real *price;      /* of the wrench [W/N, W/(N m)]: where to begin; 0 for none */
   const fl_real *previous;   /* commands (n, 3) of the tick before; 0 for none, NaN for an unknown one */
   const unsigned char *lost; /* (n,) which actuators do not work; 0 for none */
   const unsigned char *free; /* (6,) which axes may take any wrench, beside those that the robot does not command */
   fl_real calm;              /* what turning costs in a tick: 0 nothing, 2 usual, up to 10 */
-} fl_now;
-typedef struct {
-  fl_real wrench[6];       /* [N, N m] */
-  const fl_policy *policy; /* what to give beyond reach; 0: nothing else */
-  const fl_real *price;    /* of the wrench [W/N, W/(N m)]: where to begin; 0 for none */
-  fl_now now;
 } fl_question;
 int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
@@ -195,7 +192,7 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *quest
                    unsigned char *within, fl_real *error);
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
                  fl_real *command);
-int fl_worth(const fl_real *block, fl_work *work, const fl_now *now, const fl_real *price, int count, fl_real *worth);
+int fl_worth(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *price, int count, fl_real *worth);
 void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_wide *from, const fl_wide *ray, int count,
               fl_wide close, fl_wide *size, fl_wide *normal, fl_real *force);
 fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);

@@ -41,11 +41,11 @@ real fl_look(const real *block, fl_work *work, const real *wrench, const real *i
   return work->state->value;
 }
 
-/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 5) in what may be given now: prices along
+/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 5) in what a question says that may be given: prices along
    its force, ahead and in reverse, what the force is worth, less its power [W], and least and largest force [N], of planes
    below 0 in reverse. An error code. */
-int fl_worth(const real *block, fl_work *work, const fl_now *now, const real *price, int count, real *worth) {
-  fl_now still = *now;
+int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *price, int count, real *worth) {
+  fl_question still = *question;
   still.calm = 0; /* turning is no power */
   if (!stand_as(block, work, &still)) return FL_BAD_NUMBER;
   for (int k = 0; k < count; k++, price += 6) {

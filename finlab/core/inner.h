@@ -172,7 +172,7 @@ reach reach_of(const real *block, int i, const fl_box *box);
 /* now.c */
 void set_limits(const real *block, fl_work *work, const real *previous, real calm);
 int is_known(const real *command);
-int stand_as(const real *block, fl_work *work, const fl_now *now);
+int stand_as(const real *block, fl_work *work, const fl_question *q);
 void into_box(const real *block, const fl_box *box, real command[][3]);
 
 /* command.c */

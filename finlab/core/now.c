@@ -139,9 +139,9 @@ void set_limits(const real *block, fl_work *work, const real *previous, real cal
   sums_of(block, work);
 }
 
-/* Prepares the work area for what holds now; 0 where its numbers are out of range. */
-int stand_as(const real *block, fl_work *work, const fl_now *now) {
-  if (!span_now(block, work, now->lost, now->free)) return 0;
-  if (now->previous || !work->is_whole) set_limits(block, work, now->previous, now->calm);
+/* Prepares the work area for what a question says that holds now; 0 where its numbers are out of range. */
+int stand_as(const real *block, fl_work *work, const fl_question *q) {
+  if (!span_now(block, work, q->lost, q->free)) return 0;
+  if (q->previous || !work->is_whole) set_limits(block, work, q->previous, q->calm);
   return 1;
 }

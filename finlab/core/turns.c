@@ -88,7 +88,7 @@ static real exact(const whole *w, real *block, fl_work *work, const fl_box *box,
 
 /* The box of commands after the previous ones, or of all, of a block whose fins may be commanded by their forces. */
 static void box_now(const real *block, fl_work *work, const fl_question *q, fl_box *box) {
-  set_limits(block, work, q->now.previous, 0);
+  set_limits(block, work, q->previous, 0);
   *box = work->box;
 }
 
@@ -100,12 +100,12 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   fl_question q = *question;
   fl_answer own;
   fl_box box;
-  const real *previous = q.now.previous;
+  const real *previous = q.previous;
   real(*here)[2] = (real(*)[2])forces;
   real command[FL_MOST][3], there[FL_MOST][2], price[6];
   real worth = end[1];
   command_fins(w, block, !previous);
-  if (!span_now(block, work, q.now.lost, q.now.free)) return FL_BAD_NUMBER;
+  if (!span_now(block, work, q.lost, q.free)) return FL_BAD_NUMBER;
   if (previous) cost_of(block, work, (real(*)[3])previous, here);
   box_now(block, work, &q, &box);
   commands_for(block, &box, here, previous, command);

@@ -48,10 +48,10 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
   for (int k = 0; k < ROBOT_COUNT + 6; k++) flags[k] = (unsigned char)!below(4);
   q->policy = below(4) ? policy : 0;
   q->price = below(4) ? 0 : price;
-  q->now.previous = below(2) ? previous : 0;
-  q->now.lost = below(3) ? 0 : flags;
-  q->now.free = below(3) ? 0 : flags + ROBOT_COUNT;
-  q->now.calm = below(20) ? (fl_real)below(11) : wild(1);
+  q->previous = below(2) ? previous : 0;
+  q->lost = below(3) ? 0 : flags;
+  q->free = below(3) ? 0 : flags + ROBOT_COUNT;
+  q->calm = below(20) ? (fl_real)below(11) : wild(1);
 }
 
 static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators, int count) {

@@ -69,8 +69,8 @@ static double farther(const sample *s) {
    little farther. */
 static int differs(const sample *s) {
   fl_policy policy = {s->policy, GROUPS, {1, 1, 1, 1, 1, 1}, {{0}}};
-  fl_question question = {.policy = &policy, .now = {.calm = CALM}};
-  if (s->previous) question.now.previous = s->previous[0];
+  fl_question question = {.policy = &policy, .calm = CALM};
+  if (s->previous) question.previous = s->previous[0];
   memcpy(policy.group, group, sizeof group);
   memcpy(question.wrench, s->wrench, sizeof question.wrench);
   if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
