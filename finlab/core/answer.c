@@ -140,7 +140,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   const fl_box box = work->box;
   fl_answer later;
   real wrench[6];
-  set_limits(block, work, 0, 0);
+  whole_limits(block, work);
   for (int k = 0; k < 6; k++) wrench[k] = work->span.counts[k] ? q->wrench[k] - work->span.beside[k] : 0;
   memcpy(work->aim, q->wrench, sizeof work->aim);
   answer(block, work, wrench, q->policy, 0, &later);

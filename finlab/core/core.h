@@ -81,8 +81,7 @@ typedef struct { /* what one actuator may give now */
   fl_real low, high, low_cost, high_cost, middle, half, reverse, reverse_cost;
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
   fl_real turn;     /* kappa: turning by d from `at` costs kappa / 2 d^2 [W/rad^2]; 0 where it costs nothing */
-  fl_real at;       /* angle of the force before, within a turn of `middle` [rad] */
-  fl_real way;      /* of one that goes where it is worth most: what a radian of the way costs in a tick [W/rad]; else 0 */
+  fl_real at;       /* angle from which it turns, within a turn of `middle` [rad] */
   fl_real cut;      /* where it jumps: angle between the two answers [rad] */
   int flipped, forked;
   int jumps;        /* whether its answer jumps where Newton's method stood still */

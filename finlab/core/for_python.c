@@ -78,7 +78,7 @@ int fl_worth(const real *block, fl_work *work, const fl_question *question, cons
 /* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of previous ones (n, 3). */
 void fl_commands(const real *block, fl_work *work, const real *force, int count, const real *previous, real *command) {
   int n = COUNT(block);
-  set_limits(block, work, 0, 0);
+  whole_limits(block, work);
   for (int k = 0; k < count; k++)
     commands_for(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
 }

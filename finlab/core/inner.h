@@ -166,11 +166,12 @@ void mixed_force(const real *block, const fl_mixture *m, real force[][2]);
 /* law.c */
 void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]);
 void command_for(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command);
-typedef struct { real low, high, middle, half, lean; } reach;
+typedef struct { real low, high, middle, half; } reach;
 reach reach_of(const real *block, int i, const fl_box *box);
 
 /* now.c */
-void set_limits(const real *block, fl_work *work, const real *previous, real calm);
+void whole_limits(const real *block, fl_work *work);
+void tick_limits(const real *block, fl_work *work, const fl_question *q);
 int is_known(const real *command);
 int stand_as(const real *block, fl_work *work, const fl_question *q);
 void into_box(const real *block, const fl_box *box, real command[][3]);

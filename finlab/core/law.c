@@ -215,12 +215,12 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
 }
 
 /* What commands within a box give: least and largest force [N], of planes below 0 in reverse, and the arc of their
-   directions [rad]. `lean` is the angle from the middle of the commands' angles to that of the arc. */
+   directions [rad]. */
 reach reach_of(const real *block, int i, const fl_box *box) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *low = box->low[i];
   const real *high = box->high[i];
-  reach o = {0, 0, 0, 0, 0};
+  reach o = {0, 0, 0, 0};
   if (a->form == FL_THRUSTER) {
     o.low = a->sign > 0 ? low[0] : -high[0];
     o.high = a->sign > 0 ? high[0] : -low[0];
@@ -240,8 +240,7 @@ reach reach_of(const real *block, int i, const fl_box *box) {
   if (a->form == FL_POD) return o;
   real direction;
   sizes_in(block, i, box, &o.low, &o.high, &direction);
-  o.lean = wrapped(direction - o.middle);
-  o.middle += o.lean;
+  o.middle += wrapped(direction - o.middle); /* where the force points at the middle of the commands' arc */
   if (a->gauge > 0) {
     const real rho = gauge_at(block + (int)a->gauge, o.middle);
     o.low /= rho;

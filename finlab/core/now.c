@@ -5,7 +5,6 @@
    losses and rates are all sets; nothing else of the core knows of them. */
 #include "inner.h"
 
-#define HORIZON 40 /* ticks over which what a fin is worth elsewhere has to pay for its way */
 #define LEAST_POWER R(1e-3) /* of full power, that counts as the mean power of the commands before, for turning */
 
 int is_known(const real *command) {
@@ -102,46 +101,57 @@ static void tick_set(const real *block, fl_work *work, int i, const real *before
     own.low = a->low;
     own.high = a->high;
   }
-  if (all_sizes && all_angles && !(kappa > 0)) own = (reach){a->least, a->high, a->middle, a->half, 0};
+  if (all_sizes && all_angles && !(kappa > 0)) own = (reach){a->least, a->high, a->middle, a->half};
   const real low = CLIP(own.low, a->low, a->high);
   const real high = CLIP(own.high, a->low, a->high);
   limit(block, i, set, low, high, own.middle, own.half);
-  if (!is_plane(a) || !(kappa > 0)) return;
-  const real at = before[angle_of(a)] + own.lean + (set->flipped ? PI : 0);
+  if (!(kappa > 0)) return;
+  const real at = before[0] + (set->flipped ? PI : 0);
   set->turn = kappa;
-  if (a->form == FL_FIN) set->way = kappa * a->step[2] / (2 * HORIZON); /* of kappa / 2 d^2 in each tick at full rate */
   set->at = set->middle + wrapped(at - set->middle);
 }
 
-/* Limits of commands and sets of forces: those of a tick after commands (n, 3) of which rows may be NaN, or all. Turning
-   costs kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn of a tick. */
-void set_limits(const real *block, fl_work *work, const real *previous, real calm) {
-  real power = 0;
-  if (previous && calm > 0) power = mean_power(block, work, previous);
+/* Limits of commands and sets of forces outside of ticks. */
+void whole_limits(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     whole_box(block, &work->box, i);
-    if (work->span.lost[i]) {
+    if (work->span.lost[i])
       leave_out(block, i, work->set + i);
-      continue;
-    }
-    if (!previous || !is_known(previous + 3 * i)) {
+    else
       limit(block, i, work->set + i, a->least, a->high, a->middle, a->half);
-      continue;
-    }
-    const int angle = angle_of(a);
-    real kappa = 0;
-    if (angle >= 0 && a->step[angle] > 0 && a->step[angle] < R(1e6)) kappa = calm * power / a->step[angle];
-    box_after(block, &work->box, i, previous + 3 * i);
-    tick_set(block, work, i, previous + 3 * i, kappa);
   }
-  work->is_whole = !previous;
+  work->is_whole = 1;
+  sums_of(block, work);
+}
+
+/* The same of a tick after the previous commands (n, 3) of a question, of which rows may be NaN. Turning of a pod costs
+   kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn of a tick. Fins turn
+   through a right angle in a few ticks, and one that points away gives little: with such a cost it would stay for ever, and
+   leave its work to others at a fifth more power. */
+void tick_limits(const real *block, fl_work *work, const fl_question *q) {
+  real power = 0;
+  whole_limits(block, work);
+  if (q->calm > 0) power = mean_power(block, work, q->previous);
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const real *before = q->previous + 3 * i;
+    real kappa = 0;
+    if (work->span.lost[i] || !is_known(before)) continue;
+    if (a->form == FL_POD && a->step[0] > 0 && a->step[0] < R(1e6)) kappa = q->calm * power / a->step[0];
+    box_after(block, &work->box, i, before);
+    tick_set(block, work, i, before, kappa);
+  }
+  work->is_whole = 0;
   sums_of(block, work);
 }
 
 /* Prepares the work area for what a question says that holds now; 0 where its numbers are out of range. */
 int stand_as(const real *block, fl_work *work, const fl_question *q) {
   if (!span_now(block, work, q->lost, q->free)) return 0;
-  if (q->previous || !work->is_whole) set_limits(block, work, q->previous, q->calm);
+  if (q->previous)
+    tick_limits(block, work, q);
+  else if (!work->is_whole)
+    whole_limits(block, work);
   return 1;
 }

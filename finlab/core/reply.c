@@ -53,7 +53,7 @@ void limit(const real *block, int i, fl_set *set, real low, real high, real midd
   without_band(ACTUATOR(block, i)->band, &low, &high);
   int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
   set->flipped = back && high <= 0, set->tangent = 0;
-  set->turn = set->at = set->way = set->cut = 0, set->jumps = 0;
+  set->turn = set->at = set->cut = 0, set->jumps = 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
   set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;

@@ -181,6 +181,6 @@ int fl_prepare(const real *block, fl_work *work) {
   work->ray = 0;
   for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
   if (!span_anew(block, work, 1)) return FL_BAD_NUMBER;
-  set_limits(block, work, 0, 0);
+  whole_limits(block, work);
   return 0;
 }

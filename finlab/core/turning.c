@@ -1,20 +1,16 @@
-/* The answer of a plane to a price where turning costs: pods, and fins about their shafts, from tick to tick.
+/* The answer of a pod to a price where turning costs, from tick to tick.
 
-   The force is y = r b(alpha) with b = rho(alpha) (cos alpha, sin alpha), where rho is the gauge of a fin and 1 else, and
-   r lies between the least and the largest force, below 0 in reverse. At a price s = p (cos sigma, sin sigma) a newton
-   at the angle alpha is worth v = s.b(alpha), and the best size is T(v), worth C(v) = max over r of v r - c(r). Turning
-   from alpha- by d = alpha - alpha- costs kappa / 2 d^2:
+   The force is y = r b(alpha) with b = (cos alpha, sin alpha), and r between the least and the largest force, below 0 in
+   reverse. At a price s = p (cos sigma, sin sigma) a newton at the angle alpha is worth v = s.b = p cos(alpha - sigma), and
+   the best size is T(v), worth C(v) = max over r of v r - c(r). Turning from alpha- by d = alpha - alpha- costs
+   kappa / 2 d^2:
 
        value     h(alpha)  = C(v) - kappa / 2 d^2         c*(s) = max over alpha in the window
        slope     h'        = T v' - kappa d
        bend      h''       = T' v'^2 + T v'' - kappa
-       gradient  grad c*(s) = y = T b                      (envelope)
+       gradient  grad c*(s) = y = T b                     (envelope)
        Hessian   T' b b' + m m' / (-h'')   inside the window,  m = T' v' b + T b'
                  T' b b'                   at its ends
-
-   The cost is counted from a reference angle, mostly that before. Fins turn fast: one whose price points elsewhere goes
-   there at its rate where what it is worth there, over some ticks, pays for the way; else those that point away, which
-   give little and gain nothing from one tick's turn, would stay for ever and leave their work to others.
 
    Where kappa is large beside p T, h is concave and there is one answer: a pod that pushes either way passes through rest
    without turning. Else there may be two maxima, and the answer jumps between them as the price moves: newton.c sees it. */
@@ -23,40 +19,22 @@
 #define CELL R(0.12)   /* width [rad] of the cells of a window in which h' is taken to change its sign once at most */
 #define MOST_CELLS 48
 #define ROOT_STEPS 60  /* of a root of h' in a cell */
-#define STEP_OF_GAUGE R(1e-3) /* [rad], of differences of a gauge */
 
-typedef struct { /* one plane at one price */
+typedef struct { /* one pod at one price */
   const real *block;
   const fl_actuator *a;
   const fl_set *set;
-  const real *gauge; /* 0 for none */
-  real p, sigma;     /* size and angle of the price */
-  real reference;    /* angle from which turning is counted */
-} plane_at_price;
+  real p, sigma; /* size and angle of the price */
+} pod_at_price;
 
-typedef struct { /* what the plane gives at one angle */
+typedef struct { /* what the pod gives at one angle */
   real value, slope, bend; /* h, h', h'' */
   real T, dT;              /* best force, and its derivative by the price along it */
   real dv;                 /* v' */
-  real rho, drho;          /* gauge, and its derivative by the angle */
 } at_angle;
 
-/* The gauge and its first two derivatives by the angle. */
-static void gauge_slopes(const real *gauge, real angle, real *rho, real *drho, real *ddrho) {
-  *rho = 1;
-  *drho = 0;
-  *ddrho = 0;
-  if (!gauge) return;
-  const real h = STEP_OF_GAUGE;
-  const real before = gauge_at(gauge, angle - h);
-  const real after = gauge_at(gauge, angle + h);
-  *rho = gauge_at(gauge, angle);
-  *drho = (after - before) / (2 * h);
-  *ddrho = (after - 2 * *rho + before) / (h * h);
-}
-
 /* Best force along a direction at a price v of a newton along it: ahead, or in reverse where it pushes either way. */
-static along best_along(const plane_at_price *x, real v) {
+static along best_along(const pod_at_price *x, real v) {
   const fl_set *set = x->set;
   if (v >= 0) return limited(x->block, x->a, set, 0, v);
   if (set->reverse > 0) {
@@ -68,18 +46,14 @@ static along best_along(const plane_at_price *x, real v) {
   return (along){set->low, 0, v * set->low - set->low_cost};
 }
 
-static at_angle look_at(const plane_at_price *x, real alpha) {
+static at_angle look_at(const pod_at_price *x, real alpha) {
   at_angle o;
-  real ddrho;
-  gauge_slopes(x->gauge, alpha, &o.rho, &o.drho, &ddrho);
-  const real cosine = x->p * COS(alpha - x->sigma);
-  const real sine = x->p * SIN(alpha - x->sigma);
-  const real v = o.rho * cosine;
-  const real ddv = ddrho * cosine - 2 * o.drho * sine - o.rho * cosine;
-  o.dv = o.drho * cosine - o.rho * sine;
+  const real v = x->p * COS(alpha - x->sigma);
+  const real ddv = -v;
+  o.dv = -x->p * SIN(alpha - x->sigma);
   const along best = best_along(x, v);
   const real kappa = x->set->turn;
-  const real d = alpha - x->reference;
+  const real d = alpha - x->set->at;
   o.T = best.force;
   o.dT = best.slope;
   o.value = best.conjugate - kappa / 2 * d * d;
@@ -89,7 +63,7 @@ static at_angle look_at(const plane_at_price *x, real alpha) {
 }
 
 /* The root of h' between two angles at which it is above 0 and not above 0: Newton's method, kept in the bracket. */
-static real root_between(const plane_at_price *x, real low, real high) {
+static real root_between(const pod_at_price *x, real low, real high) {
   real alpha = (low + high) / 2;
   for (int k = 0; k < ROOT_STEPS; k++) {
     const at_angle o = look_at(x, alpha);
@@ -109,18 +83,6 @@ static real root_between(const plane_at_price *x, real low, real high) {
   return alpha;
 }
 
-/* The angle from which turning is counted: that before, or of a fin that is worth more elsewhere one on the way there. */
-static real reference_of(const plane_at_price *x, real low, real high) {
-  const fl_set *set = x->set;
-  const real at = CLIP(set->at, low, high);
-  if (!(set->way > 0) || !(x->p > 0)) return at;
-  const real way = wrapped(x->sigma - at);
-  const real worth_there = best_along(x, x->p).conjugate;
-  const real worth_here = best_along(x, x->p * COS(way)).conjugate;
-  if (!(worth_there - worth_here > set->way * FABS(way))) return at;
-  return CLIP(at + way, low, high);
-}
-
 /* The least and largest angles of the window, around the angle before. */
 static void window_of(const fl_set *set, real *low, real *high) {
   *low = set->middle - set->half;
@@ -133,14 +95,12 @@ static void window_of(const fl_set *set, real *low, real *high) {
 
 reply turned(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
-  plane_at_price x = {block, a, set, 0, size_of(price), 0, 0};
+  pod_at_price x = {block, a, set, size_of(price), 0};
   if (x.p > 0) x.sigma = ATAN2(price[1], price[0]);
-  if (a->gauge > 0) x.gauge = block + (int)a->gauge;
 
   real low, high;
   window_of(set, &low, &high);
-  x.reference = reference_of(&x, low, high);
-  real best_alpha = x.reference;
+  real best_alpha = CLIP(set->at, low, high);
   at_angle best = look_at(&x, best_alpha);
   const int cells = (int)CLIP((high - low) / CELL + 2, 2, MOST_CELLS);
   real from = low;
@@ -171,8 +131,8 @@ reply turned(const real *block, int i, const fl_set *set, const real *price) {
   /* Eq. of the head: y = T b, and its derivatives by the price. */
   const real c = COS(best_alpha);
   const real s = SIN(best_alpha);
-  const real b[2] = {best.rho * c, best.rho * s};
-  const real db[2] = {best.drho * c - best.rho * s, best.drho * s + best.rho * c};
+  const real b[2] = {c, s};
+  const real db[2] = {-s, c};
   const real m[2] = {best.dT * best.dv * b[0] + best.T * db[0], best.dT * best.dv * b[1] + best.T * db[1]};
   const int is_inside = best_alpha > low && best_alpha < high;
   real over = 0;
@@ -191,7 +151,7 @@ reply turned(const real *block, int i, const fl_set *set, const real *price) {
   return o;
 }
 
-/* Whether the answer of a plane jumps between two prices near to each other: its force changes sides, or moves by far more
+/* Whether the answer of a pod jumps between two prices near to each other: its force changes sides, or moves by far more
    than its slopes at both say. `step` is the step of its price, `is_short` whether that is very short. */
 int has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
                const real *step, int is_short) {
@@ -213,7 +173,7 @@ int has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,
   return size_of(off_y) > moved / 2 && size_of(off_z) > moved / 2;
 }
 
-/* Marks a plane whose answer jumps, and where it is to be cut. */
+/* Marks a pod whose answer jumps, and where it is to be cut. */
 void mark_jump(fl_set *set, real one, real other) {
   real low, high;
   window_of(set, &low, &high);

@@ -88,7 +88,12 @@ static real exact(const whole *w, real *block, fl_work *work, const fl_box *box,
 
 /* The box of commands after the previous ones, or of all, of a block whose fins may be commanded by their forces. */
 static void box_now(const real *block, fl_work *work, const fl_question *q, fl_box *box) {
-  set_limits(block, work, q->previous, 0);
+  fl_question still = *q;
+  still.calm = 0;
+  if (q->previous)
+    tick_limits(block, work, &still);
+  else
+    whole_limits(block, work);
   *box = work->box;
 }
 
