@@ -41,6 +41,7 @@ class Later(Protocol):
     def candidates(self) -> Candidates | None: ...
     def samples(self) -> Candidates | None: ...
     def bound(self) -> Array | None: ...
+    def calm_power(self) -> Array | None: ...
 
 
 def read_only(array: Array) -> Array:
@@ -265,7 +266,7 @@ class Allocation(Answer[float]):
     `print(result)` shows it as a table.
     """
 
-    LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "candidates", "samples")
+    LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
     HELD: ClassVar[tuple[str, ...]] = (*Answer.HELD, "previous", "prices")
 
     solve_ms: float = field(compare=False)
@@ -282,6 +283,13 @@ class Allocation(Answer[float]):
         """Command of each actuator by its name, in a type of its own; None for a failed one."""
         parts = zip(self.layout.actuators, self.command, strict=True)
         return {part.name: part.command(row) for part, row in parts}
+
+    @cached_property
+    def calm_power(self) -> float:
+        """Part of the power [W] that goes into less turning, as the setting `calm` weighs it: what an answer
+        for the same wrench in the same tick takes less where turning costs nothing. 0 outside of ticks."""
+        part = None if self.later is None else self.later.calm_power()
+        return 0.0 if part is None else self._number(part)
 
     @cached_property
     def candidates(self) -> Candidates | None:
@@ -329,8 +337,9 @@ class Allocation(Answer[float]):
     def with_command(self, command: Array) -> Self:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
         other = replace(self, command=command, wrench_expected=None)
-        kept = ("bound", "candidates", "samples", "_general_notes") if self.later is None else ()
-        other.__dict__.update({name: getattr(self, name) for name in kept})
+        if self.later is None:
+            kept = ("bound", "calm_power", "candidates", "samples", "_general_notes")
+            other.__dict__.update({name: getattr(self, name) for name in kept})
         return other
 
     def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:

@@ -122,6 +122,10 @@ class Answered(NamedTuple):
         own = self.solution.bound
         return None if own is None else own(self.solution.command)
 
+    def calm_power(self) -> Array | None:
+        own = self.solution.calm_power
+        return None if own is None else own(self.solution.command)
+
     def _among_all(self, make: Callable[[], Candidates] | None) -> Candidates | None:
         """Candidates of the healthy actuators, put among all."""
         robot = self.question.ready.robot

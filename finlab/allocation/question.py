@@ -118,10 +118,10 @@ def _wrenches(wrench: ArrayLike, name: str, single: bool) -> Array:
     if bad.any():
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
-        raise CommandError(
-            f"{name}: {axis} must be a number of at most {MAX_WRENCH:g} in size, got {value}; an axis that "
-            f'may take any wrench is named: free=("{axis}",)'
-        )
+        sentence = f"{name}: {axis} must be a number of at most {MAX_WRENCH:g} in size, got {value}"
+        if not np.isfinite(value):
+            sentence += f'; an axis that may take any wrench is named: free=("{axis}",)'
+        raise CommandError(sentence)
     return array
 
 

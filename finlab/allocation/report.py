@@ -84,15 +84,22 @@ def doubts(result: Allocation) -> tuple[str, ...]:
     doubt = (result.measure_next,) if result.measure_next else ()
     if result.bound is None or result.power <= (1.0 + PLAIN_GAP) * result.bound:
         return doubt
-    gap = 100.0 * (1.0 - result.bound / result.power)
+    least = result.bound
+    if (calm := result.calm_power) > PLAIN_GAP * result.power:
+        doubt = (*doubt, f"of its power, {100.0 * calm / result.power:.0f} % goes into less turning (calm)")
+        least += calm
+    if result.power <= (1.0 + PLAIN_GAP) * least:
+        return doubt
+    gap = f"of its power, {100.0 * (1.0 - least / result.power):.0f} % may be more than needed"
     if result.layout.interaction is not None:
-        laws = "the bound is that of the actuators' laws for what they push; what the jets take is not in it"
-        return (*doubt, f"of its power, {gap:.2g} % may be more than needed: {laws}")
-    return (
-        *doubt,
-        f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
-        "wide arc, a dead band, drag or a measured table, the least is not proved",
-    )
+        cause = "the bound is that of the actuators' laws for what they push; what the jets take is not in it"
+    else:
+        rates = "" if result.previous is None else ", or is held by its rates"
+        cause = (
+            "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured table"
+            f"{rates}, the least is not proved"
+        )
+    return (*doubt, f"{gap}: {cause}")
 
 
 def next_measurement(result: Allocation, plant: Plant) -> str:
@@ -109,8 +116,8 @@ def next_measurement(result: Allocation, plant: Plant) -> str:
 
 RECORD = (
     *("failed", "target", "flow", "wrench_expected", "wrench_plant", "unallocated", "err_norm"),
-    *("expected_error", "expected_miss", "effort", "power", "bound", "scale", "solve_ms", "method"),
-    *("checkpoint", "reachable", "share", "binding", "unknown_fins", "notes"),
+    *("expected_error", "expected_miss", "effort", "power", "bound", "calm_power", "scale", "solve_ms"),
+    *("method", "checkpoint", "reachable", "share", "binding", "unknown_fins", "notes"),
 )
 """Keys of the JSON object, beside those of the commands; they are a contract."""
 

@@ -93,6 +93,9 @@ class Solution(NamedTuple):
     bound: Callable[[Array], Array] | None = None
     """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen commands
     (N, n, 3); None for methods that prove none."""
+    calm_power: Callable[[Array], Array] | None = None
+    """Gives the part (N,) of the power [W] of the chosen commands (N, n, 3) that goes into less turning; None
+    for methods that weigh no turning, and outside of ticks."""
     wrench: Array | None = None
     """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
@@ -144,4 +147,4 @@ def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np
             result[rows] = part(own if all_rows else own[:, places])
         return result
 
-    return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))
+    return Solution(command, bound if bounds else None, wrench=wrench, notes=tuple(notes))

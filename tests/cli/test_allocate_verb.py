@@ -20,7 +20,7 @@ WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
 KEYS = [
     *("actuators", "fins", "command", "failed", "target", "flow", "wrench_expected"),
     *("wrench_plant", "unallocated", "err_norm", "expected_error", "expected_miss", "effort"),
-    *("power", "bound", "scale", "solve_ms", "method", "checkpoint", "reachable", "share"),
+    *("power", "bound", "calm_power", "scale", "solve_ms", "method", "checkpoint", "reachable", "share"),
     *("binding", "unknown_fins", "notes"),
 ]
 

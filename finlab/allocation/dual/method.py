@@ -18,7 +18,7 @@ from finlab.allocation.dual.price_ascent import raised_price
 from finlab.allocation.dual.turns import settled, whole_of
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import Policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -114,11 +114,12 @@ class Dual(Method):
         """
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
-        if (moved := self.at(flow)) is not self:
-            return moved.solve(
-                targets, policy=policy, previous=previous, seed=seed, prices=prices, lost=lost, free=free
-            )
         now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
+        return self.at(flow).solve_now(targets, policy, now, prices)
+
+    def solve_now(self, targets: Array, policy: Policy, now: Now, prices: Array | None = None) -> Solution:
+        """Solves for targets (N, 6), at least one, with what may be given now, in the water of `flow`; the
+        others as for `solve`."""
         if self.plant.interaction is not None:
             return settled(self, targets, policy, now, prices)
         found = self.forces(targets, policy, prices, now)
@@ -142,8 +143,24 @@ class Dual(Method):
         if now.lost is not None:
             command[:, now.lost] = np.nan
         bound: Callable[[Array], Array] = partial(self.bound, aim, price, value, now)
-        proof = None if self.unproved else bound
-        return Solution(command, proof, prices=price, notes=tuple(sorted(notes - {""})))
+        return Solution(
+            command,
+            bound=None if self.unproved else bound,
+            calm_power=partial(self.calm_power, now) if now.calm > 0.0 else None,
+            prices=price,
+            notes=tuple(sorted(notes - {""})),
+        )
+
+    def calm_power(self, now: Now, command: Array) -> Array:
+        """Power (N,) [W] that commands (N, n, 3) take now beyond those that give the same wrenches where
+        turning costs nothing."""
+        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
+        given = np.where(works[:, None], command, self.plant.lower)
+        wrench = self.problem_now(now).wrench(given) * self.scale
+        other = self.solve_now(wrench, CLOSEST, now._replace(calm=0.0)).command
+        power = self.plant.power(given)[:, works].sum(axis=-1)
+        least = self.plant.power(other)[:, works].sum(axis=-1)
+        return np.asarray(np.maximum(power - least, 0.0))
 
     def problem_now(self, now: Now) -> CommandProblem:
         """Returns the problem of steps on commands within what may be given now."""
