@@ -192,7 +192,7 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
     commands_for(block, &work->box, out->force, q->previous, out->command);
     leave_bands(block, out->force, out->command);
   }
-  out->error = refine(block, work, &work->box, out->aim, out->command, ROUNDS);
+  out->error = refine(block, work, &work->box, out->aim, out->command, LAST_STEPS);
   meet_by_laws(block, work, asked, out);
   rest_in_bands(block, &work->box, out->command);
   if (q->previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);

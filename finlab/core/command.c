@@ -95,7 +95,8 @@ static int leaves(const real *block, const fl_box *box, int i, int c, const real
   return (command[c] <= box->low[i][c] + NOTHING && step < 0) || (command[c] >= box->high[i][c] - NOTHING && step > 0);
 }
 
-/* The damped smallest change of commands, over the widths of their limits, that gives a miss; those of `held` not. */
+/* The damped smallest change of commands, over the widths of their limits, that gives a miss; those of `held` not. The
+   damping is a share of the trace: in a tick widths, and with them slopes, are small. */
 static void change_for(const real *block, fl_work *work, const real *miss, real damping,
                        const unsigned char held[][3], real step[][3]) {
   int n = COUNT(block);
@@ -108,26 +109,39 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
         for (int k = 0; k <= j; k++) gram[j][k] += row[j] * row[k];
     }
   for (int j = 0; j < 6; j++) trace += gram[j][j];
-  for (int j = 0; j < 6; j++) gram[j][j] += damping + NOTHING + ROUNDING * R(0.01) * trace;
+  for (int j = 0; j < 6; j++) gram[j][j] += (damping + ROUNDING * R(0.01)) * trace + TINY;
   if (factor(gram)) solve(gram, miss, x);
   for (int i = 0; i < n; i++)
     for (int c = 0; c < 3; c++) step[i][c] = held[i][c] ? 0 : dot(work->slope[i][c], x, 6);
 }
+
+/* Holds the commands (n, 3) that a step would take out of the box, beside those that are held; whether there are any. */
+static int hold_leaving(const real *block, const fl_box *box, real command[][3], real step[][3],
+                        unsigned char held[][3]) {
+  int any = 0;
+  for (int i = 0; i < COUNT(block); i++)
+    for (int c = 0; c < 3; c++) {
+      if (held[i][c] || !leaves(block, box, i, c, command[i], step[i][c])) continue;
+      held[i][c] = 1;
+      any = 1;
+    }
+  return any;
+}
+
+#define HOLDS 3 /* how often a step is found anew without the commands that would leave the box */
 
 /* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
   int n = COUNT(block);
   real miss[6], cost = miss_of(block, work, aim, command, miss), damping = NEARLY;
   int moved = 1;
-  for (int k = 0; k < steps && cost > EXACT * EXACT; k++) {
+  for (int k = 0; k < steps && cost > EXACT * EXACT && damping <= 1; k++) {
     unsigned char held[FL_MOST][3] = {{0}};
     real step[FL_MOST][3], tried[FL_MOST][3], other[6], new_cost;
-    int any = 0;
     if (moved) slopes_of(block, work, box, command);
     change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
-    for (int i = 0; i < n; i++)
-      for (int c = 0; c < 3; c++) any |= held[i][c] = leaves(block, box, i, c, command[i], step[i][c]);
-    if (any) change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
+    for (int again = 0; again < HOLDS && hold_leaving(block, box, command, step, held); again++)
+      change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
     for (int i = 0; i < n; i++)
       for (int c = 0; c < 3; c++) {
         real own = leaves(block, box, i, c, command[i], step[i][c]) ? 0 : step[i][c];
@@ -140,7 +154,7 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
       memcpy(miss, other, sizeof miss);
       cost = new_cost, damping *= R(0.3);
     } else
-      damping = damping * 30 + CLOSE;
+      damping = damping * 10 + NEARLY;
   }
   return SQRT(cost);
 }

@@ -47,6 +47,7 @@ typedef fl_wide wide;
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)
 #define ROUNDS 12
+#define LAST_STEPS 36 /* of Levenberg and Marquardt that end an answer; most end after three */
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define CLIP(x, low, high) MIN(MAX(x, low), high)
