@@ -272,8 +272,9 @@ class Dual(Method):
         at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
         bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
         if not self._measured:
-            # The value is one of tables, which are off by a share of full power.
-            sure = (1.0 - CLOSE) * value - NEARLY * self.compiled.robot.largest_power
+            # The value is one of tables, which are off by a share of full power, at the least forces by more.
+            sure = (1.0 - 10.0 * CLOSE) * value - NEARLY * self.compiled.robot.largest_power
+            sure = np.minimum(sure, power)
             is_of_aim = _sizes((wrench - aim) / self.scale) <= NEARLY
             bound = np.where(is_of_aim, np.maximum(bound, sure), bound)
         elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)) and works.all():
