@@ -6,6 +6,14 @@
    all lies in none. */
 #include "inner.h"
 
+/* Whether so many bytes are the same, one of which was copied from the other. Not memcmp: WebAssembly has no library. */
+static int are_same(const void *one, const void *other, size_t size) {
+  const unsigned char *a = one, *b = other;
+  for (size_t k = 0; k < size; k++)
+    if (a[k] != b[k]) return 0;
+  return 1;
+}
+
 #define ROUGHLY (NEARLY / 10) /* distance, on the yardstick, up to which the point of a part is the nearest one */
 #define HELD 1e3      /* weight of an axis that is held over one of the group that is served */
 #define AT_RIM (R(0.1) * NEARLY) /* scaled wrench by which an answer at the rim may be off: what it gives is then its aim */
@@ -135,7 +143,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     real way = (inside[k] - wrench[k]) / work->span.scale[k];
     size += way * way;
   }
-  for (int tried = memcmp(wanted, wrench, sizeof wrench) ? 0 : 1; tried < 3; tried++) {
+  for (int tried = are_same(wanted, wrench, sizeof wrench) ? 1 : 0; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
       aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
     to_basis(work, aim, target);
@@ -200,7 +208,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   }
   take_sets(block, work, work->best_set);
   work->close = CLOSE_BY;
-  if (memcmp(work->best_set, work->kept, n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
+  if (!are_same(work->best_set, work->kept, n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
   *share = 1 - best[1];
 }
 
