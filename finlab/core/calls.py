@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.core.fields import Record, actuators_of, head_of, struct, tables_begin
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
-HEAD, EACH = 65, 68
-"""Numbers of `fl_head` and of an `fl_actuator` of finlab/core/core.h."""
 MAGIC = 41721.0
 """First number of a block; its version is the second."""
 CODES = (
@@ -60,27 +59,6 @@ class Worth(NamedTuple):
     """Largest force (1, n) [N] now."""
 
 
-class _Policy(ctypes.Structure):
-    _fields_ = [
-        ("kind", ctypes.c_int),
-        ("groups", ctypes.c_int),
-        ("weight", ctypes.c_double * 6),
-        ("group", ctypes.c_ubyte * 36),
-    ]
-
-
-class _Question(ctypes.Structure):
-    _fields_ = [
-        ("wrench", ctypes.c_double * 6),
-        ("policy", ctypes.c_void_p),
-        ("price", ctypes.c_void_p),
-        ("previous", ctypes.c_void_p),
-        ("lost", ctypes.c_void_p),
-        ("free", ctypes.c_void_p),
-        ("calm", ctypes.c_double),
-    ]
-
-
 class Now(NamedTuple):
     """What holds of a robot of n actuators when it is asked."""
 
@@ -98,83 +76,143 @@ STILL = Now()
 """No tick, nothing lost, no axis free."""
 
 
+class _Served(NamedTuple):
+    """A policy as the core reads it, and where it lies."""
+
+    record: Record
+    address: int
+
+
 @lru_cache(maxsize=64)
-def _policy(policy: Any) -> _Policy:
-    groups = policy.groups
+def _served(policy: Any) -> _Served:
     weights = np.array(policy.axis_weights)
-    masks = np.concatenate([*groups, np.zeros(36 - 6 * len(groups))]).astype(int).tolist()
-    kind = ("closest", "direction", "priority").index(policy.kind)
-    return _Policy(kind, len(groups), tuple(weights / weights.max()), tuple(masks))
+    record = np.zeros(1, struct("fl_policy"))
+    record["policy"] = ("closest", "direction", "priority").index(policy.kind)
+    record["groups"] = len(policy.groups)
+    record["weight"] = weights / weights.max()
+    for place, axes in enumerate(policy.groups):
+        record["group"][:, place] = axes
+    return _Served(record, record.ctypes.data)
 
 
 class Core:
     """One robot in the core."""
 
     def __init__(self, block: Array, count: int) -> None:
-        """Takes the block of a robot of n = `count` actuators. Raises DataError: its numbers are out of the
-        range that the core works with."""
+        """Takes the block of a robot.
+
+        Args:
+            block: its numbers; see finlab/core/fl_fields.h.
+            count: n, how many actuators it has.
+
+        Raises:
+            DataError: its numbers are out of the range that the core works with.
+        """
         core = library()
-        self._core, self._block, self._count = core, block, count
-        self._work, self._lock, most = ctypes.create_string_buffer(core.fl_sizes(3)), Lock(), core.fl_sizes(6)
-        self._question, answer = _Question(), np.zeros(5 * most + 23)
-        self._to, self._from = ctypes.addressof(self._question), answer.ctypes.data
-        self._wrench = np.frombuffer(memoryview(self._question), np.float64, 6)
-        self._price, self._previous = np.zeros(6), np.zeros((count, 3))
-        self._lost, self._free = np.zeros(count, np.uint8), np.zeros(6, np.uint8)
-        kept = (self._price, self._previous, self._lost, self._free)
-        self._price_at, self._previous_at, self._lost_at, self._free_at = (
-            values.ctypes.data for values in kept
-        )
-        self._force = answer[: 2 * count].reshape(1, count, 2)
-        self._vectors = answer[2 * most :][:20]  # price, inner, aim (6,), value, error
-        self._command = answer[2 * most + 20 :][: 3 * count].reshape(1, count, 3)
-        self._flags = answer[5 * most + 20 :].view(np.int32)  # status, within, steps, ended, placed
-        self._at, self._area = block.ctypes.data, ctypes.addressof(self._work)
-        if error := core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area):
+        self._core = core
+        self._block = block
+        self._count = count
+        self._work = ctypes.create_string_buffer(core.fl_sizes(3))
+        self._lock = Lock()
+        self._at = block.ctypes.data
+        self._area = ctypes.addressof(self._work)
+
+        # Question and answer lie in one place; these are views of it.
+        question = np.zeros(1, struct("fl_question"))
+        self._question = question
+        self._to = question.ctypes.data
+        self._wrench = question["wrench"]
+        self._policy_at = question["policy"]
+        self._price_at = question["price"]
+        self._previous_at = question["previous"]
+        self._lost_at = question["lost"]
+        self._free_at = question["free"]
+        self._calm = question["calm"]
+        answer = np.zeros(1, struct("fl_answer"))
+        self._from = answer.ctypes.data
+        self._force = answer["force"][:, :count]
+        self._answer_price = answer["price"]
+        self._aim = answer["aim"]
+        self._value = answer["value"]
+        self._error = answer["error"]
+        self._command = answer["command"][:, :count]
+        self._within = answer["within"]
+        self._ended = answer["ended"]
+
+        # What the question points at, and where it lies.
+        self._price = np.zeros(6)
+        self._previous = np.zeros((count, 3))
+        self._lost = np.zeros(count, np.uint8)
+        self._free = np.zeros(6, np.uint8)
+        self._price_lies = self._price.ctypes.data
+        self._previous_lies = self._previous.ctypes.data
+        self._lost_lies = self._lost.ctypes.data
+        self._free_lies = self._free.ctypes.data
+
+        error = core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area)
+        if error:
             raise DataError(
                 f"the core takes the robot for {CODES[error]}; check its forces, powers and sizes"
             )
 
+    def _ask_for(self, policy: Any, price: Array | None, now: Now) -> _Served | None:
+        """Writes into the question all but the wrench; what is returned is to be kept until the call ends."""
+        served = None if policy is None else _served(policy)
+        self._policy_at[0] = 0 if served is None else served.address
+        self._price_at[0] = 0
+        if price is not None:
+            self._price[:] = price
+            self._price_at[0] = self._price_lies
+        self._stand(now)
+        return served
+
     def _stand(self, now: Now) -> None:
         """Writes what holds now into the question."""
-        own = self._question
-        own.previous = own.lost = own.free = None
-        own.calm = now.calm
+        self._calm[0] = now.calm
+        self._previous_at[0] = 0
         if now.previous is not None:
             self._previous[:] = now.previous
-            own.previous = self._previous_at
+            self._previous_at[0] = self._previous_lies
+        self._lost_at[0] = 0
         if now.lost is not None:
             self._lost[:] = now.lost
-            own.lost = self._lost_at
+            self._lost_at[0] = self._lost_lies
+        self._free_at[0] = 0
         if now.free is not None:
             self._free[:] = now.free
-            own.free = self._free_at
+            self._free_at[0] = self._free_lies
 
     def one(self, wrench: Array, policy: Any, price: Array | None = None, now: Now = STILL) -> Found:
-        """Returns the answer to one wrench (6,) for what holds now, from prices (6,) [W/N, W/(N m)] of the
-        wrench on, if there are any; a policy is served out of reach. Raises CommandError: the core cannot
-        work with these numbers."""
+        """Answers one wrench.
+
+        Args:
+            wrench: wanted (6,) [N, N m].
+            policy: what to give out of reach; None for nothing else.
+            price: of the wrench (6,) [W/N, W/(N m)] to begin with.
+            now: what holds.
+
+        Returns:
+            One row of forces, prices and commands.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
         with self._lock:  # question and answer lie in one place for all threads
-            question = self._question
-            self._wrench[:] = wrench
-            served = None if policy is None else _policy(policy)  # kept until the call ends
-            question.policy = None if served is None else ctypes.addressof(served)
-            question.price = None
-            if price is not None:
-                self._price[:], question.price = price, self._price_at
-            self._stand(now)
-            if error := self._ask():
+            self._wrench[0] = wrench
+            served = self._ask_for(policy, price, now)
+            error = self._ask()
+            del served
+            if error:
                 raise CommandError(_REFUSED.format(CODES[error]))
-            vectors = self._vectors.copy()
             return Found(
-                self._force.copy(),
-                vectors[None, :6],
-                vectors[None, 12:18],
-                vectors[18:19],
-                self._flags[1:2].astype(bool),
-                self._command.copy(),
-                vectors[19:20],
-                bool(self._flags[3]),
+                force=self._force.copy(),
+                price=self._answer_price.copy(),
+                aim=self._aim.copy(),
+                value=self._value.copy(),
+                within=self._within.astype(bool),
+                command=self._command.copy(),
+                error=self._error.copy(),
+                ended=bool(self._ended[0]),
             )
 
     def _ask(self) -> int:
@@ -189,12 +227,10 @@ class Core:
         command = np.empty((count, self._count, 3))
         outs = [values.ctypes.data for values in (force, price, aim, value, command, within, error)]
         with self._lock:
-            served = None if policy is None else _policy(policy)  # kept until the call ends
-            self._question.policy = None if served is None else ctypes.addressof(served)
-            self._question.price = None
-            self._stand(now)
+            served = self._ask_for(policy, None, now)
             ins = self._at, self._area, self._to, wrenches.ctypes.data, count
             code = self._core.fl_answer_many(*ins, *outs)
+            del served
         if code > 0:
             raise CommandError(_REFUSED.format(CODES[code]))
         return Found(force, price, aim, value, within, command, error, code < 0)
@@ -234,8 +270,9 @@ class Core:
 
 def planes(count: int) -> Array:
     """A block of n = `count` actuators of which it says that they push in planes, and no more."""
-    block = np.zeros(HEAD + EACH * count)
-    block[3], block[HEAD::EACH] = count, 2.0
+    block = np.zeros(tables_begin(count))
+    head_of(block)["n"] = count
+    actuators_of(block)["rows"] = 2.0
     return block
 
 

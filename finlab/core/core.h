@@ -1,5 +1,5 @@
 /* The dual allocator in C99: no heap, no library but math.h. Everything a robot needs is one block of numbers
-   (see `layout of a block` below) that Python compiles; everything that changes is in one work area.
+   (its fields are in fl_fields.h) that Python compiles; everything that changes is in one work area.
 
    A target wrench w is met at least power by prices l: each actuator answers the price B'l of its own
    directions with the force that is worth most there, and Newton's method finds the prices at which the
@@ -26,45 +26,23 @@ typedef double fl_wide; /* of points that are mixed, as their differences are sm
 #define FL_SETTLE (12 * 60)
 #define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
-#define FL_VERSION 3
+#define FL_VERSION 4
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* Layout of a block: an `fl_head`, then an `fl_actuator` for each of the n actuators, then their tables. All
-   members are numbers of one type, so both are read where they lie. Places count numbers from the block's
-   first one; 0 stands for a table that is not there. */
-typedef struct {
-  fl_real magic, version, length, n, range; /* length: numbers in the block; range: of the effectiveness, r */
-  fl_real scale[6];                         /* wrench = scale * scaled wrench [N, N m] */
-  fl_real yard[6];                          /* yardstick of errors [N, N m] */
-  fl_real counts[6];                        /* 1 of an axis that the robot commands, else 0 */
-  fl_real beside[6];                        /* wrench on top of that of the forces [N, N m] */
-  fl_real basis[6][6];                      /* 6 x r: directions of scaled wrenches that are driven */
-} fl_head;
+   fields are numbers of one type, so both are read where they lie. */
+typedef unsigned char fl_byte;
+typedef const fl_byte *fl_bytes;
+typedef const fl_real *fl_reals;
+typedef const struct fl_policy *fl_policy_at;
 
-typedef struct {
-  fl_real rows;          /* 1: a force along one direction; 2: in a plane, or a lift and its drag */
-  fl_real ahead, back;   /* places of tables of force over price, ahead and in reverse */
-  fl_real share, worth;  /* force and power of this actuator over those of its tables */
-  fl_real gauge;         /* place of a gauge: how the force differs between directions */
-  fl_real low, high;     /* least and largest force [N]; of planes below 0 against their direction */
-  fl_real least;         /* the same as low, but 0 where a plane needs no reverse */
-  fl_real middle, half;  /* of the arc of directions [rad]; half is pi for all of them */
-  fl_real band;          /* forces smaller than this, other than 0, cannot be held [N] */
-  fl_real speed;         /* above 0: the second row is drag, whose power is speed times drag [m/s] */
-  fl_real gain[2];       /* force over price of each row at the largest force, by half of it [N^2/W] */
-  fl_real most[2];       /* largest force of each row [N] */
-  fl_real matrix[2][6];  /* scaled wrench in the basis per newton of each row */
-  fl_real own[3][6];     /* wrench over the yardstick per newton along each of the own axes of the law */
-  fl_real form;          /* how forces become commands: FL_THRUSTER ... */
-  fl_real lower[3], upper[3]; /* limits of the command, unused ones 0 */
-  fl_real step[3];       /* largest changes of a command in a tick */
-  fl_real turns;         /* 1 where the angle of the command may turn freely */
-  fl_real law, beat;     /* places of the grid of its law, and of a fin's beat or a foil's curve of lift and angle */
-  fl_real sign;          /* of a thruster's command over its force */
-  fl_real lean, uneven, uneven_at; /* of a fin: angle from command to force; 1 + uneven cos(angle - uneven_at) */
-  fl_real pressure, turned, rest;  /* of a foil: force per coefficient [N], angle without lift, coefficient of drag there */
-  fl_real doubt;         /* of a foil: what a squared force costs beside its power [W/N^2] */
-} fl_actuator;
+#define FL_BEGIN(type) typedef struct type type; struct type {
+#define FL_FIELD(type, name, shape, unit, meaning) type name shape;
+#define FL_END(type) };
+#include "fl_fields.h"
+#undef FL_BEGIN
+#undef FL_FIELD
+#undef FL_END
 enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
 
 /* A table: price of the largest force, cells k, power of the least force; then force, its derivative by the
@@ -150,24 +128,6 @@ typedef struct {
 
 enum { FL_MET, FL_BEYOND, FL_STUCK };
 enum { FL_CLOSEST, FL_DIRECTION, FL_PRIORITY };
-typedef struct {
-  int policy, groups;
-  fl_real weight[6];     /* of the axes, largest 1, for FL_CLOSEST */
-  unsigned char group[6][6]; /* axes of each group, for FL_PRIORITY */
-} fl_policy;
-
-typedef struct {
-  fl_real force[FL_MOST][2]; /* of each actuator's rows [N] */
-  fl_real price[6];          /* of the wrench [W/N, W/(N m)] */
-  fl_real inner[6];          /* the same in the basis of what the actuators span now [W] */
-  fl_real aim[6];            /* wrench that the forces give [N, N m] */
-  fl_real value;             /* power that gaps are proved to need [W] */
-  fl_real error;             /* distance of the commands' wrench from the aim, on the yardstick, by the laws' tables */
-  fl_real command[FL_MOST][3];
-  int status, within;        /* of Newton's method (FL_MET ...); within reach */
-  int steps, ended;          /* Newton's steps; 1 where a search ended at its bound of steps */
-  int placed;                /* 1 where the commands are those of a search, for foils */
-} fl_answer;
 
 /* Error codes; 0 is none. */
 enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
@@ -175,16 +135,10 @@ enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
 int fl_version(void);
 int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
 int fl_check(const fl_real *block, int length);
+/* All fields as text, a struct a line: "fl_head fl_real magic;... fl_real scale[6];...". Whoever reads a block or an answer
+   asks the library that he has loaded. */
+const char *fl_fields(void);
 int fl_prepare(const fl_real *block, fl_work *work);
-typedef struct { /* behind the wrench all is zeros, where there is nothing to say */
-  fl_real wrench[6];         /* [N, N m] */
-  const fl_policy *policy;   /* what to give beyond reach; 0: nothing else */
-  const fl_real *price;      /* of the wrench [W/N, W/(N m)]: where to begin; 0 for none */
-  const fl_real *previous;   /* commands (n, 3) of the tick before; 0 for none, NaN for an unknown one */
-  const unsigned char *lost; /* (n,) which actuators do not work; 0 for none */
-  const unsigned char *free; /* (6,) which axes may take any wrench, beside those that the robot does not command */
-  fl_real calm;              /* what turning costs in a tick: 0 nothing, 2 usual, up to 10 */
-} fl_question;
 int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
                    fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,

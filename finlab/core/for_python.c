@@ -7,6 +7,20 @@ int fl_sizes(int which) {
   return which >= 0 && which < (int)(sizeof sizes / sizeof *sizes) ? sizes[which] : 0;
 }
 
+#define TEXT_OF(x) #x
+#define TEXT(x) TEXT_OF(x) /* [FL_MOST][2] as [64][2] */
+#define FL_BEGIN(type) #type " "
+#define FL_FIELD(type, name, shape, unit, meaning) #type " " #name TEXT(shape) ";"
+#define FL_END(type) "\n"
+const char *fl_fields(void) {
+  return
+#include "fl_fields.h"
+      ;
+}
+#undef FL_BEGIN
+#undef FL_FIELD
+#undef FL_END
+
 /* Answers to wrenches (count, 6), all else as of a question: forces (count, n, 2), prices and aims (count, 6), values,
    commands (count, n, 3), within reach, errors; -1 where a search ended at its bound of steps. */
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question, const real *wrench, int count,

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 3
+VERSION = 4
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
 SIGNATURES = {
+    "fl_fields": "s",
     "fl_sizes": "ii",
     "fl_check": "ipi",
     "fl_prepare": "ipp",
@@ -22,8 +23,8 @@ SIGNATURES = {
     "fl_jets": "vppipppp",
     "fl_settle": "ippppippp",
 }
-"""What each function returns and takes: i int, r real, p pointer, v nothing."""
-_TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "v": None}
+"""What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
+_TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "s": ctypes.c_char_p, "v": None}
 PATH = Path(__file__).with_name("libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so"))
 
 

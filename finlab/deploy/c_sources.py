@@ -61,7 +61,7 @@ def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = N
     sources["samples.h"] = _samples(layout, method, samples)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
-    law = max(sum(len(table) for _, table in row.values()) for row in tables_of(thin))
+    law = max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin))
     sources["README.md"] = sources["README.md"].format(
         name=layout.name,
         version=finlab.__version__,
@@ -105,7 +105,7 @@ def _block(values: Array, number: Any) -> str:
 
 def _robot(block: Array, thin: Array) -> str:
     return (
-        '#include "robot.h"\n\n/* See `layout of a block` in core.h. */\nconst fl_real robot[] = {\n'
+        '#include "robot.h"\n\n/* See fl_fields.h. */\nconst fl_real robot[] = {\n'
         f"#ifdef FL_SINGLE\n{_block(thin, np.float32)}\n#else\n{_block(block, float)}\n#endif\n}};\n"
         "const int robot_length = sizeof robot / sizeof *robot;\n"
     )

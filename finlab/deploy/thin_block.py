@@ -4,7 +4,7 @@ Forces follow from prices by the tables alone and commands are made exact on the
 error is in the wrench, and it stays below TOLERANCE. Errors of other tables cost power, by their squares.
 """
 
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.response import table_numbers
 from finlab.arrays import Array
-from finlab.core.calls import EACH, HEAD
+from finlab.core.fields import Record, actuators_of, head_of, tables_begin
 from finlab.precision import NOTHING
 
 TOLERANCE = 1e-5
@@ -21,55 +21,102 @@ CELLS = 128
 """Cells of a table at most; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Directions of a gauge at most."""
-PLACES = 1, 2, 5, 58, 59
-"""Where an `fl_actuator` of core.h names its tables: ahead, in reverse, gauge, law, beat or curve."""
-LIMITS, TURNS, FORM, FIN, LAW, LEAN, ANGLES = slice(48, 54), 57, 47, 2, 58, 61, [48, 51]
+TABLES = ("ahead", "back", "gauge", "law", "beat")
+"""Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a fin's
+beat or a foil's curve."""
+FIN = 2
+"""`form` of a fin, FL_FIN."""
 
 
-def tables_of(block: Array) -> list[dict[int, tuple[int, Array]]]:
-    """Returns of each actuator the tables that a block has, by their places: what it is, by its position in
-    PLACES, and its numbers."""
-    rows = block[HEAD : HEAD + EACH * int(block[3])].reshape(-1, EACH)
-    return [
-        {
-            int(row[at]): (
-                kind,
-                block[int(row[at]) :][: _length(kind, block[int(row[at]) :], row[FORM] == FIN)],
-            )
-            for kind, at in enumerate(PLACES)
-            if row[at]
-        }
-        for row in rows
-    ]
+class Table(NamedTuple):
+    """A table of a block."""
+
+    field: str
+    """Which of TABLES names it."""
+    numbers: Array
 
 
-def _length(kind: int, at: Array, fin: bool) -> int:
-    if kind < 2:
-        return 3 + 3 * (int(at[1]) + 1)
-    if kind == 3:
-        return int(7 + at[:3].sum() + at[:3].prod() * at[5])
-    return 1 + (4 if kind == 2 else 2) * int(at[0]) + 2 * (kind == 4 and fin)
+def tables_of(block: Array) -> list[dict[int, Table]]:
+    """Returns of each actuator the tables that a block has, by their places."""
+    tables = []
+    for actuator in actuators_of(block):
+        by_place = {}
+        for field in TABLES:
+            place = int(actuator[field])
+            if place > 0:
+                length = _length(field, block[place:], is_fin=actuator["form"] == FIN)
+                by_place[place] = Table(field, block[place : place + length])
+        tables.append(by_place)
+    return tables
+
+
+def _length(field: str, table: Array, is_fin: bool) -> int:
+    """Returns how many numbers a table has, by its first ones (see core.h)."""
+    if field in ("ahead", "back"):
+        cells = int(table[1])
+        return 3 + 3 * (cells + 1)
+    if field == "gauge":
+        points = int(table[0])
+        return 1 + 4 * points
+    if field == "law":
+        knots = table[:3]
+        columns = table[5]
+        return int(7 + knots.sum() + knots.prod() * columns)
+    rows = int(table[0])
+    if is_fin:
+        rows += 1  # a beat counts its cells
+    return 1 + 2 * rows
 
 
 def thinned(block: Array) -> Array:
-    """Returns a block of the same robot with thinned tables, whose limits are numbers of single precision,
-    none outside those of before but for angles that turn freely."""
-    new: list[Array] = []
-    length, places = HEAD + EACH * int(block[3]), {0: 0}
-    for place, (kind, numbers) in {p: own for row in tables_of(block) for p, own in row.items()}.items():
-        places[place] = length + sum(len(table) for table in new)
-        parts = block[HEAD:length].reshape(-1, EACH)
-        grid = partial(_grid, parts=parts[parts[:, LAW] == place])
-        new.append((_radial, _radial, _gauge, grid, _curve)[kind](numbers))
-    block = np.concatenate([block[:length], *new])
-    block[2] = len(block)
-    for row in block[HEAD:length].reshape(-1, EACH):
-        row[list(PLACES)] = [places[int(row[at])] for at in PLACES]
-        if not row[TURNS]:
-            low, high = np.split(row[LIMITS].astype(np.float32), 2)
-            row[LIMITS][:3] = np.where(low < row[LIMITS][:3], np.nextafter(low, np.float32(np.inf)), low)
-            row[LIMITS][3:] = np.where(high > row[LIMITS][3:], np.nextafter(high, np.float32(-np.inf)), high)
+    """Returns a block of the same robot for single precision.
+
+    Its tables have fewer knots. Its limits are numbers of single precision, none outside those of before but
+    for angles that turn freely.
+    """
+    actuators = actuators_of(block)
+    tables: dict[int, Table] = {}
+    for by_place in tables_of(block):
+        tables.update(by_place)
+
+    begin = tables_begin(len(actuators))
+    thin_tables = []
+    moved_to = {0: 0}
+    place_new = begin
+    for place, table in tables.items():
+        thin = _thinned_table(table, actuators[actuators["law"] == place])
+        thin_tables.append(thin)
+        moved_to[place] = place_new
+        place_new += len(thin)
+
+    block = np.concatenate([block[:begin], *thin_tables])
+    head_of(block)["length"] = len(block)
+    for actuator in actuators_of(block):
+        for field in TABLES:
+            actuator[field] = moved_to[int(actuator[field])]
+        if not actuator["turns"]:
+            actuator["lower"] = _rounded(actuator["lower"], up=True)
+            actuator["upper"] = _rounded(actuator["upper"], up=False)
     return block
+
+
+def _rounded(limits: Array, up: bool) -> NDArray[np.float32]:
+    """Returns limits (3,) in single precision, none outside of what they were."""
+    near = limits.astype(np.float32)
+    outside = near < limits if up else near > limits
+    inward = np.float32(np.inf if up else -np.inf)
+    return np.where(outside, np.nextafter(near, inward), near)
+
+
+def _thinned_table(table: Table, users: Record) -> Array:
+    """Returns a table with fewer knots; `users` are the actuators (m,) whose law it is."""
+    if table.field in ("ahead", "back"):
+        return _radial(table.numbers)
+    if table.field == "gauge":
+        return _gauge(table.numbers)
+    if table.field == "law":
+        return _grid(table.numbers, users)
+    return _curve(table.numbers)
 
 
 def _radial(table: Array) -> Array:
@@ -93,14 +140,14 @@ def _cubic(knot: Array, value: Array) -> CubicHermiteSpline:
     return CubicHermiteSpline(knot[1:-1], value[1:-1], rise.T)
 
 
-def _grid(grid: Array, parts: Array) -> Array:
-    """Fewer angles of foils, of those that the commands of these parts (m, EACH) reach, or sizes of a fin; a
+def _grid(grid: Array, users: Record) -> Array:
+    """Fewer angles of foils, of those that the commands of the grid's users (m,) reach, or sizes of a fin; a
     measured fin keeps its grid."""
     count = grid[:3].astype(int)
     axes = np.split(grid[7 : 7 + count.sum()], np.cumsum(count)[:-1])
     values, period = grid[7 + count.sum() :].reshape(*count, -1), grid[3]
     if count[0] == count[1] == 1 < count[2]:
-        axes[2], value, period = _reached(axes[2], values[0, 0], period, parts)
+        axes[2], value, period = _reached(axes[2], values[0, 0], period, users)
         kept = _angles(axes[2], value, period)
         axes[2], values = axes[2][kept], value[None, None, kept]
     elif values.shape[2:] == (1, 1):
@@ -108,15 +155,27 @@ def _grid(grid: Array, parts: Array) -> Array:
     return np.concatenate([[*map(len, axes)], [period], grid[4:7], *axes, values.ravel()])
 
 
-def _reached(knot: Array, value: Array, period: float, foils: Array) -> tuple[Array, Array, float]:
-    """Knots (K,) and values (K, c) of a period between the angles that foils (m, EACH) reach, and three
-    beyond, without a period; all of them where that is no less."""
-    angles = foils[:, ANGLES] - foils[:, [LEAN]]
-    around = np.concatenate([knot + turn * period for turn in (-1, 0, 1)])
-    first, last = np.searchsorted(around, angles.min()) - 3, np.searchsorted(around, angles.max()) + 3
-    if not period or foils[0, FORM] == FIN or first < 0 or last > len(around) or last - first >= len(knot):
+def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[Array, Array, float]:
+    """Returns the knots that foils reach, and three beyond; all of them where that is no less.
+
+    Args:
+        knot: angles (K,) of one period [rad].
+        value: coefficients (K, c) there.
+        period: of the angles [rad]; 0 for none.
+        foils: actuators (m,) whose law it is.
+
+    Returns:
+        Knots, values, and their period: 0 where only a part of it is left.
+    """
+    angle_min = (foils["lower"][:, 0] - foils["lean"]).min()
+    angle_max = (foils["upper"][:, 0] - foils["lean"]).max()
+    around = np.concatenate([knot - period, knot, knot + period])
+    begin = np.searchsorted(around, angle_min) - 3
+    stop = np.searchsorted(around, angle_max) + 3
+    has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)
+    if not period or foils["form"][0] == FIN or not has_room:
         return knot, value, period
-    rows = np.arange(first, last)
+    rows = np.arange(begin, stop)
     return around[rows], value[rows % len(knot)], 0.0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
-from finlab.core.calls import EACH, HEAD
+from finlab.core.fields import actuators_of
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.layout import load_layout
@@ -149,12 +149,12 @@ def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
     method = AnyRobot().method(load_layout(name))
     robot = method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
     thin = thinned(robot.block)
-    assert max(sum(len(table) for _, table in row.values()) for row in tables_of(thin)) * 4 <= 4096
+    assert max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin)) * 4 <= 4096
     assert len(thinned(thin)) <= len(thin)
-    limits = [
-        block[HEAD:][: EACH * int(block[3])].reshape(-1, EACH)[:, 48:54] for block in (robot.block, thin)
-    ]
-    np.testing.assert_allclose(limits[1], limits[0], rtol=2e-7)
+    double = actuators_of(robot.block)
+    single = actuators_of(thin)
+    for limit in ("lower", "upper"):
+        np.testing.assert_allclose(single[limit], double[limit], rtol=2e-7)
 
 
 def test_cmake_builds_and_the_examples_compile(tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, Policy
-from finlab.allocation.dual import robot
 from finlab.arrays import Array
 from finlab.core.calls import CODES, Core, Now
+from finlab.core.fields import actuators_of, head_of, struct, tables_begin
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
@@ -29,7 +29,8 @@ def heavy() -> Core:
 
 def test_both_languages_agree_on_what_a_block_is(heavy: Core) -> None:
     core = library()
-    assert [core.fl_sizes(k) // 8 for k in (1, 2)] == [robot.HEAD, robot.EACH]
+    names = ["fl_head", "fl_actuator", "fl_policy", "fl_answer"]
+    assert [core.fl_sizes(k) for k in (1, 2, 4, 5)] == [struct(name).itemsize for name in names]
     assert core.fl_check(heavy._block.ctypes.data, len(heavy._block)) == 0
 
 
@@ -39,32 +40,35 @@ def checked(block: Array) -> int:
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "code"),
+    ("field", "value", "code"),
     [
-        (0, 7.0, BLOCK),
-        (1, 9.0, 2),
-        (2, 1e6, BLOCK),
-        (3, 0.0, BLOCK),
-        (3, 65.0, BLOCK),
-        (4, 2.5, BLOCK),
-        (5, 0.0, NUMBER),
-        (110, np.nan, NUMBER),
-        (robot.HEAD, 3.0, BLOCK),
-        (robot.HEAD + 1, 1e9, BLOCK),
-        (robot.HEAD + 1, 0.5, BLOCK),
-        (robot.HEAD + 3, -1.0, NUMBER),
+        ("magic", 7.0, BLOCK),
+        ("version", 9.0, 2),
+        ("length", 1e6, BLOCK),
+        ("n", 0.0, BLOCK),
+        ("n", 65.0, BLOCK),
+        ("range", 2.5, BLOCK),
+        ("scale", 0.0, NUMBER),
+        ("own", np.nan, NUMBER),
+        ("rows", 3.0, BLOCK),
+        ("ahead", 1e9, BLOCK),
+        ("ahead", 0.5, BLOCK),
+        ("share", -1.0, NUMBER),
     ],
 )
-def test_a_damaged_block_is_refused(heavy: Core, place: int, value: float, code: int) -> None:
+def test_a_damaged_block_is_refused(heavy: Core, field: str, value: float, code: int) -> None:
     block = heavy._block.copy()
-    block[place] = value
+    names = struct("fl_head").names
+    assert names is not None
+    owner = head_of(block) if field in names else actuators_of(block)[:1]
+    owner[field] = value
     assert checked(block) == code
     with pytest.raises(DataError, match=CODES[code]):
         Core(block, 8)
 
 
 def test_a_block_cut_short_is_refused(heavy: Core) -> None:
-    for length in (0, 1, robot.HEAD, len(heavy._block) - 1):
+    for length in (0, 1, tables_begin(0), len(heavy._block) - 1):
         assert checked(heavy._block[:length].copy()) != 0
 
 

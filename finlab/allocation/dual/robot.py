@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,8 @@ from finlab.actuators.form import Form
 from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
 from finlab.arrays import AnyArray, Array
 from finlab.axes import TURN
-from finlab.core.calls import EACH, HEAD, MAGIC, Core
+from finlab.core.calls import MAGIC, Core
+from finlab.core.fields import numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
 from finlab.precision import CLOSE, NEARLY, NOTHING
 
@@ -55,7 +56,7 @@ class DualRobot:
         """Largest force (n, 2) [N] along each direction."""
         gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
         self._gain = gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
-        tables = _Tables(HEAD + EACH * len(responses))
+        tables = _Tables(tables_begin(len(responses)))
         self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
         self._tables = tables.numbers
         self.effectiveness = np.array([each.rows for each in responses])
@@ -69,10 +70,8 @@ class DualRobot:
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
         self.basis = self.span(np.ones(len(responses), bool), np.ones(6, bool))
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
-        self.rows = np.pad(self.basis.T, ((0, 6 - self.basis.shape[1]), (0, 0)))
-        """The same (6, 6) as rows, zeros behind them."""
         self.block = self._block()
-        """The numbers of finlab/core/core.h."""
+        """The numbers that the core reads; see finlab/core/fl_fields.h."""
         self.core = Core(self.block, len(responses))
         """The robot in the core."""
 
@@ -102,28 +101,76 @@ class DualRobot:
         return float((cost - rest) / self.speed[i])
 
     def _block(self) -> Array:
+        """The robot as the core reads it: head, actuators, then the tables."""
         rank = self.basis.shape[1]
-        matrix = np.zeros((len(self.responses), 2, 6))
-        matrix[..., :rank] = (self.effectiveness / self.scale) @ self.basis
-        length = HEAD + EACH * len(self.responses) + len(self._tables)
-        head = np.array([MAGIC, VERSION, length, len(self.responses), rank])
-        parts: list[Any] = [head, self.scale, self.yardstick, self._counts, self.beside, self.rows.T.ravel()]
-        for i, (each, form, places) in enumerate(zip(self.responses, self._forms, self._places, strict=True)):
-            ahead, back, gauge, law, beat = places
-            low, high = self.ends[i]
-            least, rows, arc = low, 1.0 if self.speed[i] == 0.0 else 2.0, (0.0, 0.0)
-            if isinstance(each, Plane):
-                least, rows, arc = 0.0 if _needs_no_reverse(each) else low, 2.0, (each.middle, each.half)
-            lower, upper, step, turns = (values[i] for values in self._limits)
-            parts += [
-                *(rows, ahead, back, *each.table.origin[1:], gauge, low, high, least, *arc, each.band),
-                *(self.speed[i], self._gain[i], self.most[i], matrix[i].ravel(), self._own[i].ravel()),
-                *(_KINDS.index(form.kind), lower, upper, np.minimum(step, 1e30), turns.any(), law, beat),
-                *(form.numbers, self._doubt[i]),
-            ]
-        return np.hstack([*parts, self._tables]).astype(np.float64)
+        head = np.zeros((), struct("fl_head"))
+        head["magic"] = MAGIC
+        head["version"] = VERSION
+        head["n"] = len(self.responses)
+        head["range"] = rank
+        head["scale"] = self.scale
+        head["yard"] = self.yardstick
+        head["counts"] = self._counts
+        head["beside"] = self.beside
+        head["basis"][:, :rank] = self.basis
+
+        actuators = np.zeros(len(self.responses), struct("fl_actuator"))
+        actuators["low"] = self.ends[:, 0]
+        actuators["high"] = self.ends[:, 1]
+        actuators["speed"] = self.speed
+        actuators["gain"] = self._gain
+        actuators["most"] = self.most
+        actuators["matrix"][..., :rank] = (self.effectiveness / self.scale) @ self.basis
+        actuators["own"] = self._own
+        actuators["doubt"] = self._doubt
+        lower, upper, step, turns = self._limits
+        actuators["lower"] = lower
+        actuators["upper"] = upper
+        actuators["step"] = np.minimum(step, 1e30)  # C reads no infinity
+        actuators["turns"] = np.any(turns, axis=1)
+        described = zip(actuators, self.responses, self._forms, self._places, strict=True)
+        for actuator, response, form, places in described:
+            _describe(actuator, response, form, places)
+
+        head["length"] = tables_begin(len(actuators)) + len(self._tables)
+        return np.concatenate([numbers_of(head), numbers_of(actuators), self._tables])
 
 
+def _describe(actuator: Any, response: Response, form: Form, places: "TablePlaces") -> None:
+    """Writes what one actuator offers, and how its forces become commands, into its fields."""
+    _, share, worth = response.table.origin
+    actuator["share"] = share
+    actuator["worth"] = worth
+    actuator["band"] = response.band
+    # A foil has two rows: lift, and the drag of that lift.
+    actuator["rows"] = 1.0 if actuator["speed"] == 0.0 else 2.0
+    actuator["least"] = actuator["low"]
+    if isinstance(response, Plane):
+        actuator["rows"] = 2.0
+        actuator["middle"] = response.middle
+        actuator["half"] = response.half
+        if _needs_no_reverse(response):
+            actuator["least"] = 0.0
+
+    actuator["form"] = _KINDS.index(form.kind)
+    for field, place in places._asdict().items():
+        actuator[field] = place
+    for field, number in zip(CONVERSION, form.numbers, strict=True):
+        actuator[field] = number
+
+
+class TablePlaces(NamedTuple):
+    """Where the tables of one actuator lie in the block, by the fields that name them; 0 for none."""
+
+    ahead: int
+    back: int
+    gauge: int
+    law: int
+    beat: int
+
+
+CONVERSION = ("sign", "lean", "uneven", "uneven_at", "pressure", "turned", "rest")
+"""Fields of an actuator that turn a force into a command, in the order of `Form.numbers`."""
 _KINDS = "thruster", "pod", "fin", "foil"
 
 
@@ -149,16 +196,17 @@ class _Tables:
         """The place of a table of force over price."""
         return 0 if table is None else self.place(table.origin[0], lambda: table.origin[0].numbers)
 
-    def of(self, response: Response, form: Form) -> tuple[int, ...]:
-        """Places of an actuator's tables: ahead, in reverse, gauge, law, beat."""
+    def of(self, response: Response, form: Form) -> TablePlaces:
+        """Places of an actuator's tables."""
         gauge = response.gauge if isinstance(response, Plane) else None
-        law, beat = form.law, form.beat
-        return (
-            self.radial(response.table),
-            self.radial(response.reverse),
-            self.place(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
-            self.place(law, lambda: cast(Array, law)),
-            self.place(beat, lambda: _counted(cast(Array, beat), form.kind)),
+        law = form.law
+        beat = form.beat
+        return TablePlaces(
+            ahead=self.radial(response.table),
+            back=self.radial(response.reverse),
+            gauge=self.place(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
+            law=self.place(law, lambda: cast(Array, law)),
+            beat=self.place(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
 
     @property

@@ -1,0 +1,81 @@
+"""The structs of the core as numpy sees them; the loaded library says which fields it has (fl_fields.h)."""
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import Array
+from finlab.core.library import library
+
+Record = NDArray[np.void]
+"""An array of structs, whose fields are read by name."""
+_FIELD = re.compile(r"(\w+) (\w+)((?:\[\d+\])*);")
+_TYPES: dict[str, Any] = {
+    "fl_real": np.float64,
+    "fl_byte": np.uint8,
+    "int": np.int32,
+    "fl_reals": np.uintp,
+    "fl_bytes": np.uintp,
+    "fl_policy_at": np.uintp,
+}
+"""Types of fields; addresses are whole numbers."""
+
+
+@cache
+def struct(name: str) -> np.dtype[np.void]:
+    """Returns the dtype of a struct of the core.
+
+    Args:
+        name: such as `fl_actuator`.
+
+    Returns:
+        A dtype with the fields' names and shapes, aligned as in C.
+
+    Raises:
+        KeyError: the library knows no such struct.
+    """
+    text: bytes = library().fl_fields()
+    for line in text.decode().splitlines():
+        known, _, fields = line.partition(" ")
+        if known == name:
+            return _dtype(fields)
+    raise KeyError(name)
+
+
+def _dtype(fields: str) -> np.dtype[np.void]:
+    columns = []
+    for kind, name, shape in _FIELD.findall(fields):
+        lengths = tuple(int(length) for length in re.findall(r"\d+", shape))
+        columns.append((name, _TYPES[kind], lengths))
+    return np.dtype(columns, align=True)
+
+
+def count_of(name: str) -> int:
+    """Returns how many numbers a struct of numbers alone has."""
+    return struct(name).itemsize // np.dtype(np.float64).itemsize
+
+
+def head_of(block: Array) -> Record:
+    """Returns the head () of a block, a view: what is written there is in the block."""
+    return block[: count_of("fl_head")].view(struct("fl_head")).reshape(())
+
+
+def actuators_of(block: Array) -> Record:
+    """Returns the actuators (n,) of a block, a view: what is written there is in the block."""
+    begin = count_of("fl_head")
+    n = int(head_of(block)["n"])
+    end = begin + n * count_of("fl_actuator")
+    return block[begin:end].view(struct("fl_actuator"))
+
+
+def tables_begin(n: int) -> int:
+    """Returns the place where the tables of a block of n actuators begin."""
+    return count_of("fl_head") + n * count_of("fl_actuator")
+
+
+def numbers_of(records: Record) -> Array:
+    """Returns the numbers (N,) of structs that hold nothing else."""
+    return np.ascontiguousarray(records).reshape(-1).view(np.float64)
