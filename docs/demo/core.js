@@ -25,8 +25,8 @@ function placesFor(core, sizes) {
 // A robot's block (Float64Array) and n actuators, ready for questions.
 export function prepare(core, block, n) {
   const { fl_policy, fl_question, fl_answer } = structsOf(core);
-  const sizes = [8 * block.length, core.fl_sizes(3), fl_policy.size, fl_question.size, fl_answer.size];
-  const [robot, work, policy, question, answer] = placesFor(core, sizes);
+  const sizes = [8 * block.length, core.fl_sizes(3), fl_policy.size, fl_question.size, fl_answer.size, n];
+  const [robot, work, policy, question, answer, losses] = placesFor(core, sizes);
   new Float64Array(core.memory.buffer, robot, block.length).set(block);
   const error = core.fl_check(robot, block.length) || core.fl_prepare(robot, work);
   if (error) throw new Error(`the core refused the robot: error ${error}`);
@@ -38,22 +38,27 @@ export function prepare(core, block, n) {
     const numbers = answered(field);
     return Array.from({ length: n }, (_, i) => numbers.slice(i * width, (i + 1) * width));
   };
-  return (wrench, kind = "closest", groups = []) => {
+  // Of the actuators the one whose number is `lost` does not work; -1 for none. Its rows are null.
+  return (wrench, kind = "closest", groups = [], lost = -1) => {
     served("policy")[0] = POLICIES.indexOf(kind);
     served("groups")[0] = groups.length;
     served("weight").fill(1);
     served("group").set(groups.flat());
-    new Uint8Array(core.memory.buffer, question, fl_question.size).fill(0); // nothing lost, no axis free, no tick
+    new Uint8Array(core.memory.buffer, question, fl_question.size).fill(0); // no axis free, no tick
     asked("wrench").set(wrench);
     asked("policy")[0] = policy;
+    asked("lost")[0] = losses;
+    new Uint8Array(core.memory.buffer, losses, n).fill(0).fill(1, lost < 0 ? n : lost, lost + 1);
     const code = core.fl_answer_one(robot, work, question, answer);
     if (code) throw new Error(`the core refused the question: error ${code}`);
     const force = rows("force", 2);
+    const command = rows("command", 3);
     const power = force.map(([first, second], i) => {
       const size = second === 0 ? first : Math.hypot(first, second);
       return core.cost_at(robot, i, size);
     });
+    if (lost >= 0) for (const each of [force, command, power]) each[lost] = null;
     const [within] = answered("within");
-    return { force, power, command: rows("command", 3), wrench: answered("aim"), within: within === 1 };
+    return { force, power, command, wrench: answered("aim"), within: within === 1 };
   };
 }

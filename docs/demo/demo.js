@@ -12,12 +12,11 @@ let core, robots;
 
 async function choose(name) {
   const robot = robots.find((each) => each.name === name);
-  const numbers = new Float64Array(await (await fetch(`${name}.bin`)).arrayBuffer());
-  let at = 0;
-  robot.blocks = robot.lengths.map((length) => numbers.subarray(at, (at += length)));
+  const block = new Float64Array(await (await fetch(`${name}.bin`)).arrayBuffer());
+  robot.ask = prepare(core, block, robot.actuators.length);
   Object.assign(state, { robot, lost: -1, wrench: robot.wrench.slice() });
   part(".sliders").replaceChildren(...AXES.map(slider).filter((row) => row));
-  ready();
+  answer();
 }
 
 function slider(axis, k) {
@@ -29,20 +28,12 @@ function slider(axis, k) {
   return made("label", {}, made("span", {}, axis), input, shown);
 }
 
-// The block without the lost actuator has the others in their order.
-function ready() {
-  const { robot, lost } = state;
-  robot.ask = prepare(core, robot.blocks[lost + 1], robot.actuators.length - (lost >= 0));
-  answer();
-}
-
 function answer() {
   const { robot, wrench, lost } = state, policy = part("[name=policy]").value;
-  const groups = policy === "priority" ? robot.groups : [], ask = () => robot.ask(wrench, policy, groups), got = ask();
+  const groups = policy === "priority" ? robot.groups : [], ask = () => robot.ask(wrench, policy, groups, lost), got = ask();
   const start = performance.now();
   for (let k = 0; k < REPEATS; k++) ask();
   const spent = (performance.now() - start) / REPEATS;
-  for (const rows of [got.force, got.command, got.power]) if (lost >= 0) rows.splice(lost, 0, null);
   state.answer = got;
   const missing = wrench.map((value, k) => (robot.most[k] ? value - got.wrench[k] : 0));
   const watts = got.power.reduce((sum, value) => sum + (value ?? 0), 0);
@@ -58,7 +49,7 @@ function table() {
   const rows = state.robot.actuators.map((actuator, i) => {
     const { force, command, power } = state.answer, off = force[i] === null;
     const name = made("button", { type: "button", title: off ? "Mend it" : "Lose it", ariaPressed: off }, actuator.name);
-    name.addEventListener("click", () => { state.lost = off ? -1 : i; ready(); });
+    name.addEventListener("click", () => { state.lost = off ? -1 : i; answer(); });
     const words = off ? "lost" : actuator.numbers.map(([label, unit], k) => (unit === "rad" && label !== "amplitude" ? `${label} ${((command[i][k] * 180) / Math.PI).toFixed(0)}°` : `${label} ${number(command[i][k])} ${unit}`)).join(", ");
     const cells = [off ? "" : number(Math.hypot(...force[i])), off ? "" : number(power[i])].map((text) => made("td", {}, text));
     return made("tr", {}, made("th", {}, name), made("td", {}, words), ...cells);

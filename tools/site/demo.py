@@ -32,31 +32,29 @@ def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
 
 
 def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
-    """What the page shows of a robot, and its blocks: whole, then with each actuator lost."""
+    """What the page shows of a robot, and its block."""
     scale = yardstick(layout)
-    states = [layout, *(layout.without([name]) for name in layout.names)]
-    robots = [Dual(state, DualSettings(), scale, None).compiled.robot for state in states]
+    robot = Dual(layout, DualSettings(), scale, None).compiled.robot
     most = np.abs(axis_ranges(layout, np.zeros(6))).max(axis=0) * layout.commanded
     most[most < 1e-6 * scale] = 0.0
     hull = complete_body(layout).hull
     about = {
         "name": layout.name,
-        "lengths": [len(robot.block) for robot in robots],
         "most": most.tolist(),
         "wrench": (most * [0.4, 0, 0.2, 0, 0, 0.3]).tolist(),
         "groups": np.array(Policy("priority").groups).astype(int).tolist(),
         "hull": hull.size_m,
         "center": hull.center_m,
         "size": float(max(np.abs(layout.position).max(), max(hull.size_m) / 2)),
-        "strongest": float(robots[0].most.max()),
+        "strongest": float(robot.most.max()),
         "actuators": [
             {"name": name, "position": at.tolist(), "directions": own.tolist(), "numbers": part.NUMBERS}
             for name, at, own, part in zip(
-                layout.names, layout.position, robots[0].effectiveness[..., :3], layout.actuators, strict=True
+                layout.names, layout.position, robot.effectiveness[..., :3], layout.actuators, strict=True
             )
         ],
     }
-    return about, np.concatenate([robot.block for robot in robots]).astype("<f8").tobytes()
+    return about, robot.block.astype("<f8").tobytes()
 
 
 def _compiled() -> bytes:

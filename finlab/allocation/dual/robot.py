@@ -155,7 +155,7 @@ def _describe(actuator: Any, response: Response, form: Form, places: "TablePlace
     actuator["form"] = _KINDS.index(form.kind)
     for field, place in places._asdict().items():
         actuator[field] = place
-    for field, number in zip(CONVERSION, form.numbers, strict=True):
+    for field, number in zip(_CONVERSION, form.numbers, strict=True):
         actuator[field] = number
 
 
@@ -169,9 +169,11 @@ class TablePlaces(NamedTuple):
     beat: int
 
 
-CONVERSION = ("sign", "lean", "uneven", "uneven_at", "pressure", "turned", "rest")
-"""Fields of an actuator that turn a force into a command, in the order of `Form.numbers`."""
 _KINDS = "thruster", "pod", "fin", "foil"
+
+
+_CONVERSION = ("sign", "lean", "uneven", "uneven_at", "pressure", "turned", "rest")
+"""Fields of an actuator that turn a force into a command, in the order of `Form.numbers`."""
 
 
 class _Tables:
