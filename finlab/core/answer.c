@@ -127,7 +127,7 @@ static const real *first_prices(const fl_work *work, const fl_question *q, real 
 static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = a->form == FL_POD ? 1 : 0;
+    const int k = force_number(a);
     if (work->span.lost[i] || !is_in_band(a, command[i])) continue;
     if (work->box.low[i][k] > a->lower[k] || work->box.high[i][k] < a->upper[k]) return 1;
   }
@@ -146,7 +146,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   answer(block, work, wrench, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = a->form == FL_POD ? 1 : 0;
+    const int k = force_number(a);
     const real inside = a->band * (1 - 10 * NEARLY);
     real wanted[3];
     if (work->span.lost[i] || !is_in_band(a, command[i]) || size_of(later.force[i]) < inside) continue;

@@ -19,7 +19,7 @@ void commands_for(const real *block, const fl_box *box, real force[][2], const r
 }
 
 /* Which number of a command is a force; -1 where none is. */
-static int force_number(const fl_actuator *a) {
+int force_number(const fl_actuator *a) {
   if (a->form == FL_THRUSTER) return 0;
   if (a->form == FL_POD) return 1;
   return -1;

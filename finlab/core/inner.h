@@ -184,6 +184,7 @@ void commands_for(const real *block, const fl_box *box, real force[][2], const r
 real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
 void leave_bands(const real *block, real force[][2], real command[][3]);
 void rest_in_bands(const real *block, const fl_box *box, real command[][3]);
+int force_number(const fl_actuator *a);
 int is_in_band(const fl_actuator *a, const real *command);
 
 /* policy.c */

@@ -154,13 +154,18 @@ class Dual(Method):
     def calm_power(self, now: Now, command: Array) -> Array:
         """Power (N,) [W] that commands (N, n, 3) take now beyond those that give the same wrenches where
         turning costs nothing."""
-        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
-        given = np.where(works[:, None], command, self.plant.lower)
+        works, given = self._working(command, now)
         wrench = self.problem_now(now).wrench(given) * self.scale
         other = self.solve_now(wrench, CLOSEST, now._replace(calm=0.0)).command
         power = self.plant.power(given)[:, works].sum(axis=-1)
         least = self.plant.power(other)[:, works].sum(axis=-1)
         return np.asarray(np.maximum(power - least, 0.0))
+
+    def _working(self, command: Array, now: Now) -> tuple[NDArray[np.bool_], Array]:
+        """Returns which actuators (n,) work, and commands (N, n, 3) with numbers in place of the lost ones'
+        NaN, whose forces and powers do not count."""
+        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
+        return works, np.where(works[:, None], command, self.plant.lower)
 
     def problem_now(self, now: Now) -> CommandProblem:
         """Returns the problem of steps on commands within what may be given now."""
@@ -261,8 +266,7 @@ class Dual(Method):
     def bound(self, aim: Array, price: Array, value: Array, now: Now, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives, with what may be given now, the wrenches that
         commands (N, n, 3) give."""
-        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
-        command = np.where(works[:, None], command, self.plant.lower)
+        works, command = self._working(command, now)
         force = np.where(works[:, None], self.plant.force(command), 0.0)
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if now.free is not None:  # its price is 0

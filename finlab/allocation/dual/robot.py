@@ -89,10 +89,6 @@ class DualRobot:
         pairs = zip(self.responses, self.ends, strict=True)
         return float(sum(power_of(each, ends).max() for each, ends in pairs))
 
-    def price(self, inner: Array) -> Array:
-        """Prices (6,) [W/N, W/(N m)] of the wrench from those in the basis (6,) [W]."""
-        return np.asarray(self.basis @ inner[: self.basis.shape[1]] / self.scale)
-
     def _drag(self, i: int, force: float) -> float:
         """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
         if self.speed[i] == 0.0:
