@@ -138,6 +138,7 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
   for (int k = 0; k < steps && cost > EXACT * EXACT && damping <= 1; k++) {
     unsigned char held[FL_MOST][3] = {{0}};
     real step[FL_MOST][3], tried[FL_MOST][3], other[6], new_cost;
+    work->refined++;
     if (moved) slopes_of(block, work, box, command);
     change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
     for (int again = 0; again < HOLDS && hold_leaving(block, box, command, step, held); again++)

@@ -74,7 +74,10 @@ typedef struct { /* prices, and what they give */
 } fl_state;
 
 #define FL_POINTS 8              /* of a mixture near to a point out of reach */
-#define FL_DEPTH (16 + FL_MOST)  /* cuts on the way to one part of sets with gaps */
+/* Cuts on the way to one part of sets with gaps: as many for a robot whatever FL_MOST, so that all who compile the core
+   answer alike. */
+#define FL_DEPTH_OF(n) (16 + (n))
+#define FL_DEPTH FL_DEPTH_OF(FL_MOST)
 
 typedef struct { /* a mixture of points, and an orthonormal basis of their differences from the first one */
   fl_wide force[FL_POINTS][FL_MOST][2], point[FL_POINTS][6], share[FL_POINTS], miss[6]; /* miss: of a target */
@@ -124,6 +127,8 @@ typedef struct {
   fl_real aim[6], placed[FL_MOST][3], near[6]; /* wrench; commands of the best part where there are foils, prices there */
   fl_real metric[6][6], factor[6][6], least_trace, most_cost;
   int quick, torn, drags, turns, steps, ended;
+  int refined;    /* Levenberg-Marquardt steps on commands since whoever asks set it to 0 */
+  int most_parts; /* of sets with gaps that are looked at for one target */
 } fl_work;
 
 enum { FL_MET, FL_BEYOND, FL_STUCK };

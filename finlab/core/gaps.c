@@ -201,8 +201,8 @@ void narrow(const real *block, int i, fl_set *set, const real *force, int side) 
 }
 
 /* Remembers a cut of the set of an actuator by its force; 0 where there are too many. */
-fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force) {
-  if (*depth >= FL_DEPTH) return 0;
+fl_node *cut_at(const real *block, fl_work *work, int *depth, int cut, const real *force) {
+  if (*depth >= FL_DEPTH_OF(COUNT(block))) return 0;
   fl_node *node = work->node + (*depth)++;
   node->before = work->set[cut], node->cut = cut, node->both = 0;
   node->force[0] = force[0], node->force[1] = force[1];
@@ -309,7 +309,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value) {
   real best = R(1e30), bound = R(1e30), price[6];
   int depth = 0, parts = 0, root = status;
-  const int most_parts = work->turns ? MIN(TICK_PARTS, FL_PARTS) : FL_PARTS;
+  const int most_parts = work->turns ? MIN(TICK_PARTS, work->most_parts) : work->most_parts;
   fl_node *node;
   memcpy(work->kept, work->set, sizeof work->kept);
   memcpy(price, work->now->price, sizeof price);
@@ -331,7 +331,7 @@ int least_power(const real *block, fl_work *work, const real *target, int status
       memcpy(work->set, before, sizeof before);
       bound = MIN(bound, own), status = FL_BEYOND, open = 0;
     }
-    if (open && ACTUATOR(block, gap)->speed == 0 && parts < most_parts && (node = cut_at(work, &depth, gap, s->force[gap]))) {
+    if (open && ACTUATOR(block, gap)->speed == 0 && parts < most_parts && (node = cut_at(block, work, &depth, gap, s->force[gap]))) {
       status = cheaper_side(block, work, target, node), parts += 2;
       continue;
     }

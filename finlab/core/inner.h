@@ -131,7 +131,7 @@ int worst_gap(const real *block, const fl_work *work, real force[][2], const rea
 int nearer_side(const real *block, int i, const fl_set *set, const real *force);
 int may_have_gaps(const real *block, const fl_work *work, real force[][2]);
 void narrow(const real *block, int i, fl_set *set, const real *force, int side);
-fl_node *cut_at(fl_work *work, int *depth, int cut, const real *force);
+fl_node *cut_at(const real *block, fl_work *work, int *depth, int cut, const real *force);
 void take_side(const real *block, fl_work *work, const fl_node *node, int side);
 fl_node *last_open(const real *block, fl_work *work, int *depth);
 int least_power(const real *block, fl_work *work, const real *target, int status, real *value);

@@ -182,7 +182,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *share, real *most_share) {
   real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
-  int n = COUNT(block), depth = 0, most = 8 * (ROUNDS + n), found = 0;
+  int n = COUNT(block), depth = 0, most = MIN(8 * (ROUNDS + n), work->most_parts), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
   work->close = CLOSE_BY;
@@ -197,7 +197,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
       memcpy(work->best_set, work->set, sizeof work->best_set);
       found |= cut < 0;
     }
-    if (cut >= 0 && parts < most && (node = cut_at(work, &depth, cut, own[cut]))) {
+    if (cut >= 0 && parts < most && (node = cut_at(block, work, &depth, cut, own[cut]))) {
       better_side(block, work, wrench, policy, node, own, score);
       if (!found || is_less(score, best)) continue;
     }

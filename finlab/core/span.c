@@ -179,6 +179,8 @@ int span_now(const real *block, fl_work *work, const unsigned char *lost, const 
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
   work->ray = 0;
+  work->refined = 0;
+  work->most_parts = FL_PARTS;
   for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
   if (!span_anew(block, work, 1)) return FL_BAD_NUMBER;
   whole_limits(block, work);

@@ -2,6 +2,7 @@
    Levenberg-Marquardt steps on the whole model. finlab/allocation/dual/turns.py says why they settle. */
 #include "inner.h"
 
+#define TURN_PARTS 200 /* of sets with gaps that are looked at after the first turn, which begins near its answer */
 #define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model; most times that a step is made shorter */
 
 /* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
@@ -99,7 +100,9 @@ static void box_now(const real *block, fl_work *work, const fl_question *q, fl_b
 
 /* Turns from forces (n, 2) on, as many as are given, or from the previous commands of the question; its price is one
    of the wrench. The forces that they come to, the last answer of the dual by which they got better, with their
-   commands, and what they end with (3,): power [W], what an error as large as the yardstick counts [W], the error. */
+   commands, and what they end with (4,): power [W], what an error as large as the yardstick counts [W], the error,
+   steps of Newton's method and on commands. The second and the last are also taken: what an error counts at least; steps after which no other turn
+   is begun. */
 int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *forces,
               fl_answer *out, real *end) {
   fl_question q = *question;
@@ -109,6 +112,9 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   real(*here)[2] = (real(*)[2])forces;
   real command[FL_MOST][3], there[FL_MOST][2], price[6];
   real worth = end[1];
+  const real most_steps = end[3];
+  real steps = 0;
+  work->refined = 0;
   command_fins(w, block, !previous);
   if (!span_now(block, work, q.lost, q.free)) return FL_BAD_NUMBER;
   if (previous) cost_of(block, work, (real(*)[3])previous, here);
@@ -120,11 +126,14 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   if (previous) enough = 1 / NOTHING;
   real error = exact(w, block, work, &box, q.wrench, enough, command);
   real power = cost_of(block, work, command, here);
-  for (int turn = 0; turn < turns; turn++) {
+  for (int turn = 0; turn < turns && (turn == 0 || steps + work->refined < most_steps); turn++) {
     int better = 0;
     if (!span_anew(block, work, 0)) return FL_BAD_NUMBER;
+    if (turn > 0) work->most_parts = MIN(TURN_PARTS, FL_PARTS);
     const int failed = fl_answer_one(block, work, &q, &own);
+    work->most_parts = FL_PARTS;
     if (failed) return failed;
+    steps += own.steps;
     real scaled[6], size = 1;
     for (int k = 0; k < 6; k++) scaled[k] = own.price[k] * HEAD(block)->yard[k];
     worth = MAX(worth, 2 * SQRT(dot(scaled, scaled, 6))); /* twice what it is worth at these prices: an exact penalty */
@@ -152,6 +161,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   end[0] = power;
   end[1] = worth;
   end[2] = error;
+  end[3] = steps + work->refined;
   if (turns == 0) return 0;
   command_fins(w, block, 0);
   box_now(block, work, &q, &box);

@@ -43,6 +43,8 @@ class Ended(NamedTuple):
     """What an error as large as the yardstick counts [W]."""
     error: float
     """Distance of the wrench from the target, on the yardstick, by the laws' tables."""
+    steps: float
+    """Steps of Newton's method and on commands that the turns took."""
 
 
 class _Whole(ctypes.Structure):
@@ -68,7 +70,7 @@ class Whole(Core):
             *(None if own is None else own.ctypes.data for own in arrays),
             tuple(beside.counts),
         )
-        self._begin, self._end, self._turns = np.zeros((1, self._count, 2)), np.zeros(3), 0
+        self._begin, self._end, self._turns = np.zeros((1, self._count, 2)), np.zeros(4), 0
         self._ends = self._begin.ctypes.data, self._from, self._end.ctypes.data
 
     def settled(
@@ -80,12 +82,15 @@ class Whole(Core):
         price: Array | None = None,
         now: Now = STILL,
         worth: float = 0.0,
+        most_steps: float = math.inf,
     ) -> Ended:
         """What turns from forces (n, 2) on, or in a tick from the command before, come to for a wrench (6,):
         at most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of
-        the wrench. An error counts `worth` [W] at least. Else as for `one`."""
+        the wrench. An error counts `worth` [W] at least. No turn but the first is begun after `most_steps`
+        steps. Else as for `one`."""
         with self._turn:
-            self._begin[0], self._end[1], self._turns = 0.0 if force is None else force, worth, turns
+            self._begin[0], self._turns = 0.0 if force is None else force, turns
+            self._end[1], self._end[3] = worth, most_steps
             found = self.one(wrench, policy, price, now)
             return Ended(found._replace(force=self._begin.copy()), *self._end.tolist())
 

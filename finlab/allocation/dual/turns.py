@@ -27,6 +27,8 @@ IN_A_TICK, RANDOM = 2, 3
 """Turns of a tick; beginnings at random."""
 BACK, FOLLOWED = 2, 1
 """How many beginnings are followed of those where one force is turned back, and of the others."""
+WORK = 400_000
+"""Steps times actuators after which no other turn is begun: about a tenth of a second."""
 
 
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
@@ -67,17 +69,22 @@ def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array |
     if now.previous is not None:
         return whole.settled(target, None, IN_A_TICK, policy, prices, now).found
     laws: Found = dual.forces(target[None], policy, prices, now)
-    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0], now)
+    left = WORK / len(laws.force[0])
+    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0], now, most_steps=left)
+    left -= best.steps
 
     def better(starts: Array, followed: int) -> bool:
         """Whether some of other forces (K, n, 2) come to less; then the best is that."""
-        nonlocal best
+        nonlocal best, left
         before = best
         tried = [whole.settled(target, start, 0, now=now, worth=best.worth) for start in starts]
         merits = [one.power + one.worth * one.error for one in tried]
         for k in np.argsort(merits)[:followed]:
+            if left <= 0:
+                break
             force = tried[k].found.force[0]
-            other = whole.settled(target, force, ROUNDS, policy, laws.price[0], now)
+            other = whole.settled(target, force, ROUNDS, policy, laws.price[0], now, most_steps=left)
+            left -= other.steps
             best = other if _beats(other, best) else best
         return best.power < (1.0 - 10.0 * CLOSE) * before.power
 
