@@ -26,7 +26,7 @@ from finlab.axes import axes_in
 from finlab.core.calls import STILL, Found, Now
 from finlab.core.whole import Whole
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the yardstick, up to which commands need no further step."""
@@ -286,9 +286,10 @@ class Dual(Method):
             questions = zip(wrench[rows], price[rows], command[rows], strict=True)
             raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])
             bound[rows] = np.maximum(bound[rows], proved_power(self.compiled, wrench[rows], raised, now))
-        bound = np.maximum(bound, 0.0)
-        slack = power * (1.0 + FINE) + 100.0 * NOTHING * self.compiled.robot.largest_power
-        return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
+        # Above the power it is off by what tables are off; by more than that it proves nothing.
+        above_by_tables = (1.0 + 10.0 * CLOSE) * power + NEARLY * self.compiled.robot.largest_power
+        bound = np.where(bound > above_by_tables, 0.0, np.clip(bound, 0.0, power))
+        return np.asarray(bound * (1.0 - ROUNDING))
 
     @cached_property
     def _measured(self) -> bool:
