@@ -40,7 +40,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/pip install --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev]'
 	@touch $@
 
-core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.[ch])
+core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.h finlab/core/src/*.[ch])
 	$(BIN)/python hatch_build.py
 
 app: setup

@@ -61,7 +61,8 @@ def compile_core(folder: Path) -> Path:
     words, _, name = target()
     with TemporaryDirectory() as work:  # a process that has loaded the library in the folder keeps its own
         made = Path(work) / name
-        command = [*words, *FLAGS, *map(str, sorted(CORE.glob("*.c"))), "-o", str(made), "-lm"]
+        sources = map(str, sorted((CORE / "src").glob("*.c")))
+        command = [*words, *FLAGS, f"-I{CORE}", *sources, "-o", str(made), "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True)
             said, failed = done.stderr or done.stdout, done.returncode != 0

@@ -257,15 +257,20 @@ class Core:
         """Returns what forces are worth at prices (N, 6) of the wrench [W/N, W/(N m)], of all that may be
         given now. Raises CommandError: the core cannot work with these numbers."""
         price = np.ascontiguousarray(price)
-        worth = np.empty((len(price), self._count, 5))
+        worth = np.empty((len(price), self._count), struct("fl_actuator_worth"))
         with self._lock:
             self._stand(now)
             ins = self._at, self._area, self._to, price.ctypes.data, len(price)
             error = self._core.fl_worth(*ins, worth.ctypes.data)
         if error:
             raise CommandError(_REFUSED.format(CODES[error]))
-        ahead, back, most, low, high = np.moveaxis(worth, -1, 0)
-        return Worth(ahead, back, most, low[:1], high[:1])
+        return Worth(
+            worth["price"],
+            worth["price_back"],
+            worth["conjugate"],
+            worth["low"][:1],
+            worth["high"][:1],
+        )
 
 
 def planes(count: int) -> Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 4
+VERSION = 5
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
 SIGNATURES = {
     "fl_fields": "s",

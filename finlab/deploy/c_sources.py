@@ -30,7 +30,7 @@ SAMPLES = 24
 """Questions of a self-test."""
 ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
-NOT_ABOARD = "jets.c", "turns.c", "reach.c", "for_python.c"
+NOT_ABOARD = "jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c"
 """Files of the core for robots with `interaction`, and for what a layout can do and prices prove."""
 QUESTIONS = ("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("priority", 3.0), ("closest", 0.6)
 """Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick before."""
@@ -53,17 +53,23 @@ def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = N
     method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
     block = method.compiled.robot.block
     thin = thinned(block)
-    files = [path for path in Path(core.__path__[0]).glob("*.[ch]") if path.name not in NOT_ABOARD]
-    sources = {path.name: path.read_text("utf-8") for path in files}
-    sources["core.h"] = _sized(sources["core.h"], layout.n)
+    folder = Path(core.__path__[0])
+    files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]
+    sources = {path.name: path.read_text("utf-8") for path in files if path.name not in NOT_ABOARD}
+    name = _identifier(layout.name)
+    sources["fl_names.h"] = _names(sources["finlab.h"] + sources["internal.h"], name)
+    sources["finlab.h"] = _sized(sources["finlab.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)
-    sources["robot.h"] = _header(layout)
+    sources["robot.h"] = _header(layout, name)
+    sources[f"fl_{name}.h"] = _plain_header(layout, name)
+    sources["allocate.c"] = _plain_source(layout, name)
     sources["samples.h"] = _samples(layout, method, samples)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
     law = max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin))
     sources["README.md"] = sources["README.md"].format(
         name=layout.name,
+        identifier=name,
         version=finlab.__version__,
         count=layout.n,
         samples=samples,
@@ -84,7 +90,7 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
 
 
 def _sized(header: str, count: int) -> str:
-    """core.h for so many actuators, in single precision where a processor has no unit for double."""
+    """finlab.h for so many actuators, in single precision where a processor has no unit for double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
     single = "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define FL_SINGLE\n#endif\n\n"
     return header.replace("#ifdef FL_SINGLE\n", f"{single}#ifdef FL_SINGLE\n", 1)
@@ -103,30 +109,142 @@ def _block(values: Array, number: Any) -> str:
     return ",\n".join("  " + ", ".join(texts[k : k + 8]) for k in range(0, len(texts), 8))
 
 
+def _identifier(name: str) -> str:
+    """A layout's name as part of names in C."""
+    return re.sub(r"[^a-z0-9]", "_", name.lower())
+
+
+def _names(headers: str, name: str) -> str:
+    """fl_names.h, by which all functions of the core have the robot's name: two robots link into one
+    program, each with a core of its own size."""
+    functions = sorted(set(re.findall(r"\b(fl_[a-z_0-9]+)\(", headers)))
+    lines = [f"#define {one} fl_{name}_{one.removeprefix('fl_')}" for one in functions]
+    about = (
+        "/* Names of this core's functions in the linker: with the robot's name two robots link into one\n"
+        "   program. Your source says fl_answer_one. */"
+    )
+    return "\n".join([about, "#ifndef FL_NAMES_H", "#define FL_NAMES_H", *lines, "#endif", ""])
+
+
 def _robot(block: Array, thin: Array) -> str:
     return (
         '#include "robot.h"\n\n/* See fl_fields.h. */\nconst fl_real robot[] = {\n'
         f"#ifdef FL_SINGLE\n{_block(thin, np.float32)}\n#else\n{_block(block, float)}\n#endif\n}};\n"
-        "const int robot_length = sizeof robot / sizeof *robot;\n"
+        "const int robot_length = (int)(sizeof robot / sizeof *robot);\n"
     )
 
 
-def _header(layout: Layout) -> str:
-    about = [
-        f"  ROBOT_{re.sub(r'[^A-Z0-9]', '_', name.upper())}, /* {name}: "
-        + ", ".join(f"{label} [{unit}]" for label, unit in part.NUMBERS)
-        + " */"
-        for name, part in zip(layout.names, layout.actuators, strict=True)
-    ]
-    return (
-        '#ifndef ROBOT_H\n#define ROBOT_H\n#include "core.h"\n\nextern const fl_real robot[];\n'
-        "extern const int robot_length;\n"
-        "int robot_selftest(void); /* how many answers differ from the library's */\n"
-        "#define ROBOT_ACTUATOR(i) ((const fl_actuator *)((const fl_head *)robot + 1) + (i))\n\n"
-        "enum { /* rows of commands, and their numbers */\n"
-        + "\n".join(about)
-        + "\n  ROBOT_COUNT\n};\n#endif\n"
-    )
+def _rows_of_commands(layout: Layout, prefix: str) -> str:
+    """An enumeration of the rows of commands, with the meaning of their numbers."""
+    lines = []
+    for name, part in zip(layout.names, layout.actuators, strict=True):
+        numbers = ", ".join(f"{label} [{unit}]" for label, unit in part.NUMBERS)
+        lines.append(f"  {prefix}_{_identifier(name).upper()}, /* {name}: {numbers} */")
+    rows = "\n".join(lines)
+    return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"
+
+
+_HEADER = """/* The robot {title} for the functions of finlab.h. One robot in a file: for several use fl_{name}.h. */
+#ifndef FL_ROBOT_H
+#define FL_ROBOT_H
+#include "finlab.h"
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* Short names of this robot. */
+#define robot fl_{name}
+#define robot_length fl_{name}_length
+#define robot_selftest fl_{name}_selftest
+
+extern const fl_real robot[];    /* its block of numbers */
+extern const int robot_length;   /* how many */
+int robot_selftest(void);        /* how many answers differ from the library's */
+#define ROBOT_ACTUATOR(i) ((const fl_actuator *)(const void *)((const fl_head *)(const void *)robot + 1) + (i))
+
+{rows}
+#ifdef __cplusplus
+}}
+#endif
+#endif
+"""
+
+_PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++; several robots may be in one program. */
+#ifndef FL_{upper}_H
+#define FL_{upper}_H
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+{rows}
+/* Finds commands of least power for a wrench; beyond reach those that give the largest share of it. Not for several
+   threads at once.
+
+   @param wrench    (6,) Fx, Fy, Fz [N], Tx, Ty, Tz [N m], body frame: x forward, y left, z up
+   @param previous  (count, 3) commands of the tick before, from which rates hold; 0 for none
+   @param command   (count, 3) becomes the commands; unused numbers are 0
+   @return          0, or a code for fl_{name}_error_text; then the commands are as they were */
+int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double (*command)[3]);
+
+/* @return a sentence that says what is wrong and what to do */
+const char *fl_{name}_error_text(int code);
+
+/* @return how many of the self-test's answers differ from the library's; selftest.c has it */
+int fl_{name}_selftest(void);
+
+#ifdef __cplusplus
+}}
+#endif
+#endif
+"""
+
+_PLAIN_SOURCE = """#include "robot.h"
+#include "fl_{name}.h"
+
+#define CALM ((fl_real){calm!r}) /* what turning costs in a tick */
+
+static fl_work work;
+static fl_answer answer;
+static int is_prepared;
+
+int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double (*command)[3]) {{
+  fl_real before[ROBOT_COUNT][3];
+  const fl_policy policy = {{FL_DIRECTION, 0, {{1, 1, 1, 1, 1, 1}}, {{{{0}}}}}};
+  fl_question question = {{{{0}}, 0, 0, 0, 0, 0, CALM}};
+  if (!is_prepared) {{
+    int code = fl_check(robot, robot_length);
+    if (!code) code = fl_prepare(robot, &work);
+    if (code) return code;
+    is_prepared = 1;
+  }}
+  question.policy = &policy;
+  for (int k = 0; k < 6; k++) question.wrench[k] = (fl_real)wrench[k];
+  if (previous) {{
+    for (int i = 0; i < ROBOT_COUNT; i++)
+      for (int k = 0; k < 3; k++) before[i][k] = (fl_real)previous[i][k];
+    question.previous = before[0];
+  }}
+  const int code = fl_answer_one(robot, &work, &question, &answer);
+  if (code) return code;
+  for (int i = 0; i < ROBOT_COUNT; i++)
+    for (int k = 0; k < 3; k++) command[i][k] = (double)answer.command[i][k];
+  return FL_OK;
+}}
+"""
+
+
+def _header(layout: Layout, name: str) -> str:
+    return _HEADER.format(title=layout.name, name=name, rows=_rows_of_commands(layout, "ROBOT"))
+
+
+def _plain_header(layout: Layout, name: str) -> str:
+    rows = _rows_of_commands(layout, f"FL_{name.upper()}")
+    return _PLAIN_HEADER.format(title=layout.name, name=name, upper=name.upper(), rows=rows)
+
+
+def _plain_source(layout: Layout, name: str) -> str:
+    return _PLAIN_SOURCE.format(name=name, calm=DualSettings().calm)
 
 
 def _samples(layout: Layout, method: Dual, count: int) -> str:

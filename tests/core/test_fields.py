@@ -50,7 +50,7 @@ def copied(folder: Path) -> Path:
 
 def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     copy = copied(tmp_path)
-    sources = sorted(map(str, (copy / "core").glob("*.c")))
+    sources = sorted(map(str, (copy / "core" / "src").glob("*.c")))
     library = str(copy / "core" / "libfinlab.so")
     subprocess.run(["gcc", *FLAGS, "-fPIC", "-shared", *sources, "-o", library, "-lm"], check=True)
     said = {}

@@ -1,7 +1,7 @@
 /* Asks what the library was asked at the export and compares the answers; `robot_selftest` says how many differ.
    On a board call it from your own program, as examples/blink.ino does; define FL_NO_MAIN there. */
 #include "robot.h"
-#include "inner.h"
+#include "internal.h"
 #include <stdio.h>
 
 typedef struct { /* question and answer of the library: wrench that it gives, its error on the yardstick, commands */
@@ -47,7 +47,7 @@ static int is_other(const sample *s) {
     if (size_of(out.force[i]) <= a->most[0] / 100) continue;
     for (int k = 0; k < 3; k++) {
       fl_real way = out.command[i][k] - s->command[i][k], width = a->upper[k] - a->lower[k];
-      if (a->turns != 0 && width > 6) way = wrapped(way);
+      if (a->turns != 0 && width > 6) way = fl_wrap_angle(way);
       if (FABS(way) > width / 20) return 1;
     }
   }
@@ -79,7 +79,7 @@ static int differs(const sample *s) {
   double size = fmax(1, apart(s->wrench, rest, all)), most = s->previous ? 1e-3 + 1.02 * (double)s->error : 0;
   fl_real command[ROBOT_COUNT][3]; /* the library's, by the laws of this block */
   memcpy(command, s->command, sizeof command);
-  if (!(refine(robot, &work, &work.box, s->previous ? s->wrench : s->aim, command, 0) <= s->error + size * APART)) return 1;
+  if (!(fl_refine_commands(robot, &work, &work.box, s->previous ? s->wrench : s->aim, command, 0) <= s->error + size * APART)) return 1;
   others += is_other(s);
   return !(farther(s) <= size * APART && (double)out.error <= size * APART + most);
 }

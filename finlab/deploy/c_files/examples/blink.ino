@@ -1,6 +1,6 @@
 // Blinks once a second where the self-test holds, ten times a second where it does not.
 // The C files lie in src/ of this sketch's folder.
-extern "C" int robot_selftest(void);
+#include "src/robot.h"
 
 static int wrong;
 

@@ -6,9 +6,7 @@
 #include <uORB/topics/actuator_motors.h>
 #include <uORB/topics/vehicle_thrust_setpoint.h>
 #include <uORB/topics/vehicle_torque_setpoint.h>
-extern "C" {
 #include "robot.h"
-}
 
 class RobotAllocator : public px4::ScheduledWorkItem {
 public:

@@ -2,9 +2,7 @@
 #include <geometry_msgs/msg/wrench.hpp>
 #include <rclcpp/rclcpp.hpp>
 #include <std_msgs/msg/float64_multi_array.hpp>
-extern "C" {
 #include "robot.h"
-}
 
 class RobotAllocator : public rclcpp::Node {
 public:

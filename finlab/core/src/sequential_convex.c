@@ -1,6 +1,6 @@
 /* Answers where actuators act on each other, in turns: the dual of the model made linear at the last forces, then
    Levenberg-Marquardt steps on the whole model. finlab/allocation/dual/turns.py says why they settle. */
-#include "inner.h"
+#include "internal.h"
 
 #define TURN_PARTS 200 /* of sets with gaps that are looked at after the first turn, which begins near its answer */
 #define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model; most times that a step is made shorter */
@@ -25,7 +25,7 @@ static real linear_at(const whole *w, real *block, fl_work *work, const real *ai
     const fl_actuator *a = ACTUATOR(block, i);
     memset(force[i], 0, sizeof force[i]);
     if (span->lost[i]) continue;
-    if (!is_in_band(a, command[i])) force_of(block, i, command[i], force[i], 0);
+    if (!fl_is_in_dead_band(a, command[i])) fl_force_of_command(block, i, command[i], force[i], 0);
     for (int c = 0; c < 3; c++) {
       real own = force[i][c] + (a->form == FL_FOIL && c == 1 ? a->pressure * a->rest : 0);
       for (int b = 0; b < 3; b++) body[i][b] += own * w->frames[9 * i + 3 * c + b];
@@ -47,7 +47,7 @@ static real linear_at(const whole *w, real *block, fl_work *work, const real *ai
         h->beside[k] -= force[i][c] * more, miss[k] -= force[i][c] * from->own[c][k];
       }
   }
-  beside_of(block, &work->span);
+  fl_offset_wrench(block, &work->span);
   for (int k = 0; k < 6; k++)
     if (!span->counts[k]) miss[k] = 0;
   return SQRT(dot(miss, miss, 6));
@@ -75,7 +75,7 @@ static real exact(const whole *w, real *block, fl_work *work, const fl_box *box,
     real tried[FL_MOST][3], near[6], other[6], new_error;
     memcpy(tried, command, COUNT(block) * sizeof *tried);
     for (int c = 0; c < 6; c++) near[c] = aim[c] - (1 - share) * miss[c] * HEAD(block)->yard[c];
-    refine(block, work, box, near, tried, 1);
+    fl_refine_commands(block, work, box, near, tried, 1);
     new_error = linear_at(w, block, work, aim, tried, other);
     if (new_error < error) {
       memcpy(command, tried, COUNT(block) * sizeof *tried);
@@ -92,9 +92,9 @@ static void box_now(const real *block, fl_work *work, const fl_question *q, fl_b
   fl_question still = *q;
   still.calm = 0;
   if (q->previous)
-    tick_limits(block, work, &still);
+    fl_limits_of_tick(block, work, &still);
   else
-    whole_limits(block, work);
+    fl_limits_without_tick(block, work);
   *box = work->box;
 }
 
@@ -116,22 +116,23 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   real steps = 0;
   work->refined = 0;
   command_fins(w, block, !previous);
-  if (!span_now(block, work, q.lost, q.free)) return FL_BAD_NUMBER;
-  if (previous) cost_of(block, work, (real(*)[3])previous, here);
+  if (!fl_span_of_question(block, work, q.lost, q.free)) return FL_BAD_NUMBER;
+  if (previous) fl_power_of_commands(block, work, (real(*)[3])previous, here);
   box_now(block, work, &q, &box);
-  commands_for(block, &box, here, previous, command);
+  fl_commands_for_forces(block, &box, here, previous, command);
   /* A tick begins where the robot is; forces that are only looked at need not be exact. */
   real enough = NEARLY / 10;
   if (turns == 0) enough = 10 * CLOSE;
   if (previous) enough = 1 / NOTHING;
   real error = exact(w, block, work, &box, q.wrench, enough, command);
-  real power = cost_of(block, work, command, here);
+  real power = fl_power_of_commands(block, work, command, here);
   for (int turn = 0; turn < turns && (turn == 0 || steps + work->refined < most_steps); turn++) {
     int better = 0;
-    if (!span_anew(block, work, 0)) return FL_BAD_NUMBER;
-    if (turn > 0) work->most_parts = MIN(TURN_PARTS, FL_PARTS);
+    if (!fl_prepare_span(block, work, 0)) return FL_BAD_NUMBER;
+    const fl_settings usual = work->settings;
+    if (turn > 0) work->settings.most_parts = MIN(TURN_PARTS, usual.most_parts);
     const int failed = fl_answer_one(block, work, &q, &own);
-    work->most_parts = FL_PARTS;
+    work->settings = usual;
     if (failed) return failed;
     steps += own.steps;
     real scaled[6], size = 1;
@@ -144,9 +145,9 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
       real force[FL_MOST][2], (*tried)[3] = own.command;
       for (int i = 0; i < COUNT(block); i++)
         for (int c = 0; c < 2; c++) force[i][c] = here[i][c] + size * (own.force[i][c] - here[i][c]);
-      if (k > 0 || previous) commands_for(block, &box, force, previous, tried);
+      if (k > 0 || previous) fl_commands_for_forces(block, &box, force, previous, tried);
       const real new_error = exact(w, block, work, &box, q.wrench, NEARLY / 10, tried);
-      const real new_power = cost_of(block, work, tried, there);
+      const real new_power = fl_power_of_commands(block, work, tried, there);
       if (!(new_power + worth * new_error < merit)) continue;
       better = 1;
       power = new_power;
@@ -165,9 +166,9 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   if (turns == 0) return 0;
   command_fins(w, block, 0);
   box_now(block, work, &q, &box);
-  commands_for(block, &box, here, previous, out->command);
+  fl_commands_for_forces(block, &box, here, previous, out->command);
   end[2] = exact(w, block, work, &box, q.wrench, EXACT, out->command);
-  rest_in_bands(block, &box, out->command);
-  into_box(block, &box, out->command);
+  fl_rest_in_dead_bands(block, &box, out->command);
+  fl_clip_commands(block, &box, out->command);
   return 0;
 }

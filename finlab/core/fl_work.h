@@ -1,55 +1,14 @@
-/* The dual allocator in C99: no heap, no library but math.h. Everything a robot needs is one block of numbers
-   (its fields are in fl_fields.h) that Python compiles; everything that changes is in one work area.
-
-   A target wrench w is met at least power by prices l: each actuator answers the price B'l of its own
-   directions with the force that is worth most there, and Newton's method finds the prices at which the
-   answers add up to w. docs/theory/method.md has the mathematics. */
-#ifndef FINLAB_CORE_H
-#define FINLAB_CORE_H
-
-#ifdef FL_SINGLE
-typedef float fl_real;
-#else
-typedef double fl_real;
-#endif
-typedef double fl_wide; /* of points that are mixed, as their differences are small */
-
-#ifndef FL_MOST
-#define FL_MOST 64 /* actuators */
-#endif
-#ifndef FL_PARTS
-#define FL_PARTS 1000 /* of sets with gaps that are looked at for one target */
-#endif
-/* Newton's steps of one answer at most: two searches of two parts, each a dive and two for each cut. Where foils drag,
-   steps of a start take FL_SETTLE more: starts of a part, of the foils' ends, of a lattice of their angles (6) and of the
-   shares of a ray. */
-#define FL_SETTLE (12 * 60)
-#define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
-#define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
-#define FL_VERSION 4
-#define FL_MAGIC 41721 /* first number of a block */
-
-/* Layout of a block: an `fl_head`, then an `fl_actuator` for each of the n actuators, then their tables. All
-   fields are numbers of one type, so both are read where they lie. */
-typedef unsigned char fl_byte;
-typedef const fl_byte *fl_bytes;
-typedef const fl_real *fl_reals;
-typedef const struct fl_policy *fl_policy_at;
-
-#define FL_BEGIN(type) typedef struct type type; struct type {
-#define FL_FIELD(type, name, shape, unit, meaning) type name shape;
-#define FL_END(type) };
-#include "fl_fields.h"
-#undef FL_BEGIN
-#undef FL_FIELD
-#undef FL_END
-enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
+/* The work area of the core, public for its size alone: a program without a heap keeps one in static memory. Its fields may
+   change in any version. */
+#ifndef FL_WORK_H
+#define FL_WORK_H
+#include "finlab.h"
 
 /* A table: price of the largest force, cells k, power of the least force; then force, its derivative by the
    price, conjugate at k + 1 prices top (j / k)^4. A gauge: points p; then support function, its derivative,
    the gauge, and the angle from the command's direction to the force's in p directions around the circle. A curve:
    points p; then pairs, the first number ascending. A beat: cells k; then amplitude and frequency of the shares
-   (j / k)^2 of the largest force. A grid: see law.c. */
+   (j / k)^2 of the largest force. A grid: see command_law.c. */
 
 typedef struct { /* a foil near to a command: force, by angle, cost, by angle and squared angle */
   fl_real force[2], slope[2], cost, pay, bend;
@@ -107,7 +66,7 @@ typedef struct { /* what the actuators that work span in the axes that count */
   int range;
 } fl_span;
 
-typedef struct {
+struct fl_work {
   fl_span span;
   int is_whole; /* whether `set` and `box` are those of the robot outside of ticks */
   fl_set set[FL_MOST];
@@ -128,30 +87,9 @@ typedef struct {
   fl_real metric[6][6], factor[6][6], least_trace, most_cost;
   int quick, torn, drags, turns, steps, ended;
   int refined;    /* Levenberg-Marquardt steps on commands since whoever asks set it to 0 */
-  int most_parts; /* of sets with gaps that are looked at for one target */
-} fl_work;
+  fl_settings settings;
+};
 
+/* How Newton's method ended: the target is met, is beyond reach, or prices stood still. */
 enum { FL_MET, FL_BEYOND, FL_STUCK };
-enum { FL_CLOSEST, FL_DIRECTION, FL_PRIORITY };
-
-/* Error codes; 0 is none. */
-enum { FL_BAD_BLOCK = 1, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT };
-
-int fl_version(void);
-int fl_sizes(int which); /* bytes of fl_real, fl_head, fl_actuator, fl_work, fl_policy, fl_answer; then FL_MOST */
-int fl_check(const fl_real *block, int length);
-/* All fields as text, a struct a line: "fl_head fl_real magic;... fl_real scale[6];...". Whoever reads a block or an answer
-   asks the library that he has loaded. */
-const char *fl_fields(void);
-int fl_prepare(const fl_real *block, fl_work *work);
-int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *out);
-int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
-                   fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,
-                   unsigned char *within, fl_real *error);
-void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
-                 fl_real *command);
-int fl_worth(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *price, int count, fl_real *worth);
-void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_wide *from, const fl_wide *ray, int count,
-              fl_wide close, fl_wide *size, fl_wide *normal, fl_real *force);
-fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
 #endif

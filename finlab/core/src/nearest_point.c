@@ -4,14 +4,14 @@
    of few points that answered prices. Each step asks for the point that is worth most along the miss, and takes
    the nearest point of the affine hull of all, points whose share would fall below 0 left out. What the last
    answer adds proves how far the point is from the nearest one. Sets with curved sides converge the same way. */
-#include "inner.h"
+#include "internal.h"
 
 #define BARELY ((wide)NEARLY * NEARLY) /* rounding of shares and misses, which are in double precision always */
 #define MOST_POINTS 400
 #define MOST_SHARES (5 * ROUNDS)
 
 /* An axis of a scaled wrench in the basis, on the yardstick. */
-wide out_of_basis(const real *block, const fl_work *work, const real *inner, int axis) {
+wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis) {
   const fl_span *span = &work->span;
   wide sum = 0;
   for (int j = 0; j < 6; j++) sum += (wide)span->basis[axis][j] * (wide)inner[j];
@@ -19,12 +19,12 @@ wide out_of_basis(const real *block, const fl_work *work, const real *inner, int
 }
 
 /* The wrench on the yardstick, in weighted axes, that each force gives per newton. */
-void weigh(const real *block, fl_work *work, const wide *weight) {
+void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
   for (int i = 0; i < COUNT(block); i++) {
     work->corners[i] = 0;
     for (int q = 0; q < 2; q++)
       for (int k = 0; k < 6; k++)
-        work->column[i][q][k] = weight[k] * out_of_basis(block, work, work->span.matrix[i][q], k);
+        work->column[i][q][k] = weight[k] * fl_out_of_range(block, work, work->span.matrix[i][q], k);
   }
 }
 
@@ -36,7 +36,7 @@ static void best_corner(const real *polygon, const real *price, wide *force) {
 }
 
 /* The point (6,), in weighted axes, that forces give. */
-void point_of(const real *block, const fl_work *work, wide force[][2], wide *point) {
+void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point) {
   memset(point, 0, sizeof work->column[0][0]);
   for (int i = 0; i < COUNT(block); i++)
     for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) add(point, force[i][q], work->column[i][q]);
@@ -51,9 +51,9 @@ static void farthest(const real *block, const fl_work *work, const wide *normal,
     if (work->corners[i] > 0)
       best_corner(block + work->corners[i], own, force[i]);
     else
-      farthest_of(block, i, work->set + i, own, force[i]);
+      fl_support_of_set(block, i, work->set + i, own, force[i]);
   }
-  point_of(block, work, force, m->point[m->count]);
+  fl_point_of_forces(block, work, force, m->point[m->count]);
   m->along[m->count] = work->ray && product(work->ray, normal, 6) < 0 ? 1 : 0;
   if (m->along[m->count] > 0) add(m->point[m->count], -1, work->ray);
 }
@@ -135,7 +135,7 @@ static void mix(fl_mixture *m, const wide *target) {
 /* Makes a mixture the point nearest to a target (6,); it begins at the mixture, where that has points. Up to the
    distance `close` a point is the nearest one; `apart` is the share of a miss to be proved. Where there is a miss,
    what is worth most across it follows the mixture's points. Returns the miss. */
-wide nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m) {
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m) {
   wide last = 1e300, way[6];
   if (m->count == 0) {
     farthest(block, work, target, m);
@@ -162,7 +162,7 @@ wide nearest_point(const real *block, const fl_work *work, const wide *target, w
 /* The point of the set that is farthest along a ray (6,) from a point (6,), at sizes from `least` to `most`. A plane
    across the miss of a size bounds it from above, and is kept; the next try is that bound (Dinkelbach), until it
    is as `close`. Returns the bound; where no size is in the set, the least one, and the point is the nearest to it. */
-wide farthest_along(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
+wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
                     wide close, fl_mixture *m, wide *plane) {
   wide size = most, last = 1e300, target[6];
   memcpy(m->miss, ray, sizeof m->miss);
@@ -175,7 +175,7 @@ wide farthest_along(const real *block, const fl_work *work, const wide *from, co
     memcpy(target, from, sizeof target);
     add(target, size, ray);
     m->count = MAX(m->count, 1);
-    wide miss = nearest_point(block, work, target, close, 0.5, m);
+    wide miss = fl_nearest_point(block, work, target, close, 0.5, m);
     if (size == least || miss <= 2 * close || (size >= last && miss <= 1)) break;
     last = size >= last ? size - miss / (2 * length_of(ray)) : size;
     size = last;
@@ -183,7 +183,7 @@ wide farthest_along(const real *block, const fl_work *work, const wide *from, co
   return size;
 }
 
-void mixed_force(const real *block, const fl_mixture *m, real force[][2]) {
+void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++)
     for (int q = 0; q < 2; q++) {
       wide sum = 0;

@@ -1,24 +1,24 @@
 /* Small dense systems. */
-#include "inner.h"
+#include "internal.h"
 
-real wrapped(real angle) { return angle - 2 * PI * FLOOR((angle + PI) / (2 * PI)); }
+real fl_wrap_angle(real angle) { return angle - 2 * PI * FLOOR((angle + PI) / (2 * PI)); }
 
 /* Adds b b' times a weight to a lower triangle. */
-void add_square(real h[6][6], const real *b, real weight) {
+void fl_add_square(real h[6][6], const real *b, real weight) {
   for (int j = 0; j < 6; j++) {
     const real own = weight * b[j];
     for (int k = 0; k <= j; k++) h[j][k] += own * b[k];
   }
 }
 
-real trace_of(real h[6][6]) {
+real fl_trace(real h[6][6]) {
   real sum = 0;
   for (int j = 0; j < 6; j++) sum += h[j][j];
   return sum;
 }
 
 /* Turns the lower triangle of a (6 x 6) into L and 1 / D of L D L'; 0 where a is singular to rounding. */
-int factor(real a[6][6]) {
+int fl_factor(real a[6][6]) {
   for (int i = 0; i < 6; i++) {
     real row[6], rest = a[i][i];
     for (int j = 0; j < i; j++) row[j] = a[i][j] - dot(row, a[j], j);
@@ -29,7 +29,7 @@ int factor(real a[6][6]) {
   return 1;
 }
 
-void solve(real a[6][6], const real *right, real *x) {
+void fl_solve(real a[6][6], const real *right, real *x) {
   for (int i = 0; i < 6; i++) x[i] = right[i] - dot(a[i], x, i);
   for (int i = 5; i >= 0; i--) {
     x[i] *= a[i][i];

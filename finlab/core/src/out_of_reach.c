@@ -4,7 +4,7 @@
    takes the axes by their weights, `direction` the farthest share of the target, `priority` the axes of one
    group after the other, what those before it have got held. Sets with gaps are cut until the best answer of
    all lies in none. */
-#include "inner.h"
+#include "internal.h"
 
 /* Whether so many bytes are the same, one of which was copied from the other. Not memcmp: WebAssembly has no library. */
 static int are_same(const void *one, const void *other, size_t size) {
@@ -31,9 +31,9 @@ static void closest(const real *block, fl_work *work, const real *wrench, const 
     weight[k] = MAX(policy->weight[k], CLOSE);
     target[k] = weight[k] * on_yardstick(block, wrench, k);
   }
-  weigh(block, work, weight);
+  fl_weigh_axes(block, work, weight);
   work->mixture.count = 0;
-  score[0] = rounded((real)nearest_point(block, work, target, work->close, 0, &work->mixture));
+  score[0] = rounded((real)fl_nearest_point(block, work, target, work->close, 0, &work->mixture));
 }
 
 /* The largest share of a wrench that can be given alone. In a tick there may be none, as drives cannot stop or turn at
@@ -47,12 +47,12 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
     all[k] = wrench[k] + work->span.beside[k];
     begin[k] = -on_yardstick(block, work->span.beside, k);
   }
-  to_basis(work, all, target);
-  const int ranged = in_range(work, all, target);
+  fl_reduce_wrench(work, all, target);
+  const int ranged = fl_is_in_range(work, all, target);
   for (int k = 0; k < 6; k++) /* what rounding has put beside the range is left out */
-    ray[k] = ranged ? out_of_basis(block, work, target, k) : 0;
-  weigh(block, work, weight);
-  wide share = farthest_along(block, work, begin, ray, 0, 1, work->close, m, plane);
+    ray[k] = ranged ? fl_out_of_range(block, work, target, k) : 0;
+  fl_weigh_axes(block, work, weight);
+  wide share = fl_farthest_along_ray(block, work, begin, ray, 0, 1, work->close, m, plane);
   const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
   add(m->miss, -less, ray);
   score[0] = rounded((real)length_of(m->miss));
@@ -60,7 +60,7 @@ static void direction(const real *block, fl_work *work, const real *wrench, real
   if (share > 0 || !(score[0] > 0)) return;
   m->count = 0;
   work->ray = ray;
-  score[0] = rounded((real)nearest_point(block, work, begin, work->close, 0, m));
+  score[0] = rounded((real)fl_nearest_point(block, work, begin, work->close, 0, m));
   work->ray = 0;
   share = 0;
   for (int p = 0; p < m->count; p++) share += m->share[p] * m->along[p];
@@ -83,10 +83,10 @@ static void priority(const real *block, fl_work *work, const real *wrench, const
         weight[k] = HELD * held[k] + sqrt(PULL / missed) * group[k];
         target[k] = weight[k] * aim[k];
       }
-      weigh(block, work, weight);
+      fl_weigh_axes(block, work, weight);
       m->done = 0; /* the points so far, in the axes of this group: */
-      for (int p = 0; p < m->count; p++) point_of(block, work, m->force[p], m->point[p]);
-      nearest_point(block, work, target, work->close, 0, m);
+      for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
+      fl_nearest_point(block, work, target, work->close, 0, m);
       for (int k = 0; k < 6; k++)
         if (group[k]) missing[k] = m->miss[k] / weight[k];
       missed = length_of(missing);
@@ -109,7 +109,7 @@ static void serve(const real *block, fl_work *work, const real *wrench, const fl
     priority(block, work, wrench, policy, score);
   else
     closest(block, work, wrench, policy, score);
-  mixed_force(block, &work->mixture, force);
+  fl_mixed_forces(block, &work->mixture, force);
 }
 
 static int is_less(const real *a, const real *b) {
@@ -123,7 +123,7 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *s = work->set + i;
     real size = (s->low + s->high) / 2;
-    force[i][0] = size, force[i][1] = drag_of(block, i, size);
+    force[i][0] = size, force[i][1] = fl_drag_of_lift(block, i, size);
     if (is_plane(ACTUATOR(block, i))) {
       if (!(s->half < PI) || s->reverse > 0) size = 0;
       force[i][0] = size * s->cos_middle, force[i][1] = size * s->sin_middle;
@@ -136,7 +136,7 @@ static void middle_of(const real *block, const fl_work *work, real force[][2]) {
 static void cheapest(const real *block, fl_work *work, real force[][2], const real *inside, const real *wanted,
                      fl_answer *out) {
   real wrench[6], aim[6], target[6], size = 0, most = R(1e30);
-  wrench_of(block, work, force, wrench);
+  fl_wrench_of_forces(block, work, force, wrench);
   memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof wrench);
   for (int k = 0; k < 6; k++) {
@@ -146,13 +146,13 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
   for (int tried = are_same(wanted, wrench, sizeof wrench) ? 1 : 0; tried < 3; tried++) {
     for (int k = 0; k < 6; k++)
       aim[k] = tried == 0 ? wanted[k] : wrench[k] + (tried == 2) * NEARLY * (inside[k] - wrench[k]) / MAX(1, SQRT(size));
-    to_basis(work, aim, target);
-    newton(block, work, target, 0, STEPS_AT_KINK);
+    fl_reduce_wrench(work, aim, target);
+    fl_dual_newton(block, work, target, 0, STEPS_AT_KINK);
     if (work->now->size > MAX(AT_RIM, ENOUGH) || work->now->value > most) continue;
     memcpy(out->inner, work->now->price, sizeof out->inner);
     memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
     memcpy(out->aim, aim, sizeof aim);
-    if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) wrench_of(block, work, out->force, out->aim);
+    if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) fl_wrench_of_forces(block, work, out->force, out->aim);
     most = (1 - FINE) * work->now->value;
     if (tried != 1 || dot(out->inner, target, 6) <= FINE / NEARLY * work->now->value) return;
   }
@@ -162,10 +162,10 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
 static void better_side(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_node *node,
                         real force[][2], real *score) {
   real other[FL_MOST][2];
-  node->first = nearer_side(block, node->cut, &node->before, node->force);
-  take_side(block, work, node, -node->first);
+  node->first = fl_nearer_side(block, node->cut, &node->before, node->force);
+  fl_take_side(block, work, node, -node->first);
   serve(block, work, wrench, policy, other, node->score);
-  take_side(block, work, node, node->first);
+  fl_take_side(block, work, node, node->first);
   serve(block, work, wrench, policy, force, score);
   if (!is_less(node->score, score)) return;
   for (int k = 0; k < FL_SCORES; k++) {
@@ -174,7 +174,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
   }
   memcpy(force, other, COUNT(block) * sizeof *other);
   node->first = -node->first;
-  take_side(block, work, node, node->first);
+  fl_take_side(block, work, node, node->first);
 }
 
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the work area, and those
@@ -182,7 +182,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *share, real *most_share) {
   real score[FL_SCORES], best[FL_SCORES] = {0}, own[FL_MOST][2];
-  int n = COUNT(block), depth = 0, most = MIN(8 * (ROUNDS + n), work->most_parts), found = 0;
+  int n = COUNT(block), depth = 0, most = MIN(8 * (ROUNDS + n), work->settings.most_parts), found = 0;
   fl_node *node = 0;
   memcpy(work->kept, work->set, sizeof work->kept);
   work->close = CLOSE_BY;
@@ -190,56 +190,56 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   *most_share = 1 - score[1];
   work->close = ROUGHLY;
   for (int parts = 0;; parts += 2) {
-    int cut = worst_gap(block, work, own, 0);
+    int cut = fl_worst_gap(block, work, own, 0);
     if (cut < 0 || !found) { /* of parts with a gap the last one, until there is one without */
       memcpy(best, score, sizeof best);
       memcpy(force, own, sizeof own);
       memcpy(work->best_set, work->set, sizeof work->best_set);
       found |= cut < 0;
     }
-    if (cut >= 0 && parts < most && (node = cut_at(block, work, &depth, cut, own[cut]))) {
+    if (cut >= 0 && parts < most && (node = fl_cut_set(block, work, &depth, cut, own[cut]))) {
       better_side(block, work, wrench, policy, node, own, score);
       if (!found || is_less(score, best)) continue;
     }
-    while ((node = last_open(block, work, &depth)) && !is_less(node->score, best)) {}
+    while ((node = fl_last_open_cut(block, work, &depth)) && !is_less(node->score, best)) {}
     if (!node || parts >= most) break;
-    take_side(block, work, node, -node->first);
+    fl_take_side(block, work, node, -node->first);
     serve(block, work, wrench, policy, own, score);
   }
-  take_sets(block, work, work->best_set);
+  fl_restore_sets(block, work, work->best_set);
   work->close = CLOSE_BY;
   if (!are_same(work->best_set, work->kept, n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
   *share = 1 - best[1];
 }
 
-void in_its_place(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
+void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out) {
   const fl_head *h = HEAD(block);
   real force[FL_MOST][2], middle[FL_MOST][2], inside[6] = {0}, wanted[6], target[6], value, share, most;
   best_part(block, work, wrench, policy, force, &share, &most);
   if (policy->policy != FL_DIRECTION) {
     middle_of(block, work, middle);
-    wrench_of(block, work, middle, inside);
+    fl_wrench_of_forces(block, work, middle, inside);
   }
-  wrench_of(block, work, force, wanted);
+  fl_wrench_of_forces(block, work, force, wanted);
   for (int k = 0; k < 6; k++)
     if (FABS(wanted[k] - wrench[k]) <= FINE * h->yard[k]) wanted[k] = wrench[k];
   cheapest(block, work, force, inside, wanted, out);
-  take_sets(block, work, work->kept);
-  if (!may_have_gaps(block, work, out->force)) return;
-  to_basis(work, out->aim, target); /* another part of the sets may give it for less */
-  int status = newton(block, work, target, 0, MOST_STEPS);
+  fl_restore_sets(block, work, work->kept);
+  if (!fl_may_have_gaps(block, work, out->force)) return;
+  fl_reduce_wrench(work, out->aim, target); /* another part of the sets may give it for less */
+  int status = fl_dual_newton(block, work, target, 0, MOST_STEPS);
   if (work->drags) {
     for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + work->span.beside[k];
-    int met = with_drag(block, work, target, status, out);
-    if (policy->policy == FL_DIRECTION) on_ray(block, work, wrench, met * share, most, out);
+    int met = fl_answer_with_drag(block, work, target, status, out);
+    if (policy->policy == FL_DIRECTION) fl_largest_ray_share(block, work, wrench, met * share, most, out);
     return;
   }
   if (status == FL_BEYOND) return;
   memcpy(out->inner, work->now->price, sizeof out->inner); /* those of all sets prove more than those of a part */
-  int gap = worst_gap(block, work, work->now->force, work->now->price);
+  int gap = fl_worst_gap(block, work, work->now->force, work->now->price);
   if (gap < 0 && status == FL_MET)
     memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
-  else if (gap >= 0 && least_power(block, work, target, status, &value)) {
+  else if (gap >= 0 && fl_search_gaps(block, work, target, status, &value)) {
     memcpy(out->force, work->best, COUNT(block) * sizeof out->force[0]);
     out->value = work->turns ? 0 : value * (1 - FINE); /* with turning it is more than power */
   }

@@ -1,5 +1,5 @@
 /* What jets take from forces by a formula of eight constants, and what speed takes; docs/theory/interaction.md has both. */
-#include "inner.h"
+#include "internal.h"
 
 /* Numbers of a robot: a `water`, then an `outlet` for each of its n actuators. */
 typedef struct {

@@ -1,4 +1,4 @@
-#include "inner.h"
+#include "internal.h"
 
 /* Of `count` robots of n actuators in planes, which a block counts and no more, how far (count,) a ray (count, 6)
    from a point (count, 6) goes in what they push: a bound that is as `close`, the normal (count, 6) of its plane, and
@@ -10,10 +10,10 @@ void fl_reach(const real *block, fl_work *work, const real *own, const wide *fro
     for (int i = 0; i < COUNT(block); i++, own += 16) {
       work->set[i] = (fl_set){.high = own[1], .middle = own[2], .half = own[3]};
       work->corners[i] = (int)own[0];
-      set_up(block, i, work->set + i);
+      fl_prepare_set(block, i, work->set + i);
       memcpy(work->column[i], own + 4, sizeof work->column[i]);
     }
-    size[k] = farthest_along(block, work, from, ray, -1e30, 1e30, close, &work->mixture, normal);
-    mixed_force(block, &work->mixture, (real(*)[2])force);
+    size[k] = fl_farthest_along_ray(block, work, from, ray, -1e30, 1e30, close, &work->mixture, normal);
+    fl_mixed_forces(block, &work->mixture, (real(*)[2])force);
   }
 }

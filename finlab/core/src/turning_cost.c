@@ -14,7 +14,7 @@
 
    Where kappa is large beside p T, h is concave and there is one answer: a pod that pushes either way passes through rest
    without turning. Else there may be two maxima, and the answer jumps between them as the price moves: newton.c sees it. */
-#include "inner.h"
+#include "internal.h"
 
 #define CELL R(0.12)   /* width [rad] of the cells of a window in which h' is taken to change its sign once at most */
 #define MOST_CELLS 48
@@ -36,10 +36,10 @@ typedef struct { /* what the pod gives at one angle */
 /* Best force along a direction at a price v of a newton along it: ahead, or in reverse where it pushes either way. */
 static along best_along(const pod_at_price *x, real v) {
   const fl_set *set = x->set;
-  if (v >= 0) return limited(x->block, x->a, set, 0, v);
+  if (v >= 0) return fl_limited_response(x->block, x->a, set, 0, v);
   if (set->reverse > 0) {
-    const fl_set back = reversed(set);
-    along o = limited(x->block, x->a, &back, 0, -v);
+    const fl_set back = fl_reversed_set(set);
+    along o = fl_limited_response(x->block, x->a, &back, 0, -v);
     o.force = -o.force;
     return o;
   }
@@ -93,7 +93,7 @@ static void window_of(const fl_set *set, real *low, real *high) {
   }
 }
 
-reply turned(const real *block, int i, const fl_set *set, const real *price) {
+reply fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   pod_at_price x = {block, a, set, size_of(price), 0};
   if (x.p > 0) x.sigma = ATAN2(price[1], price[0]);
@@ -153,7 +153,7 @@ reply turned(const real *block, int i, const fl_set *set, const real *price) {
 
 /* Whether the answer of a pod jumps between two prices near to each other: its force changes sides, or moves by far more
    than its slopes at both say. `step` is the step of its price, `is_short` whether that is very short. */
-int has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
+int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
                const real *step, int is_short) {
   const real top = ACTUATOR(block, i)->most[0];
   const real *y = one->force[i];
@@ -174,7 +174,7 @@ int has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,
 }
 
 /* Marks a pod whose answer jumps, and where it is to be cut. */
-void mark_jump(fl_set *set, real one, real other) {
+void fl_mark_jump(fl_set *set, real one, real other) {
   real low, high;
   window_of(set, &low, &high);
   set->jumps = 1;

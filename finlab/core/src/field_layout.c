@@ -1,5 +1,5 @@
 /* What the fields of a block promise, checked by the compiler. */
-#include "core.h"
+#include "finlab.h"
 
 #define FL_ASSERT(name, condition) typedef char fl_assert_##name[(condition) ? 1 : -1]
 

@@ -1,5 +1,5 @@
 /* What Python alone asks: sizes, many answers, commands of other methods, and what prices prove. */
-#include "inner.h"
+#include "internal.h"
 
 int fl_sizes(int which) {
   const int sizes[] = {sizeof(real), sizeof(fl_head), sizeof(fl_actuator), sizeof(fl_work),
@@ -49,50 +49,45 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
 /* What prices (6,) of the wrench in the basis [W] give: forces (n, 2), and the dual value for a wrench. */
 real fl_look(const real *block, fl_work *work, const real *wrench, const real *inner, real *force) {
   real target[6];
-  to_basis(work, wrench, target);
-  look(block, work, target, inner, work->state);
+  fl_reduce_wrench(work, wrench, target);
+  fl_dual_at(block, work, target, inner, work->state);
   memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
   return work->state->value;
 }
 
-/* At prices (count, 6) of the wrench [W/N, W/(N m)], of each actuator (count, n, 5) in what a question says that may be given: prices along
-   its force, ahead and in reverse, what the force is worth, less its power [W], and least and largest force [N], of planes
-   below 0 in reverse. An error code. */
-int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *price, int count, real *worth) {
+int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *price, int count,
+             fl_actuator_worth *worth) {
   fl_question still = *question;
   still.calm = 0; /* turning is no power */
-  if (!stand_as(block, work, &still)) return FL_BAD_NUMBER;
-  for (int k = 0; k < count; k++, price += 6) {
+  if (!fl_prepare_question(block, work, &still)) return FL_BAD_NUMBER;
+  for (int k = 0; k < count; k++) {
     real inner[6];
-    price_in_basis(work, price, inner);
-    for (int i = 0; i < COUNT(block); i++, worth += 5) {
+    fl_reduce_lambda(work, price + 6 * k, inner);
+    for (int i = 0; i < COUNT(block); i++, worth++) {
       const fl_set *set = work->set + i;
       real own[2];
       wide force[2];
       own_price(work, i, inner, own);
-      worth[0] = farthest_of(block, i, set, own, force);
-      worth[1] = 0;
-      worth[3] = set->flipped ? -set->high : set->low;
-      worth[4] = set->flipped ? -set->low : set->high;
+      const real along = fl_support_of_set(block, i, set, own, force);
+      worth->price = set->flipped ? 0 : along;
+      worth->price_back = set->flipped ? along : 0;
+      worth->low = set->flipped ? -set->high : set->low;
+      worth->high = set->flipped ? -set->low : set->high;
       if (set->reverse > 0) {
-        const fl_set back = reversed(set);
-        worth[1] = farthest_of(block, i, &back, own, force);
-        worth[3] = -set->reverse;
+        const fl_set back = fl_reversed_set(set);
+        worth->price_back = fl_support_of_set(block, i, &back, own, force);
+        worth->low = -set->reverse;
       }
-      if (set->flipped) {
-        worth[1] = worth[0];
-        worth[0] = 0;
-      }
-      worth[2] = reply_of(block, i, set, own).conjugate;
+      worth->conjugate = fl_response(block, i, set, own).conjugate;
     }
   }
-  return 0;
+  return FL_OK;
 }
 
 /* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of previous ones (n, 3). */
 void fl_commands(const real *block, fl_work *work, const real *force, int count, const real *previous, real *command) {
   int n = COUNT(block);
-  whole_limits(block, work);
+  fl_limits_without_tick(block, work);
   for (int k = 0; k < count; k++)
-    commands_for(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
+    fl_commands_for_forces(block, &work->box, (real(*)[2])(force + 2 * n * k), previous, (real(*)[3])(command + 3 * n * k));
 }

@@ -1,59 +1,5 @@
 /* Commands of all actuators: for forces, and made exact by Levenberg-Marquardt steps within a box. */
-#include "inner.h"
-
-/* Which number of a command is an angle; -1 where none is. */
-int angle_of(const fl_actuator *a) { return a->form == FL_FIN ? 2 : a->form == FL_POD ? 0 : -1; }
-
-/* A number of a command in a box, an angle wrapped first. */
-real held_in(const fl_box *box, int i, int k, int angle, real value) {
-  real low = box->low[i][k], high = box->high[i][k], middle = (low + high) / 2;
-  if (k == angle) value = middle + wrapped(value - middle);
-  return CLIP(value, low, high);
-}
-
-void commands_for(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const real *before = previous && is_known(previous + 3 * i) ? previous + 3 * i : 0;
-    command_for(block, i, box, force[i], before, command[i]);
-  }
-}
-
-/* Which number of a command is a force; -1 where none is. */
-int force_number(const fl_actuator *a) {
-  if (a->form == FL_THRUSTER) return 0;
-  if (a->form == FL_POD) return 1;
-  return -1;
-}
-
-/* Whether a command lies in the dead band of its actuator, where it gives no force; on its edge but for rounding it
-   does not. */
-int is_in_band(const fl_actuator *a, const real *command) {
-  const int k = force_number(a);
-  return k >= 0 && FABS(command[k]) < a->band * (1 - NEARLY);
-}
-
-/* Puts commands that gaps left a little inside their dead band at its edge: forces nearer to it than to rest. */
-void leave_bands(const real *block, real force[][2], real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const int k = force_number(a);
-    if (k < 0 || !is_in_band(a, command[i]) || size_of(force[i]) < R(0.9) * a->band) continue;
-    command[i][k] = command[i][k] < 0 ? -a->band : a->band;
-  }
-}
-
-/* Has commands inside a dead band rest, where the box allows, and puts those that rounding took from the edge there. */
-void rest_in_bands(const real *block, const fl_box *box, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const int k = force_number(a);
-    if (k < 0 || !(FABS(command[i][k]) < a->band)) continue;
-    if (!is_in_band(a, command[i]))
-      command[i][k] = command[i][k] < 0 ? -a->band : a->band;
-    else if (box->low[i][k] <= 0 && box->high[i][k] >= 0)
-      command[i][k] = 0;
-  }
-}
+#include "internal.h"
 
 /* The miss (6,) of commands from an aim, on the yardstick. Returns its square. */
 static real miss_of(const real *block, const fl_work *work, const real *aim, real command[][3], real *miss) {
@@ -64,8 +10,8 @@ static real miss_of(const real *block, const fl_work *work, const real *aim, rea
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3];
     if (span->lost[i]) continue;
-    force_of(block, i, command[i], force, 0);
-    if (is_in_band(a, command[i])) memset(force, 0, sizeof force);
+    fl_force_of_command(block, i, command[i], force, 0);
+    if (fl_is_in_dead_band(a, command[i])) memset(force, 0, sizeof force);
     for (int k = 0; k < 6; k++)
       miss[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
   }
@@ -79,8 +25,8 @@ static void slopes_of(const real *block, fl_work *work, const fl_box *box, real 
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3], by[3][3];
-    force_of(block, i, command[i], force, by);
-    if (work->span.lost[i] || is_in_band(a, command[i])) memset(by, 0, sizeof by);
+    fl_force_of_command(block, i, command[i], force, by);
+    if (work->span.lost[i] || fl_is_in_dead_band(a, command[i])) memset(by, 0, sizeof by);
     for (int c = 0; c < 3; c++) {
       real width = box->high[i][c] - box->low[i][c];
       for (int k = 0; k < 6; k++)
@@ -91,7 +37,7 @@ static void slopes_of(const real *block, fl_work *work, const fl_box *box, real 
 }
 
 static int leaves(const real *block, const fl_box *box, int i, int c, const real *command, real step) {
-  if (c == angle_of(ACTUATOR(block, i)) && box->free[i]) return 0;
+  if (c == fl_angle_number(ACTUATOR(block, i)) && box->free[i]) return 0;
   return (command[c] <= box->low[i][c] + NOTHING && step < 0) || (command[c] >= box->high[i][c] - NOTHING && step > 0);
 }
 
@@ -110,7 +56,7 @@ static void change_for(const real *block, fl_work *work, const real *miss, real 
     }
   for (int j = 0; j < 6; j++) trace += gram[j][j];
   for (int j = 0; j < 6; j++) gram[j][j] += (damping + ROUNDING * R(0.01)) * trace + TINY;
-  if (factor(gram)) solve(gram, miss, x);
+  if (fl_factor(gram)) fl_solve(gram, miss, x);
   for (int i = 0; i < n; i++)
     for (int c = 0; c < 3; c++) step[i][c] = held[i][c] ? 0 : dot(work->slope[i][c], x, 6);
 }
@@ -131,7 +77,7 @@ static int hold_leaving(const real *block, const fl_box *box, real command[][3],
 #define HOLDS 3 /* how often a step is found anew without the commands that would leave the box */
 
 /* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
-real refine(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
+real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
   int n = COUNT(block);
   real miss[6], cost = miss_of(block, work, aim, command, miss), damping = NEARLY;
   int moved = 1;
@@ -147,7 +93,7 @@ real refine(const real *block, fl_work *work, const fl_box *box, const real *aim
       for (int c = 0; c < 3; c++) {
         real own = leaves(block, box, i, c, command[i], step[i][c]) ? 0 : step[i][c];
         own = command[i][c] + own * (box->high[i][c] - box->low[i][c]);
-        tried[i][c] = held_in(box, i, c, angle_of(ACTUATOR(block, i)), own);
+        tried[i][c] = fl_clip_number(box, i, c, fl_angle_number(ACTUATOR(block, i)), own);
       }
     new_cost = miss_of(block, work, aim, tried, other);
     if ((moved = new_cost <= cost)) {

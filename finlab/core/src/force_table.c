@@ -1,12 +1,12 @@
 /* Tables of force over price, cubic between their knots, and gauges of forces that differ by direction. */
-#include "inner.h"
+#include "internal.h"
 
 #define THIRD (R(1.0) / 3)
 
 static const real *knots(const real *table) { return table + 3; }
 
 /* Force, its derivative and the conjugate at a price from 0 on. */
-along radial(const real *table, real price) {
+along fl_force_of_price(const real *table, real price) {
   price = MAX(price, 0); /* NaN is 0, too */
   real top = table[0], per = 1 / top, t = price * per, scale = top;
   int cells = (int)table[1];
@@ -30,7 +30,7 @@ along radial(const real *table, real price) {
 }
 
 /* Power of a size of force within the table, and the price at which it is given. */
-real marginal(const real *table, real size, real *price) {
+real fl_marginal_cost(const real *table, real size, real *price) {
   int cells = (int)table[1], low = 0, high = cells;
   const real *knot = knots(table);
   while (high - low > 1) {
@@ -66,7 +66,7 @@ static real place_of(const real *gauge, real angle) {
 }
 
 /* Support function of a gauge in the direction (x, y) of the price, and its two derivatives by the angle. */
-support gauge_support(const real *gauge, real x, real y) {
+support fl_gauge_support(const real *gauge, real x, real y) {
   int points = (int)gauge[0];
   real step = 2 * PI / points, place = place_of(gauge, ATAN2(y, x));
   int cell = (int)place, next = (cell + 1) % points;
@@ -79,7 +79,7 @@ support gauge_support(const real *gauge, real x, real y) {
 }
 
 /* The gauge itself in a direction of the force. */
-real gauge_at(const real *gauge, real angle) {
+real fl_gauge_radius(const real *gauge, real angle) {
   int points = (int)gauge[0];
   real place = place_of(gauge, angle);
   int cell = (int)place;
@@ -90,10 +90,10 @@ real gauge_at(const real *gauge, real angle) {
 }
 
 /* Angle from the command's direction to that of the force, in a direction of the force. */
-real lean_at(const real *gauge, real angle) {
+real fl_gauge_lean(const real *gauge, real angle) {
   int points = (int)gauge[0];
   real place = place_of(gauge, angle);
   int cell = (int)place;
   real first = gauge[1 + 4 * cell + 3], last = gauge[1 + 4 * ((cell + 1) % points) + 3];
-  return first + wrapped(last - first) * (place - FLOOR(place));
+  return first + fl_wrap_angle(last - first) * (place - FLOOR(place));
 }

@@ -7,12 +7,12 @@
    S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as they are, and M the Hessian
    of quadratic costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have 6 numbers,
    those behind its range are 0. */
-#include "inner.h"
+#include "internal.h"
 
 #define SATURATED R(1e-1) /* share c of M, and ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
 
 /* Scaled wrench in the basis. */
-void to_basis(const fl_work *work, const real *wrench, real *target) {
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
     target[j] = 0;
@@ -21,7 +21,7 @@ void to_basis(const fl_work *work, const real *wrench, real *target) {
 }
 
 /* Prices in the basis of those of the wrench. */
-void price_in_basis(const fl_work *work, const real *price, real *inner) {
+void fl_reduce_lambda(const fl_work *work, const real *price, real *inner) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
     inner[j] = 0;
@@ -30,7 +30,7 @@ void price_in_basis(const fl_work *work, const real *price, real *inner) {
 }
 
 /* Whether a wrench lies in the range but for rounding. */
-int in_range(const fl_work *work, const real *wrench, const real *target) {
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target) {
   const fl_span *span = &work->span;
   real rest = 0, all = 0;
   for (int k = 0; k < 6; k++) {
@@ -41,7 +41,7 @@ int in_range(const fl_work *work, const real *wrench, const real *target) {
 }
 
 /* The wrench [N, N m] of forces. */
-void wrench_of(const real *block, const fl_work *work, real force[][2], real *wrench) {
+void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench) {
   const fl_span *span = &work->span;
   real given[6] = {0};
   for (int i = 0; i < COUNT(block); i++)
@@ -51,7 +51,7 @@ void wrench_of(const real *block, const fl_work *work, real force[][2], real *wr
 }
 
 /* What follows from all sets. */
-void sums_of(const real *block, fl_work *work) {
+void fl_prepare_sets(const real *block, fl_work *work) {
   work->most_cost = 0, work->quick = 1, work->torn = work->drags = work->turns = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *s = work->set + i;
@@ -67,19 +67,19 @@ void sums_of(const real *block, fl_work *work) {
   }
 }
 
-void take_sets(const real *block, fl_work *work, const fl_set *set) {
+void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
   memcpy(work->set, set, sizeof work->set);
-  sums_of(block, work);
+  fl_prepare_sets(block, work);
 }
 
 /* What prices give for a target in the basis. */
-void look(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
+void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
   real given[6] = {0}, conjugate = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real own[2], *slope = state->slope[i];
     own_price(work, i, price, own);
-    reply o = reply_of(block, i, work->set + i, own);
+    reply o = fl_response(block, i, work->set + i, own);
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
     slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
     state->angle[i] = o.angle;
@@ -96,16 +96,16 @@ void look(const real *block, const fl_work *work, const real *target, const real
 }
 
 /* Has Newton's method be at prices. */
-void stand_at(const real *block, fl_work *work, const real *target, const real *price) {
+void fl_dual_start(const real *block, fl_work *work, const real *target, const real *price) {
   work->now = work->state;
-  look(block, work, target, price, work->state);
+  fl_dual_at(block, work, target, price, work->state);
 }
 
 /* Prices to begin with: those at which actuators whose costs are ~ T^1.5 give a target, each with its force over price
    at what it gives where costs are quadratic. */
-void first_price(const real *block, const fl_work *work, const real *target, real *price, real *ridge) {
+void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price, real *ridge) {
   real even[6], h[6][6] = {{0}}, trace;
-  solve((real(*)[6])work->factor, target, even);
+  fl_solve((real(*)[6])work->factor, target, even);
   *ridge = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -120,12 +120,12 @@ void first_price(const real *block, const fl_work *work, const real *target, rea
     real share = size / most;
     if (share > R(0.8)) *ridge = SATURATED;
     real weight = share > 1 && !work->drags ? 1 / share : SQRT(CLIP(share, CLOSE, 1));
-    for (int q = 0; q < (int)a->rows; q++) add_square(h, work->span.matrix[i][q], weight * gain[q]);
+    for (int q = 0; q < (int)a->rows; q++) fl_add_square(h, work->span.matrix[i][q], weight * gain[q]);
   }
-  trace = trace_of(h);
+  trace = fl_trace(h);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
-  if (factor(h))
-    solve(h, target, price);
+  if (fl_factor(h))
+    fl_solve(h, target, price);
   else
     for (int j = 0; j < 6; j++) price[j] = target[j] / trace;
 }
@@ -137,7 +137,7 @@ static int step_of(const real *block, const fl_work *work, const fl_state *s, re
     const real *b = work->span.matrix[i][0], *c = work->span.matrix[i][1], *slope = s->slope[i];
     real xx = slope[0] + ridge * slope[3], xy = slope[1], yy = slope[2] + ridge * slope[3];
     if (ACTUATOR(block, i)->rows == 1) {
-      if (xx > 0) add_square(h, b, xx);
+      if (xx > 0) fl_add_square(h, b, xx);
       continue;
     }
     for (int j = 0; j < 6; j++) {
@@ -145,11 +145,11 @@ static int step_of(const real *block, const fl_work *work, const fl_state *s, re
       for (int k = 0; k <= j; k++) h[j][k] += u * b[k] + v * c[k];
     }
   }
-  real added = (work->drags ? 1 : SATURATED) * ridge * MAX(trace_of(h), work->least_trace);
+  real added = (work->drags ? 1 : SATURATED) * ridge * MAX(fl_trace(h), work->least_trace);
   for (int j = 0; j < 6; j++)
     for (int k = 0; k <= j; k++) h[j][k] += added * work->metric[j][k];
-  if (!factor(h)) return 0;
-  solve(h, s->residual, step);
+  if (!fl_factor(h)) return 0;
+  fl_solve(h, s->residual, step);
   return 1;
 }
 
@@ -168,19 +168,19 @@ static int jumps_between(const real *block, fl_work *work, const fl_state *one, 
     real own[2];
     if (!(set->turn > 0)) continue;
     own_price(work, i, step, own);
-    if (!has_jumped(block, i, set, one, other, own, square < R(1e-7) * all)) continue;
+    if (!fl_has_jumped(block, i, set, one, other, own, square < R(1e-7) * all)) continue;
     jumps++;
-    if (marked) mark_jump(set, one->angle[i], other->angle[i]);
+    if (marked) fl_mark_jump(set, one->angle[i], other->angle[i]);
   }
   return jumps;
 }
 
 /* Newton's method from prices on; work->now is what it comes to. */
-int newton(const real *block, fl_work *work, const real *target, const real *price, int most_steps) {
+int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price, int most_steps) {
   fl_state *s = work->state, *trial = work->state + 1;
   real first[6], step[6], next[6], ridge = NEARLY, growth = 2, most = work->most_cost * (1 + NOTHING) + NOTHING;
-  if (!price) first_price(block, work, target, first, &ridge);
-  stand_at(block, work, target, price ? price : first);
+  if (!price) fl_first_lambda(block, work, target, first, &ridge);
+  fl_dual_start(block, work, target, price ? price : first);
   real value = s->value, size = s->size; /* when it last got better by more than rounding */
   for (int i = 0; work->turns && i < COUNT(block); i++) work->set[i].jumps = 0;
   for (int k = 0, idle = 0, jumps = 0;; k++) {
@@ -195,7 +195,7 @@ int newton(const real *block, fl_work *work, const real *target, const real *pri
       continue;
     }
     for (int j = 0; j < 6; j++) next[j] = s->price[j] + step[j];
-    look(block, work, target, next, trial);
+    fl_dual_at(block, work, target, next, trial);
     if (work->turns && jumps_between(block, work, s, trial, step, 0) && ++jumps >= JUMPS) {
       jumps_between(block, work, s, trial, step, 1);
       return FL_STUCK;

@@ -1,8 +1,20 @@
 /* One target after the other: least power where it is within what may be given now, else what a policy gives in its
    place. */
-#include "inner.h"
+#include "internal.h"
 
 int fl_version(void) { return FL_VERSION; }
+
+const char *fl_error_text(int code) {
+  static const char *const text[FL_ERRORS] = {
+      "all is well",
+      "the block is no robot of this library, or was cut or changed; export the robot again",
+      "the block was made for another version of this library; export the robot again",
+      "a number of the robot is out of the range that the library works with; check its forces, powers and sizes",
+      "a number of the question is not finite or out of range; name an axis that may take any wrench in free",
+  };
+  if (code < 0) return "a search ended at its bound of parts; raise most_parts of fl_settings";
+  return code < FL_ERRORS ? text[code] : "no error code of this library";
+}
 
 static int are_within(const real *values, int count, real most) {
   for (int k = 0; k < count; k++)
@@ -85,41 +97,41 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
   memset(out->price, 0, sizeof out->price);
   memset(out->force, 0, n * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof out->aim);
-  to_basis(work, wrench, target);
+  fl_reduce_wrench(work, wrench, target);
   if (span->range == 0) { /* nothing pushes, such as foils at rest */
     out->within = 1;
     for (int k = 0; k < 6; k++) out->within &= wrench[k] == 0, out->aim[k] = 0;
     return;
   }
   const int torn = work->torn || work->drags || work->turns;
-  const int ranged = in_range(work, wrench, target);
-  int status = newton(block, work, target, price, torn ? STEPS_AT_KINK : MOST_STEPS);
+  const int ranged = fl_is_in_range(work, wrench, target);
+  int status = fl_dual_newton(block, work, target, price, torn ? STEPS_AT_KINK : MOST_STEPS);
   int within = (status == FL_MET || (status == FL_STUCK && torn)) && ranged;
   out->status = status;
   memcpy(out->inner, work->now->price, sizeof out->inner);
   memcpy(out->force, work->now->force, n * sizeof out->force[0]);
   if (work->drags) {
-    within = ranged && with_drag(block, work, target, status, out);
+    within = ranged && fl_answer_with_drag(block, work, target, status, out);
     if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
   }
-  if (!work->drags && may_have_gaps(block, work, out->force)) {
-    int inside = worst_gap(block, work, out->force, out->inner) >= 0;
+  if (!work->drags && fl_may_have_gaps(block, work, out->force)) {
+    int inside = fl_worst_gap(block, work, out->force, out->inner) >= 0;
     if (within && inside) {
       real value;
-      within = least_power(block, work, target, status, &value);
+      within = fl_search_gaps(block, work, target, status, &value);
       if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
       out->value = within && !work->turns ? value * (1 - FINE) : 0; /* with turning it is more than power */
     } else
       within &= status == FL_MET;
   }
-  if (!(out->within = within) && policy) out->placed = 0, in_its_place(block, work, wrench, policy, out);
+  if (!(out->within = within) && policy) out->placed = 0, fl_out_of_reach(block, work, wrench, policy, out);
   for (int k = 0; k < 6; k++) out->price[k] = dot(span->basis[k], out->inner, span->range) / span->scale[k];
 }
 
 /* Prices in the basis to begin with; 0 where there are none, or none of use. */
 static const real *first_prices(const fl_work *work, const fl_question *q, real *inner) {
   if (!q->price) return 0;
-  price_in_basis(work, q->price, inner);
+  fl_reduce_lambda(work, q->price, inner);
   return are_within(inner, 6, LARGEST) ? inner : 0;
 }
 
@@ -127,8 +139,8 @@ static const real *first_prices(const fl_work *work, const fl_question *q, real 
 static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = force_number(a);
-    if (work->span.lost[i] || !is_in_band(a, command[i])) continue;
+    const int k = fl_force_number(a);
+    if (work->span.lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     if (work->box.low[i][k] > a->lower[k] || work->box.high[i][k] < a->upper[k]) return 1;
   }
   return 0;
@@ -140,17 +152,17 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   const fl_box box = work->box;
   fl_answer later;
   real wrench[6];
-  whole_limits(block, work);
+  fl_limits_without_tick(block, work);
   for (int k = 0; k < 6; k++) wrench[k] = work->span.counts[k] ? q->wrench[k] - work->span.beside[k] : 0;
   memcpy(work->aim, q->wrench, sizeof work->aim);
   answer(block, work, wrench, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = force_number(a);
+    const int k = fl_force_number(a);
     const real inside = a->band * (1 - 10 * NEARLY);
     real wanted[3];
-    if (work->span.lost[i] || !is_in_band(a, command[i]) || size_of(later.force[i]) < inside) continue;
-    command_for(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
+    if (work->span.lost[i] || !fl_is_in_dead_band(a, command[i]) || size_of(later.force[i]) < inside) continue;
+    fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
     wanted[k] = CLIP(wanted[k], -inside, inside);
     memcpy(command[i], wanted, sizeof wanted);
   }
@@ -167,7 +179,7 @@ static void meet_by_laws(const real *block, fl_work *work, const real *asked, fl
   for (int k = 0; k < 6; k++) missing[k] = (out->aim[k] - asked[k]) / yard[k];
   if (out->within || SQRT(dot(missing, missing, 6)) > 10 * CLOSE) return;
   memcpy(tried, out->command, COUNT(block) * sizeof *tried);
-  const real error = refine(block, work, &work->box, asked, tried, ROUNDS);
+  const real error = fl_refine_commands(block, work, &work->box, asked, tried, ROUNDS);
   if (error > NEARLY) return;
   memcpy(out->command, tried, COUNT(block) * sizeof *tried);
   memcpy(out->aim, asked, sizeof out->aim);
@@ -189,14 +201,14 @@ static void answered(const real *block, fl_work *work, const fl_question *q, fl_
   answer(block, work, wrench, q->policy, first_prices(work, q, inner), out);
   for (int k = 0; k < 6; k++) out->aim[k] = out->within ? asked[k] : out->aim[k] + span->beside[k];
   if (!out->placed) {
-    commands_for(block, &work->box, out->force, q->previous, out->command);
-    leave_bands(block, out->force, out->command);
+    fl_commands_for_forces(block, &work->box, out->force, q->previous, out->command);
+    fl_leave_dead_bands(block, out->force, out->command);
   }
-  out->error = refine(block, work, &work->box, out->aim, out->command, LAST_STEPS);
+  out->error = fl_refine_commands(block, work, &work->box, out->aim, out->command, work->settings.command_steps);
   meet_by_laws(block, work, asked, out);
-  rest_in_bands(block, &work->box, out->command);
+  fl_rest_in_dead_bands(block, &work->box, out->command);
   if (q->previous && may_pass_bands(block, work, out->command)) pass_bands(block, work, q, out->command);
-  into_box(block, &work->box, out->command);
+  fl_clip_commands(block, &work->box, out->command);
   out->steps = work->steps;
   out->ended = work->ended;
 }
@@ -213,7 +225,7 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
   }
   for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
     if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
-  if (!stand_as(block, work, q)) return FL_BAD_NUMBER;
+  if (!fl_prepare_question(block, work, q)) return FL_BAD_NUMBER;
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;
 }

@@ -5,100 +5,13 @@
    the smooth larger one of their conjugates asks for. A foil gives lift and with it drag; with drag paid a
    [W/N], lift is as dear as r = 1 - a/U times its power: it answers v as v/r. Where r < 0 drag is welcome:
    then r is softened to s(r) > 0, and (s - r) times the chord of the power is on top of the conjugate. */
-#include "inner.h"
+#include "internal.h"
 
 #define SOFT R(0.2)
-#define TURNING R(1e-2) /* price, over the mean one of the least force, up to which a force turns round; CLOSE in a narrow arc */
-
-static const real *table_of(const real *block, const fl_actuator *a, int back) {
-  return block + (int)(back && a->back > 0 ? a->back : a->ahead);
-}
-
-static along at_price(const real *block, const fl_actuator *a, int back, real price) {
-  real per = a->share == a->worth ? 1 : a->share / a->worth;
-  along o = radial(table_of(block, a, back), price * per);
-  return (along){o.force * a->share, o.slope * a->share * per, o.conjugate * a->worth};
-}
-
-/* Power [W] of a force of an actuator within its tables, of planes below 0 in reverse. */
-real cost_at(const real *block, int i, real force) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  return a->worth * marginal(table_of(block, a, force < 0), FABS(force) / a->share, 0);
-}
-
-/* What follows from the limits of a set, but for its angles. */
-static void set_ends(int plane, fl_set *set) {
-  real least = set->high > 0 ? NOTHING * set->high_cost / set->high : 0;
-  if (set->low > 0) least = MAX(least, (set->half <= NARROW ? CLOSE : TURNING) * set->low_cost / set->low);
-  set->gap2 = least * least + TINY;
-  set->forked = plane && set->half < PI && (set->half > PI / 2 || (set->low > 0 && set->half > 0));
-}
-
-void set_up(const real *block, int i, fl_set *set) {
-  set_ends(is_plane(ACTUATOR(block, i)), set);
-  set->cos_middle = COS(set->middle), set->sin_middle = SIN(set->middle);
-  set->cos_half = COS(set->half), set->sin_half = SIN(set->half);
-}
-
-/* Leaves of an interval of forces what is outside of a dead band, and rest: commands within the band give no force. */
-static void without_band(real band, real *low, real *high) {
-  const int touches = *low < band && *high > -band;
-  if (!(band > 0) || !touches) return;
-  if (*low > -band) *low = 0;
-  if (*high < band) *high = 0;
-}
-
-/* A set between two forces [N], of planes below 0 against their direction, in an arc [rad]. */
-void limit(const real *block, int i, fl_set *set, real low, real high, real middle, real half) {
-  without_band(ACTUATOR(block, i)->band, &low, &high);
-  int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
-  set->flipped = back && high <= 0, set->tangent = 0;
-  set->turn = set->at = set->cut = 0, set->jumps = 0;
-  real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
-  set->low_cost = cost_at(block, i, near), set->high_cost = cost_at(block, i, far);
-  set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;
-  set->reverse = back && !set->flipped ? -low : 0;
-  set->reverse_cost = back ? cost_at(block, i, low) : set->low_cost;
-  set->middle = middle + (set->flipped ? PI : 0), set->half = half;
-  set_up(block, i, set);
-}
-
-/* The set of an actuator that is lost: rest, at no power. */
-void leave_out(const real *block, int i, fl_set *set) {
-  memset(set, 0, sizeof *set);
-  if (is_plane(ACTUATOR(block, i))) set->half = PI;
-  set_up(block, i, set);
-}
-
-/* A set of one force and nothing else. */
-void freeze(const real *block, int i, fl_set *set, const real *force) {
-  int plane = is_plane(ACTUATOR(block, i));
-  real size = plane ? size_of(force) : force[0];
-  real within = CLIP(size, set->low, set->high);
-  set->low_cost = set->high_cost = cost_at(block, i, set->flipped ? -within : within);
-  set->low = set->high = size;
-  if (plane) set->middle = ATAN2(force[1], force[0]), set->half = 0, set->reverse = 0;
-  set_up(block, i, set);
-}
-
-/* The force that is worth most at a price along it, between the limits of a set. */
-along limited(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
-  int back = set->flipped, narrow = !line && set->half < PI;
-  real sign = line && price < 0 ? -1 : 1, size = sign * price;
-  if (line) back = price < 0;
-  along o = at_price(block, a, back, narrow ? MAX(size, 0) : size);
-  o.force *= sign;
-  if (narrow && !(size > 0)) o.slope = 0;
-  if (o.force <= set->low)
-    o = (along){set->low, 0, price * set->low - set->low_cost};
-  else if (o.force >= set->high)
-    o = (along){set->high, 0, price * set->high - set->high_cost};
-  return o;
-}
 
 typedef struct { real along, x, y, xx, xy, yy, other; int beyond; } fan;
 
-static real gauge_or_one(const real *gauge, real angle) { return gauge ? gauge_at(gauge, angle) : 1; }
+static real gauge_or_one(const real *gauge, real angle) { return gauge ? fl_gauge_radius(gauge, angle) : 1; }
 
 /* The direction in which a plane answers a price, with its gauge, and how it turns. */
 static fan direction_of(const fl_set *set, const real *gauge, const real *price, real gap2) {
@@ -106,7 +19,7 @@ static fan direction_of(const fl_set *set, const real *gauge, const real *price,
   real tangent = 1 / size;
   fan o = {size, x, y, 0, 0, 0, 0, 0};
   if (gauge) {
-    support s = gauge_support(gauge, x, y);
+    support s = fl_gauge_support(gauge, x, y);
     o.x = s.value * x - s.slope * y, o.y = s.value * y + s.slope * x;
     tangent *= MAX(s.value + s.bend, 0);
     o.along *= s.value;
@@ -151,29 +64,20 @@ static reply along_fan(along o, const fan *f) {
 static reply one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
                      const real *price) {
   fan f = direction_of(set, gauge, price, set->gap2);
-  reply own = along_fan(limited(block, a, set, 0, f.along), &f);
+  reply own = along_fan(fl_limited_response(block, a, set, 0, f.along), &f);
   if (set->forked && f.beyond) {
     real rho = gauge_or_one(gauge, f.other);
     fan g = {0, rho * COS(f.other), rho * SIN(f.other), 0, 0, 0, 0, 0};
-    reply other = along_fan(limited(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
+    reply other = along_fan(fl_limited_response(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
     blend(&own, &other, FINE * set->high_cost + R(1e-12));
   }
   return own;
 }
 
-/* What a plane that pushes either way gives in reverse. */
-fl_set reversed(const fl_set *set) {
-  fl_set r = *set;
-  r.low = 0, r.high = set->reverse, r.high_cost = set->reverse_cost, r.reverse = 0, r.flipped = 1;
-  r.at = set->at + PI, r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
-  set_ends(1, &r);
-  return r;
-}
-
 static reply plane(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
   reply own = one_way(block, a, set, a->gauge > 0 ? block + (int)a->gauge : 0, price);
   if (set->reverse > 0) {
-    fl_set back = reversed(set);
+    fl_set back = fl_reversed_set(set);
     reply other = one_way(block, a, &back, 0, price);
     blend(&own, &other, FINE * back.high_cost + R(1e-12));
   }
@@ -187,7 +91,7 @@ static reply foil(const real *block, const fl_actuator *a, const fl_set *set, co
   real rate = power > CLOSE ? power : 0, soft = below < 0 ? SOFT * MAX(power, CLOSE) : ratio;
   real rise = (set->high_cost - set->low_cost) / MAX(set->high - set->low, TINY);
   real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = (price[0] + (soft - ratio) * rise) / soft;
-  along o = limited(block, a, set, 1, own);
+  along o = fl_limited_response(block, a, set, 1, own);
   real cost = own * o.force - o.conjugate - rest, most = set->low_cost - rest + rise * (o.force - set->low);
   o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * (set->low_cost - rest - rise * set->low) - rest;
   o.slope /= soft;
@@ -207,39 +111,39 @@ static reply on_tangent(const fl_set *set, const real *price) {
                  dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost, 0};
 }
 
-reply reply_of(const real *block, int i, const fl_set *set, const real *price) {
+reply fl_response(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->rows == 1) {
-    along o = limited(block, a, set, 1, price[0]);
+    along o = fl_limited_response(block, a, set, 1, price[0]);
     return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate, 0};
   }
   if (set->tangent) return on_tangent(set, price);
   if (a->speed > 0) return foil(block, a, set, price);
-  if (set->turn > 0) return turned(block, i, set, price);
+  if (set->turn > 0) return fl_response_with_turning(block, i, set, price);
   return plane(block, a, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */
-real drag_of(const real *block, int i, real force) {
+real fl_drag_of_lift(const real *block, int i, real force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return a->speed > 0 ? (cost_at(block, i, force) - rest_of(block, a)) / a->speed : 0;
+  return a->speed > 0 ? (fl_power_of_force(block, i, force) - rest_of(block, a)) / a->speed : 0;
 }
 
 static void farthest_foil(const real *block, int i, const fl_set *set, const real *price, wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
   real cost = -price[1];
   if (cost > 0)
-    force[0] = limited(block, a, set, 1, price[0] * a->speed / cost).force;
+    force[0] = fl_limited_response(block, a, set, 1, price[0] * a->speed / cost).force;
   else {
-    real low = price[0] * set->low - cost * drag_of(block, i, set->low);
-    force[0] = price[0] * set->high - cost * drag_of(block, i, set->high) > low ? set->high : set->low;
+    real low = price[0] * set->low - cost * fl_drag_of_lift(block, i, set->low);
+    force[0] = price[0] * set->high - cost * fl_drag_of_lift(block, i, set->high) > low ? set->high : set->low;
   }
-  force[1] = drag_of(block, i, (real)force[0]);
+  force[1] = fl_drag_of_lift(block, i, (real)force[0]);
 }
 
 /* The force that is worth most at a price, whatever its power; returns the price along it, of planes that push either
    way along what they push ahead. */
-real farthest_of(const real *block, int i, const fl_set *set, const real *price, wide *force) {
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
   force[1] = 0;
   if (a->rows == 1) {
@@ -271,18 +175,18 @@ real farthest_of(const real *block, int i, const fl_set *set, const real *price,
   wide times = size / 2 * (3 - length);
   force[0] *= times, force[1] *= times;
   if (set->reverse > 0) {
-    fl_set back = reversed(set);
+    fl_set back = fl_reversed_set(set);
     wide other[2];
-    real along = farthest_of(block, i, &back, price, other);
+    real along = fl_support_of_set(block, i, &back, price, other);
     if (along > 0 && back.high * along > size * f.along) force[0] = other[0], force[1] = other[1];
   }
   return f.along;
 }
 
 /* Whether a plane that pushes either way answers rather forward, and how far [N] its blend is from that. */
-int undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
+int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
   const fl_actuator *a = ACTUATOR(block, i);
-  fl_set back = reversed(set);
+  fl_set back = fl_reversed_set(set);
   reply ahead = one_way(block, a, set, 0, price), other = one_way(block, a, &back, 0, price);
   real gain = ahead.conjugate - other.conjugate, width = FINE * back.high_cost + R(1e-12);
   real share = (1 + gain / SQRT(gain * gain + width * width)) / 2;

@@ -1,5 +1,5 @@
 /* Laws of actuators by tables: the force of a command, its derivatives, and a command for a force. */
-#include "inner.h"
+#include "internal.h"
 
 /* Weights of four neighbours in value and derivative, and where their values are, on an axis of knots with values `each`
    apart: a cubic whose slope at a knot is that of the line through its neighbours. Beyond the ends nothing changes. */
@@ -76,7 +76,7 @@ static void grid_at(const real *grid, const real *command, real *value, real (*s
 
 /* Force along an actuator's own axes (3,) of a command (3,), and, where there is room for them, its derivatives
    (3 commands, 3 axes). */
-void force_of(const real *block, int i, const real *command, real *force, real (*slope)[3]) {
+void fl_force_of_command(const real *block, int i, const real *command, real *force, real (*slope)[3]) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *grid = block + (int)a->law;
   real none[3][3];
@@ -90,8 +90,8 @@ void force_of(const real *block, int i, const real *command, real *force, real (
     real c = COS(command[0]), s = SIN(command[0]), bend = 0;
     if (a->gauge > 0) { /* of a fin by its force */
       const real *gauge = block + (int)a->gauge;
-      real rho = gauge_at(gauge, command[0]), h = R(1e-3);
-      if (steep) bend = (gauge_at(gauge, command[0] + h) - gauge_at(gauge, command[0] - h)) / (2 * h * rho);
+      real rho = fl_gauge_radius(gauge, command[0]), h = R(1e-3);
+      if (steep) bend = (fl_gauge_radius(gauge, command[0] + h) - fl_gauge_radius(gauge, command[0] - h)) / (2 * h * rho);
       c *= rho, s *= rho;
     }
     force[1] = command[1] * c, force[2] = command[1] * s;
@@ -145,26 +145,26 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   real angle = ATAN2(force[1], force[0]), size = size_of(force), wanted = size;
   real given[3];
   for (int k = 0; k < 2; k++) { /* what the tables leave undone is asked for on top */
-    real most = a->high * (gauge ? gauge_at(gauge, angle) : 1), lean = gauge ? lean_at(gauge, angle) : a->lean;
+    real most = a->high * (gauge ? fl_gauge_radius(gauge, angle) : 1), lean = gauge ? fl_gauge_lean(gauge, angle) : a->lean;
     beat_at(block + (int)a->beat, wanted / most, command);
     command[2] = angle - lean;
-    for (int c = 0; c < 3; c++) command[c] = held_in(box, i, c, 2, command[c]);
+    for (int c = 0; c < 3; c++) command[c] = fl_clip_number(box, i, c, 2, command[c]);
     if (k == 1) break;
-    force_of(block, i, command, given, 0);
+    fl_force_of_command(block, i, command, given, 0);
     wanted = MAX(wanted + size - size_of(given + 1), 0);
-    if (gauge && size > 0) angle += wrapped(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));
+    if (gauge && size > 0) angle += fl_wrap_angle(ATAN2(force[1], force[0]) - ATAN2(given[2], given[1]));
   }
 }
 
 /* Angle and force of a pod, one way or the other: what comes nearer to a force, or the cheaper one. */
 static void pod_command(const real *block, int i, const fl_box *box, const real *force, real before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real size = size_of(force) / (a->gauge > 0 ? gauge_at(block + (int)a->gauge, ATAN2(force[1], force[0])) : 1);
+  real size = size_of(force) / (a->gauge > 0 ? fl_gauge_radius(block + (int)a->gauge, ATAN2(force[1], force[0])) : 1);
   real angle = size > 0 ? ATAN2(force[1], force[0]) : before, way[2][2], missing[2], watts[2];
   for (int k = 0; k < 2; k++) {
-    way[k][0] = held_in(box, i, 0, 0, angle + k * PI), way[k][1] = held_in(box, i, 1, 0, k ? -size : size);
+    way[k][0] = fl_clip_number(box, i, 0, 0, angle + k * PI), way[k][1] = fl_clip_number(box, i, 1, 0, k ? -size : size);
     real dx = way[k][1] * COS(way[k][0]) - size * COS(angle), dy = way[k][1] * SIN(way[k][0]) - size * SIN(angle);
-    missing[k] = SQRT(dx * dx + dy * dy), watts[k] = cost_at(block, i, way[k][1]);
+    missing[k] = SQRT(dx * dx + dy * dy), watts[k] = fl_power_of_force(block, i, way[k][1]);
   }
   real least = NEARLY * a->upper[1];
   int back = box->low[i][1] < 0 && (missing[1] < missing[0] - least ||
@@ -174,7 +174,7 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
 
 /* A command within a box for a force, as near as the tables are; an angle that does not count stays that of the
    command before, where there is one. */
-void command_for(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command) {
+void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->form == FL_FIN)
     fin_command(block, i, box, force, command);
@@ -183,7 +183,7 @@ void command_for(const real *block, int i, const fl_box *box, const real *force,
   else {
     real angle = a->form == FL_FOIL ? on_curve(block + (int)a->beat, FABS(force[0]) / a->pressure) : 0;
     command[0] = a->form == FL_FOIL ? (force[0] < 0 ? -angle : angle) + a->turned : a->sign * force[0];
-    command[0] = held_in(box, i, 0, -1, command[0]), command[1] = command[2] = 0;
+    command[0] = fl_clip_number(box, i, 0, -1, command[0]), command[1] = command[2] = 0;
   }
 }
 
@@ -206,7 +206,7 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
       command[0] = low[0] + (real)(j % PROBES) / (PROBES - 1) * (high[0] - low[0]);
       command[1] = low[1] + (real)(j / PROBES) / (PROBES - 1) * (high[1] - low[1]);
     }
-    force_of(block, i, command, force, 0);
+    fl_force_of_command(block, i, command, force, 0);
     const real size = a->form == FL_FOIL ? force[0] : size_of(force + 1);
     if (size > *largest) *direction = ATAN2(force[2], force[1]);
     *least = MIN(*least, size);
@@ -216,7 +216,7 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
 
 /* What commands within a box give: least and largest force [N], of planes below 0 in reverse, and the arc of their
    directions [rad]. */
-reach reach_of(const real *block, int i, const fl_box *box) {
+reach fl_force_range(const real *block, int i, const fl_box *box) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *low = box->low[i];
   const real *high = box->high[i];
@@ -231,7 +231,7 @@ reach reach_of(const real *block, int i, const fl_box *box) {
     sizes_in(block, i, box, &o.low, &o.high, &none);
     return o;
   }
-  const int angle = angle_of(a);
+  const int angle = fl_angle_number(a);
   o.middle = (low[angle] + high[angle]) / 2;
   o.half = (high[angle] - low[angle]) / 2;
   if (o.half >= PI - NOTHING) o.half = PI;
@@ -240,11 +240,18 @@ reach reach_of(const real *block, int i, const fl_box *box) {
   if (a->form == FL_POD) return o;
   real direction;
   sizes_in(block, i, box, &o.low, &o.high, &direction);
-  o.middle += wrapped(direction - o.middle); /* where the force points at the middle of the commands' arc */
+  o.middle += fl_wrap_angle(direction - o.middle); /* where the force points at the middle of the commands' arc */
   if (a->gauge > 0) {
-    const real rho = gauge_at(block + (int)a->gauge, o.middle);
+    const real rho = fl_gauge_radius(block + (int)a->gauge, o.middle);
     o.low /= rho;
     o.high /= rho;
   }
   return o;
+}
+
+void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const real *before = previous && fl_is_known_command(previous + 3 * i) ? previous + 3 * i : 0;
+    fl_command_for_force(block, i, box, force[i], before, command[i]);
+  }
 }

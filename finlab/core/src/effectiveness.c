@@ -4,7 +4,7 @@
    actuator's effectiveness is the matrix Q' B. An axis that does not count has no row in B, so its price is held at 0; an
    actuator that is lost has no column. Python has prepared all of it for a whole robot; any other state follows here, in
    a few microseconds, and is kept until the next question asks for another one. */
-#include "inner.h"
+#include "internal.h"
 
 /* Squared length, over that of the longest column, below which nothing is left of the columns. */
 #define DEPENDENT (NOTHING * NOTHING)
@@ -106,7 +106,7 @@ static void take_prepared(const real *block, fl_span *span) {
 }
 
 /* The wrench beside the forces, less the drag at rest of foils that are lost. */
-void beside_of(const real *block, fl_span *span) {
+void fl_offset_wrench(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
   for (int k = 0; k < 6; k++) {
     real sum = h->beside[k];
@@ -125,18 +125,18 @@ static int prepare_newton(const real *block, fl_work *work) {
   memset(work->factor, 0, sizeof work->factor);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    for (int row = 0; row < (int)a->rows; row++) add_square(h, span->matrix[i][row], a->gain[row]);
+    for (int row = 0; row < (int)a->rows; row++) fl_add_square(h, span->matrix[i][row], a->gain[row]);
   }
-  const real trace = trace_of(h);
+  const real trace = fl_trace(h);
   for (int j = 0; j < 6; j++)
     for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * span->range / MAX(trace, TINY) + (j == k ? NEARLY : 0);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
   work->least_trace = NEARLY * trace;
-  return span->range == 0 || factor(h);
+  return span->range == 0 || fl_factor(h);
 }
 
 /* Prepares the state of a robot anew; 0 where its numbers are out of range. */
-int span_anew(const real *block, fl_work *work, int is_as_prepared) {
+int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared) {
   fl_span *span = &work->span;
   if (is_as_prepared)
     take_prepared(block, span);
@@ -145,7 +145,7 @@ int span_anew(const real *block, fl_work *work, int is_as_prepared) {
     basis_of(block, span);
     matrices_of(block, span);
   }
-  beside_of(block, span);
+  fl_offset_wrench(block, span);
   work->is_whole = 0;
   if (prepare_newton(block, work)) return 1;
   memset(span->lost, 2, sizeof span->lost); /* so that no question is taken for one of this state */
@@ -154,7 +154,7 @@ int span_anew(const real *block, fl_work *work, int is_as_prepared) {
 
 /* Prepares the state in which some actuators (n,) are lost and some axes (6,) free, each 0 for none, unless the last
    question had the same; 0 where its numbers are out of range. */
-int span_now(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free) {
+int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free) {
   fl_span *span = &work->span;
   int is_same = 1;
   int is_as_prepared = 1;
@@ -172,17 +172,5 @@ int span_now(const real *block, fl_work *work, const unsigned char *lost, const 
     span->counts[k] = counts;
   }
   if (is_same) return 1;
-  return span_anew(block, work, is_as_prepared);
-}
-
-/* Prepares a work area for the whole robot; an error code. */
-int fl_prepare(const real *block, fl_work *work) {
-  memset(&work->span, 0, sizeof work->span);
-  work->ray = 0;
-  work->refined = 0;
-  work->most_parts = FL_PARTS;
-  for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
-  if (!span_anew(block, work, 1)) return FL_BAD_NUMBER;
-  whole_limits(block, work);
-  return 0;
+  return fl_prepare_span(block, work, is_as_prepared);
 }

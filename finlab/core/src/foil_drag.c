@@ -8,7 +8,7 @@
    a wrench on it is met at few commands, far from each other, and from elsewhere steps end at a least miss. Where the
    starts that the dual has come to no cost that it proves, others are taken from a lattice over the angles of all
    foils, each kept within the branches of the lifts on which it lies. */
-#include "inner.h"
+#include "internal.h"
 
 #define TRUST (R(3.0) / ROUNDS)      /* of its range that a foil turns in a step: all together may cross it thrice */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
@@ -18,7 +18,7 @@
 static void foil_at(const real *block, int i, real angle, fl_tangent *t) {
   const fl_actuator *a = ACTUATOR(block, i);
   real command[3] = {angle, 0, 0}, own[3], by[3][3];
-  force_of(block, i, command, own, by);
+  fl_force_of_command(block, i, command, own, by);
   real all = own[1] + a->pressure * a->rest;
   memcpy(t->force, own, sizeof t->force);
   memcpy(t->slope, by[0], sizeof t->slope);
@@ -41,23 +41,23 @@ static void draw_tangent(const real *block, int i, const fl_box *box, real angle
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
-real cost_of(const real *block, const fl_work *work, real command[][3], real force[][2]) {
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3], real force[][2]) {
   real cost = 0, own[3];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     int plane = is_plane(a);
     force[i][0] = force[i][1] = 0;
     if (work->span.lost[i]) continue;
-    force_of(block, i, command[i], own, 0);
+    fl_force_of_command(block, i, command[i], own, 0);
     force[i][0] = plane ? own[1] : a->sign * own[0], force[i][1] = plane ? own[2] : 0;
     real size = plane ? size_of(force[i]) : force[i][0];
-    if (a->gauge > 0) size /= gauge_at(block + (int)a->gauge, ATAN2(own[2], own[1]));
+    if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(own[2], own[1]));
     if (a->speed > 0) {
       fl_tangent t;
       foil_at(block, i, command[i][0], &t);
       force[i][1] = t.force[1], cost += t.cost;
     } else
-      cost += cost_at(block, i, a->form == FL_POD && command[i][1] < 0 ? -size : size);
+      cost += fl_power_of_force(block, i, a->form == FL_POD && command[i][1] < 0 ? -size : size);
   }
   return cost;
 }
@@ -68,11 +68,11 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
     const fl_actuator *a = ACTUATOR(block, i);
     fl_set *set = work->set + i;
     if (is_plane(a) ? set->forked || set->reverse > 0 : a->band > 0)
-      narrow(block, i, set, force[i], nearer_side(block, i, set, force[i]));
+      fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
     if (a->form != FL_THRUSTER || !(a->band > 0)) continue;
     box->low[i][0] = MAX(box->low[i][0], a->sign > 0 ? set->low : -set->high);
     box->high[i][0] = MIN(box->high[i][0], a->sign > 0 ? set->high : -set->low);
-    command[i][0] = held_in(box, i, 0, -1, command[i][0]);
+    command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
   }
 }
 
@@ -85,9 +85,9 @@ static void stepped(const real *block, const fl_work *work, const fl_box *box, r
     real wanted[2] = {force[i][0] + way[0], force[i][1] + way[1]};
     if (work->span.lost[i]) continue;
     if (ACTUATOR(block, i)->speed > 0)
-      command[i][0] = held_in(box, i, 0, -1, command[i][0] + dot(way, t, 2) / MAX(dot(t, t, 2), TINY));
+      command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + dot(way, t, 2) / MAX(dot(t, t, 2), TINY));
     else
-      command_for(block, i, box, wanted, command[i], command[i]);
+      fl_command_for_force(block, i, box, wanted, command[i], command[i]);
   }
 }
 
@@ -106,7 +106,7 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
   real before, miss = NONE;
   for (int k = 0; k < 2 * ROUNDS; k += steps) {
     before = miss;
-    miss = refine(block, work, box, work->aim, command, steps);
+    miss = fl_refine_commands(block, work, box, work->aim, command, steps);
     if (miss <= EXACT || miss > before / 2) return;
   }
 }
@@ -120,7 +120,7 @@ static int come_to_give(const real *block, fl_work *work, const fl_box *box, rea
     approach(block, work, box, command, ROUNDS / 2);
     steps = 0;
   }
-  return refine(block, work, box, work->aim, command, steps) <= part + ROUNDING * size;
+  return fl_refine_commands(block, work, box, work->aim, command, steps) <= part + ROUNDING * size;
 }
 
 /* How far off the yardstick commands may be that are said to give a wrench: what tables leave where these are few. */
@@ -136,10 +136,10 @@ static real settle(const real *block, fl_work *work, const real *target, real pa
   fl_set before[FL_MOST];
   real size = 1, tried[FL_MOST][3], other[FL_MOST][2];
   memcpy(before, work->set, sizeof before);
-  cost_of(block, work, command, force);
+  fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
   int met = come_to_give(block, work, &box, command, 2 * ROUNDS, part), moved = 1;
-  real cost = met ? cost_of(block, work, command, force) : NONE;
+  real cost = met ? fl_power_of_commands(block, work, command, force) : NONE;
   for (int k = 0; met && k < ROUNDS; k++) {
     for (int i = 0; moved && i < COUNT(block); i++) {
       real own[2];
@@ -147,13 +147,13 @@ static real settle(const real *block, fl_work *work, const real *target, real pa
       if (ACTUATOR(block, i)->speed > 0 && !work->span.lost[i])
         draw_tangent(block, i, &box, command[i][0], own, work->tangent + i, work->set + i);
     }
-    sums_of(block, work);
-    if (moved && newton(block, work, target, price, STEPS_AT_KINK) == FL_MET)
+    fl_prepare_sets(block, work);
+    if (moved && fl_dual_newton(block, work, target, price, STEPS_AT_KINK) == FL_MET)
       memcpy(price, work->now->price, sizeof work->now->price);
     memcpy(tried, command, sizeof tried);
     stepped(block, work, &box, force, size, tried);
     int meets = come_to_give(block, work, &box, tried, 2 * ROUNDS, part);
-    real gain = meets ? cost - cost_of(block, work, tried, other) : -NONE;
+    real gain = meets ? cost - fl_power_of_commands(block, work, tried, other) : -NONE;
     if ((moved = gain > 0)) {
       memcpy(command, tried, sizeof tried);
       memcpy(force, other, sizeof other);
@@ -162,7 +162,7 @@ static real settle(const real *block, fl_work *work, const real *target, real pa
       size *= R(0.25);
     if (FABS(gain) <= CHEAPER * cost) break;
   }
-  take_sets(block, work, before);
+  fl_restore_sets(block, work, before);
   return cost;
 }
 
@@ -180,9 +180,9 @@ static void place_from(const real *block, fl_work *work, const real *target, con
 }
 
 /* The same of the forces and prices that Newton's method came to. */
-void place(const real *block, fl_work *work, const real *target, real *best) {
+void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best) {
   real command[FL_MOST][3];
-  commands_for(block, &work->box, work->now->force, work->previous, command);
+  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, command);
   place_from(block, work, target, work->now->price, command, best);
 }
 
@@ -210,7 +210,7 @@ static real proved_value(const real *block, const fl_work *work, real *most) {
       real limit, own[2], more = 0;
       if (!may_stall(block, work, i, end, &limit)) continue;
       own_price(work, i, work->now->price, own);
-      reply known = reply_of(block, i, work->set + i, own);
+      reply known = fl_response(block, i, work->set + i, own);
       real last = end_of(block, a)[1];
       real begin = a->turned + (end ? last : -last);
       for (int k = 1; k <= ROUNDS; k++) {
@@ -311,11 +311,11 @@ static void lay_rows(const real *block, const fl_work *work, lattice *l) {
   }
   for (int j = 0; j < 6; j++) trace += gram[j][j];
   for (int j = 0; j < 6; j++) gram[j][j] += MAX(NOTHING, ROUNDING) * trace + TINY;
-  if (!factor(gram)) return;
+  if (!fl_factor(gram)) return;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     for (int q = 0; q < (int)a->rows && !(a->speed > 0); q++) {
-      solve(gram, work->span.matrix[i][q], l->row[i][q]);
+      fl_solve(gram, work->span.matrix[i][q], l->row[i][q]);
       for (int j = 0; j < 6; j++) l->row[i][q][j] *= a->gain[q];
     }
   }
@@ -397,7 +397,7 @@ static void begin_at(const real *block, fl_work *work, const lattice *l, const r
   real force[FL_MOST][2];
   fl_box box = work->box;
   cost_at_point(block, work, l, target, own->node, force);
-  commands_for(block, &work->box, force, work->previous, command);
+  fl_commands_for_forces(block, &work->box, force, work->previous, command);
   for (int f = 0; f < l->foils; f++) {
     int node = own->node[f], i = l->foil[f], branch = (node - l->first[f]) / l->each;
     command[i][0] = l->angle[node];
@@ -422,7 +422,7 @@ static void place_spread(const real *block, fl_work *work, const real *target, c
   for (int k = 0; k < count; k++) {
     begin_at(block, work, &l, target, points + k, command);
     int met = come_to_give(block, work, &work->box, command, 0, part);
-    points[k].cost = met ? cost_of(block, work, command, force) : NONE;
+    points[k].cost = met ? fl_power_of_commands(block, work, command, force) : NONE;
   }
   for (int tried = 0; tried < FOLLOWED && *best > enough; tried++) {
     const point *next = 0;
@@ -438,12 +438,12 @@ static void place_spread(const real *block, fl_work *work, const real *target, c
 }
 
 /* The same of several starts, as steps from a cheap one may end early: each has its own valley. */
-void place_starts(const real *block, fl_work *work, const real *target, real *best) {
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best) {
   real start[FL_MOST][3], command[FL_MOST][3], price[6], angle, ridge, most;
   real proved = proved_value(block, work, &most), enough = proved * (1 + CLOSE);
   memcpy(price, work->now->price, sizeof price);
-  commands_for(block, &work->box, work->now->force, work->previous, start);
-  place(block, work, target, best);
+  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, start);
+  fl_improve_commands(block, work, target, best);
   if (*best <= enough) return;
   for (int i = 0; i < COUNT(block); i++)
     for (int end = 0; end < 2; end++) {
@@ -453,52 +453,37 @@ void place_starts(const real *block, fl_work *work, const real *target, real *be
       place_from(block, work, target, price, command, best);
     }
   if (*best <= enough) return;
-  first_price(block, work, target, price, &ridge);
-  stand_at(block, work, target, price);
-  place(block, work, target, best);
+  fl_first_lambda(block, work, target, price, &ridge);
+  fl_dual_start(block, work, target, price);
+  fl_improve_commands(block, work, target, best);
   if (*best > enough && proved <= most) place_spread(block, work, target, price, enough, best);
 }
 
 /* Commands for forces that the dual is sure of: no foil drags more than its lift does, and none is in doubt. */
-static int are_sure(const real *block, fl_work *work) {
+int fl_are_forces_sure(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->doubt > 0) return 0;
     if (a->speed > 0 && FABS(work->now->force[i][0]) >= a->pressure * (1 - NOTHING) * end_of(block, a)[0]) return 0;
   }
-  if (worst_gap(block, work, work->now->force, work->now->price) >= 0) return 0;
+  if (fl_worst_gap(block, work, work->now->force, work->now->price) >= 0) return 0;
   memcpy(work->best, work->now->force, sizeof work->best);
-  commands_for(block, &work->box, work->best, work->previous, work->placed);
+  fl_commands_for_forces(block, &work->box, work->best, work->previous, work->placed);
   return come_to_give(block, work, &work->box, work->placed, ROUNDS, allowed(block, work, &work->box));
-}
-
-/* Commands that give work->aim, from what Newton's method came to; 0 where none are found. */
-int with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out) {
-  real value = work->now->value, bound;
-  memcpy(out->inner, work->now->price, sizeof out->inner);
-  if (!(status == FL_MET && are_sure(block, work))) {
-    if (!least_power(block, work, target, status, &bound)) return 0;
-    if (status != FL_MET) { /* prices at the commands may prove more */
-      stand_at(block, work, target, work->near);
-      if (work->state->value > value) memcpy(out->inner, work->near, sizeof out->inner);
-    }
-  }
-  memcpy(out->command, work->placed, COUNT(block) * sizeof out->command[0]);
-  return out->placed = 1;
 }
 
 /* Commands that give the largest share of a wrench that steps come to, between that which commands are `found` for, 0
    without any, and the `most` that the dual allows. `out` has forces near to it. */
-void on_ray(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out) {
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out) {
   real part[6], target[6], inner[6], own[FL_MOST][2], start[FL_MOST][3], command[FL_MOST][3], less = NEARLY, all = most;
   for (int i = 0; i < 2 * COUNT(block); i++) /* a stalled foil gives more than its table */
     if (may_stall(block, work, i / 2, i % 2, part)) most = MIN(all * (1 + R(0.1)), 1);
-  commands_for(block, &work->box, out->force, work->previous, start);
+  fl_commands_for_forces(block, &work->box, out->force, work->previous, start);
   for (int k = 0; k < 2 * ROUNDS && less < 1 && most - found > NEARLY / 4 * all; k++) {
     real share = found > 0 ? (found + most) / 2 : all * (1 - less);
     int met = 0;
     for (int j = 0; j < 6; j++) work->aim[j] = share * (wrench[j] + work->span.beside[j]), part[j] = work->aim[j] - work->span.beside[j];
-    to_basis(work, part, target);
+    fl_reduce_wrench(work, part, target);
     for (int way = found > 0 ? 0 : 1; way < 2 && !met; way++) {
       memcpy(command, way ? start : out->command, sizeof command);
       memcpy(inner, out->inner, sizeof inner);

@@ -1,0 +1,197 @@
+/* What the files of the core share. */
+#ifndef FINLAB_INNER_H
+#define FINLAB_INNER_H
+#include "finlab.h"
+#include <math.h>
+#include <string.h>
+
+typedef fl_real real;
+typedef fl_wide wide;
+#ifdef FL_SINGLE
+#define R(x) x##f
+#define SQRT sqrtf
+#define SIN sinf
+#define COS cosf
+#define ATAN2 atan2f
+#define EXP expf
+#define TANH tanhf
+#define FLOOR floorf
+#define FABS fabsf
+#define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
+#define ENOUGH R(1e-4) /* the same where Newton's method stands still for IDLE steps; commands make up for it */
+#define IDLE 6
+#define ROUNDING R(1e-6)
+#define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
+#define TINY R(1e-30)
+#else
+#define R(x) x
+#define SQRT sqrt
+#define SIN sin
+#define COS cos
+#define ATAN2 atan2
+#define EXP exp
+#define TANH tanh
+#define FLOOR floor
+#define FABS fabs
+#define TOLERANCE 1e-10
+#define ENOUGH TOLERANCE
+#define IDLE MOST_STEPS
+#define EXACT 1e-8
+#define ROUNDING 1e-12
+#define TINY 1e-300
+#endif
+#define PI R(3.14159265358979323846)
+#define NOTHING R(1e-9)
+#define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
+#define NEARLY R(1e-6)
+#define FINE R(1e-5)
+#define CLOSE R(1e-4)
+#define ROUNDS 12
+#define TICK_PARTS 60 /* the usual fl_settings.tick_parts */
+#define LAST_STEPS 36 /* the usual fl_settings.command_steps */
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define CLIP(x, low, high) MIN(MAX(x, low), high)
+
+#define HEAD(block) ((const fl_head *)(block))
+#define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
+#define COUNT(block) ((int)HEAD(block)->n)
+
+/* linear.c */
+static inline real dot(const real *a, const real *b, int n) {
+  real sum = 0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
+real fl_wrap_angle(real angle);
+void fl_add_square(real h[6][6], const real *b, real weight);
+real fl_trace(real h[6][6]);
+int fl_factor(real a[6][6]);
+void fl_solve(real a[6][6], const real *right, real *x);
+
+/* Whether an actuator pushes in a plane. */
+static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
+/* Prices of an actuator's rows at prices of the wrench in the basis. */
+static inline void own_price(const fl_work *work, int i, const real *price, real *own) {
+  own[0] = dot(work->span.matrix[i][0], price, 6);
+  own[1] = dot(work->span.matrix[i][1], price, 6);
+}
+
+/* span.c */
+int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared);
+void fl_offset_wrench(const real *block, fl_span *span);
+int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free);
+
+/* table.c */
+typedef struct { real force, slope, conjugate; } along;
+along fl_force_of_price(const real *table, real price);
+real fl_marginal_cost(const real *table, real size, real *price);
+typedef struct { real value, slope, bend; } support;
+support fl_gauge_support(const real *gauge, real x, real y);
+real fl_gauge_radius(const real *gauge, real angle);
+real fl_gauge_lean(const real *gauge, real angle);
+
+/* reply.c */
+typedef struct { real force[2], xx, xy, yy, conjugate, angle; } reply; /* angle: where turning costs */
+void fl_empty_set(const real *block, int i, fl_set *set);
+along fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set, int line, real price);
+void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, real middle, real half);
+void fl_prepare_set(const real *block, int i, fl_set *set);
+void fl_fix_force(const real *block, int i, fl_set *set, const real *force);
+real fl_power_of_force(const real *block, int i, real force);
+reply fl_response(const real *block, int i, const fl_set *set, const real *price);
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force);
+fl_set fl_reversed_set(const fl_set *set);
+real fl_drag_of_lift(const real *block, int i, real force);
+int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
+
+/* turning.c */
+reply fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price);
+int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
+               const real *step, int is_short);
+void fl_mark_jump(fl_set *set, real one, real other);
+
+/* newton.c */
+#define MOST_STEPS 200
+void fl_prepare_sets(const real *block, fl_work *work);
+void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
+void fl_dual_start(const real *block, fl_work *work, const real *target, const real *price);
+void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
+void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
+int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price, int most);
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target);
+void fl_reduce_lambda(const fl_work *work, const real *price, real *inner);
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
+void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
+
+/* gaps.c */
+#define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
+#define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
+int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
+int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force);
+int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]);
+real fl_gap_of(const real *block, const fl_work *work, int i, const real *force, real largest, const real *price);
+real fl_largest_force(const real *block, real force[][2]);
+void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force);
+void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side);
+fl_node *fl_cut_set(const real *block, fl_work *work, int *depth, int cut, const real *force);
+void fl_take_side(const real *block, fl_work *work, const fl_node *node, int side);
+fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
+int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *value);
+
+/* drag.c */
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3], real force[][2]);
+void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
+int fl_are_forces_sure(const real *block, fl_work *work);
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
+
+/* nearest.c */
+static inline wide product(const wide *a, const wide *b, int n) {
+  wide sum = 0;
+  for (int k = 0; k < n; k++) sum += a[k] * b[k];
+  return sum;
+}
+
+static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+
+/* Adds a vector (6,) so many times. */
+static inline void add(wide *to, wide times, const wide *other) {
+  for (int k = 0; k < 6; k++) to[k] += times * other[k];
+}
+wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);
+void fl_weigh_axes(const real *block, fl_work *work, const wide *weight);
+void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point);
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
+wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
+                    wide close, fl_mixture *m, wide *plane);
+void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
+
+/* law.c */
+void fl_force_of_command(const real *block, int i, const real *command, real *force, real (*slope)[3]);
+void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command);
+typedef struct { real low, high, middle, half; } reach;
+reach fl_force_range(const real *block, int i, const fl_box *box);
+
+/* now.c */
+void fl_limits_without_tick(const real *block, fl_work *work);
+void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
+int fl_is_known_command(const real *command);
+int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
+void fl_clip_commands(const real *block, const fl_box *box, real command[][3]);
+
+/* command.c */
+int fl_angle_number(const fl_actuator *a);
+real fl_clip_number(const fl_box *box, int i, int k, int angle, real value);
+void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
+real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
+void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
+void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
+int fl_force_number(const fl_actuator *a);
+int fl_is_in_dead_band(const fl_actuator *a, const real *command);
+
+/* policy.c */
+void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out);
+#endif
