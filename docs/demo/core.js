@@ -1,4 +1,4 @@
-// The core in C (finlab/core/core.h) as WebAssembly: one robot, questions and answers.
+// The core in C (finlab/core/finlab.h) as WebAssembly: one robot, questions and answers.
 import { fieldAt, structsOf } from "./fields.js";
 
 const math = { atan2: Math.atan2, cos: Math.cos, sin: Math.sin, exp: Math.exp, tanh: Math.tanh };

@@ -1,4 +1,4 @@
-"""Numbers for the core (finlab/core/law.c): how forces of actuators become commands, and commands forces."""
+"""Numbers for the core (finlab/core/src/command_law.c): how forces of actuators become commands, and commands forces."""
 
 from collections.abc import Callable, Sequence
 from itertools import product

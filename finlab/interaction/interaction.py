@@ -85,7 +85,7 @@ class AtPlaces(Interaction):
         head = [len(self.lever), constants is not None, DENSITY, STILL, *(constants or np.zeros(10))]
         rows = np.column_stack([places.position, places.diameter, places.advance])
         self.table: Array = np.concatenate([head, places.hull.ravel(), rows.ravel()], dtype=np.float64)
-        """The numbers of finlab/core/jets.c."""
+        """The numbers of finlab/core/src/jets.c."""
 
     @abstractmethod
     def at_rest(self, force: Array) -> Array:

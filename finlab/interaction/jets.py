@@ -6,7 +6,7 @@ water of others loses thrust, by a curve through the tests of two thrusters in l
 Laheij, 2004), and turns the water that comes from the side (momentum); its housing is dragged along; a jet
 that meets the hull pushes it back (Nienhuis, 1992). The constants' usual values were fitted to the formulas
 of Dang and Laheij as they are quoted; they hold to 0.05 at distances from 2 to 16 D, turned by up to 30
-degrees. The formula itself is in finlab/core/jets.c.
+degrees. The formula itself is in finlab/core/src/jets.c.
 """
 
 from dataclasses import astuple, dataclass

@@ -58,7 +58,7 @@ FILES = [
 ]
 
 
-CORE = sorted((ROOT / "finlab/core").glob("*.[ch]"))
+CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
 DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
 DOUBLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
 NO_CHOICE = {"PI", "TINY", "LARGEST", "NONE", "FL_MOST", "FL_VERSION", "FL_MAGIC", "FL_POINTS", "FL_SCORES"}

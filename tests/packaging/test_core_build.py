@@ -54,7 +54,7 @@ def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(
 
 
 def test_what_does_not_compile_is_said_in_the_words_of_the_compiler(project: Path) -> None:
-    (project / "finlab" / "core" / "wrong.c").write_text("int wrong(void) { return nowhere; }\n")
+    (project / "finlab" / "core" / "src" / "wrong.c").write_text("int wrong(void) { return nowhere; }\n")
     for argv in (["hatch_build.py"], ["-m", "hatchling", "build", "-t", "wheel"]):
         done = python(project, *argv)
         assert done.returncode == 1 and "nowhere" in done.stderr and "Traceback" not in done.stderr

@@ -19,7 +19,7 @@ static fan direction_of(const fl_set *set, const real *gauge, const real *price,
   real tangent = 1 / size;
   fan o = {size, x, y, 0, 0, 0, 0, 0};
   if (gauge) {
-    support s = fl_gauge_support(gauge, x, y);
+    gauge_point s = fl_gauge_support(gauge, x, y);
     o.x = s.value * x - s.slope * y, o.y = s.value * y + s.slope * x;
     tangent *= MAX(s.value + s.bend, 0);
     o.along *= s.value;
@@ -41,7 +41,7 @@ static fan direction_of(const fl_set *set, const real *gauge, const real *price,
 }
 
 /* Blends an answer with another one, in a width [W] of their conjugates. */
-static void blend(reply *own, const reply *other, real width) {
+static void blend(response *own, const response *other, real width) {
   real ahead = own->conjugate - other->conjugate, root = SQRT(ahead * ahead + width * width);
   real share = (1 + ahead / root) / 2, rest = 1 - share, turn = width * width / (2 * root * root * root);
   real dx = own->force[0] - other->force[0], dy = own->force[1] - other->force[1];
@@ -53,32 +53,32 @@ static void blend(reply *own, const reply *other, real width) {
   own->conjugate += (root - ahead) / 2;
 }
 
-static reply along_fan(along o, const fan *f) {
-  return (reply){{o.force * f->x, o.force * f->y},
+static response along_fan(line_response o, const fan *f) {
+  return (response){{o.force * f->x, o.force * f->y},
                  o.slope * f->x * f->x + o.force * f->xx,
                  o.slope * f->x * f->y + o.force * f->xy,
                  o.slope * f->y * f->y + o.force * f->yy,
                  o.conjugate, 0};
 }
 
-static reply one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
+static response one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
                      const real *price) {
   fan f = direction_of(set, gauge, price, set->gap2);
-  reply own = along_fan(fl_limited_response(block, a, set, 0, f.along), &f);
+  response own = along_fan(fl_limited_response(block, a, set, 0, f.along), &f);
   if (set->forked && f.beyond) {
     real rho = gauge_or_one(gauge, f.other);
     fan g = {0, rho * COS(f.other), rho * SIN(f.other), 0, 0, 0, 0, 0};
-    reply other = along_fan(fl_limited_response(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
+    response other = along_fan(fl_limited_response(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
     blend(&own, &other, FINE * set->high_cost + R(1e-12));
   }
   return own;
 }
 
-static reply plane(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
-  reply own = one_way(block, a, set, a->gauge > 0 ? block + (int)a->gauge : 0, price);
+static response plane(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
+  response own = one_way(block, a, set, a->gauge > 0 ? block + (int)a->gauge : 0, price);
   if (set->reverse > 0) {
     fl_set back = fl_reversed_set(set);
-    reply other = one_way(block, a, &back, 0, price);
+    response other = one_way(block, a, &back, 0, price);
     blend(&own, &other, FINE * back.high_cost + R(1e-12));
   }
   return own;
@@ -86,36 +86,36 @@ static reply plane(const real *block, const fl_actuator *a, const fl_set *set, c
 
 static real rest_of(const real *block, const fl_actuator *a) { return a->worth * block[(int)a->ahead + 2]; }
 
-static reply foil(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
+static response foil(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
   real ratio = 1 - price[1] / a->speed, below = MIN(ratio / SOFT - 1, 0), power = EXP(below);
   real rate = power > CLOSE ? power : 0, soft = below < 0 ? SOFT * MAX(power, CLOSE) : ratio;
   real rise = (set->high_cost - set->low_cost) / MAX(set->high - set->low, TINY);
   real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = (price[0] + (soft - ratio) * rise) / soft;
-  along o = fl_limited_response(block, a, set, 1, own);
+  line_response o = fl_limited_response(block, a, set, 1, own);
   real cost = own * o.force - o.conjugate - rest, most = set->low_cost - rest + rise * (o.force - set->low);
   o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * (set->low_cost - rest - rise * set->low) - rest;
   o.slope /= soft;
   real lean = (rate * own + (1 - rate) * rise) / a->speed;
-  return (reply){{o.force, (rate * cost + (1 - rate) * most) / a->speed},
+  return (response){{o.force, (rate * cost + (1 - rate) * most) / a->speed},
                  o.slope,
                  o.slope * lean,
                  o.slope * lean * lean + (most - cost) * bend / (a->speed * a->speed),
                  o.conjugate, 0};
 }
 
-static reply on_tangent(const fl_set *set, const real *price) {
+static response on_tangent(const fl_set *set, const real *price) {
   const fl_tangent *t = set->tangent;
   real gain = dot(price, t->slope, 2) - t->pay, step = CLIP(gain / t->bend, set->low, set->high);
   real x = t->slope[0], y = t->slope[1], free = step > set->low && step < set->high ? 1 / t->bend : 0;
-  return (reply){{t->force[0] + step * x, t->force[1] + step * y}, free * x * x, free * x * y, free * y * y,
+  return (response){{t->force[0] + step * x, t->force[1] + step * y}, free * x * x, free * x * y, free * y * y,
                  dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost, 0};
 }
 
-reply fl_response(const real *block, int i, const fl_set *set, const real *price) {
+response fl_response(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->rows == 1) {
-    along o = fl_limited_response(block, a, set, 1, price[0]);
-    return (reply){{o.force, 0}, o.slope, 0, 0, o.conjugate, 0};
+    line_response o = fl_limited_response(block, a, set, 1, price[0]);
+    return (response){{o.force, 0}, o.slope, 0, 0, o.conjugate, 0};
   }
   if (set->tangent) return on_tangent(set, price);
   if (a->speed > 0) return foil(block, a, set, price);
@@ -187,7 +187,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
   const fl_actuator *a = ACTUATOR(block, i);
   fl_set back = fl_reversed_set(set);
-  reply ahead = one_way(block, a, set, 0, price), other = one_way(block, a, &back, 0, price);
+  response ahead = one_way(block, a, set, 0, price), other = one_way(block, a, &back, 0, price);
   real gain = ahead.conjugate - other.conjugate, width = FINE * back.high_cost + R(1e-12);
   real share = (1 + gain / SQRT(gain * gain + width * width)) / 2;
   real dx = ahead.force[0] - other.force[0], dy = ahead.force[1] - other.force[1];

@@ -23,7 +23,7 @@ static int are_within(const real *values, int count, real most) {
 }
 
 static int is_place(real place, real length, int numbers) {
-  return place == FLOOR(place) && place >= 0 && place + numbers <= length;
+  return place == FLOOR(place) && place >= 0 && place + (real)numbers <= (real)length;
 }
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
@@ -57,7 +57,7 @@ static int is_grid(const real *block, real place, real length) {
 /* Whether a block can be worked with; an error code. */
 int fl_check(const real *block, int length) {
   const int head = sizeof(fl_head) / sizeof(real), own = sizeof(fl_actuator) / sizeof(real);
-  if (length < head || block[0] != FL_MAGIC || HEAD(block)->length != length) return FL_BAD_BLOCK;
+  if (length < head || block[0] != FL_MAGIC || HEAD(block)->length != (real)length) return FL_BAD_BLOCK;
   if (block[1] != FL_VERSION) return FL_BAD_VERSION;
   if (!are_within(block, length, R(1e30))) return FL_BAD_NUMBER;
   const fl_head *h = HEAD(block);
@@ -95,7 +95,7 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
   out->value = 0, out->status = FL_MET, out->placed = 0;
   memset(out->inner, 0, sizeof out->inner);
   memset(out->price, 0, sizeof out->price);
-  memset(out->force, 0, n * sizeof out->force[0]);
+  memset(out->force, 0, (size_t)n * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof out->aim);
   fl_reduce_wrench(work, wrench, target);
   if (span->range == 0) { /* nothing pushes, such as foils at rest */
@@ -109,17 +109,17 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
   int within = (status == FL_MET || (status == FL_STUCK && torn)) && ranged;
   out->status = status;
   memcpy(out->inner, work->now->price, sizeof out->inner);
-  memcpy(out->force, work->now->force, n * sizeof out->force[0]);
+  memcpy(out->force, work->now->force, (size_t)n * sizeof out->force[0]);
   if (work->drags) {
     within = ranged && fl_answer_with_drag(block, work, target, status, out);
-    if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
+    if (within) memcpy(out->force, work->best, (size_t)n * sizeof out->force[0]);
   }
   if (!work->drags && fl_may_have_gaps(block, work, out->force)) {
     int inside = fl_worst_gap(block, work, out->force, out->inner) >= 0;
     if (within && inside) {
       real value;
       within = fl_search_gaps(block, work, target, status, &value);
-      if (within) memcpy(out->force, work->best, n * sizeof out->force[0]);
+      if (within) memcpy(out->force, work->best, (size_t)n * sizeof out->force[0]);
       out->value = within && !work->turns ? value * (1 - FINE) : 0; /* with turning it is more than power */
     } else
       within &= status == FL_MET;
@@ -178,10 +178,10 @@ static void meet_by_laws(const real *block, fl_work *work, const real *asked, fl
   real tried[FL_MOST][3];
   for (int k = 0; k < 6; k++) missing[k] = (out->aim[k] - asked[k]) / yard[k];
   if (out->within || SQRT(dot(missing, missing, 6)) > 10 * CLOSE) return;
-  memcpy(tried, out->command, COUNT(block) * sizeof *tried);
+  memcpy(tried, out->command, (size_t)COUNT(block) * sizeof *tried);
   const real error = fl_refine_commands(block, work, &work->box, asked, tried, ROUNDS);
   if (error > NEARLY) return;
-  memcpy(out->command, tried, COUNT(block) * sizeof *tried);
+  memcpy(out->command, tried, (size_t)COUNT(block) * sizeof *tried);
   memcpy(out->aim, asked, sizeof out->aim);
   out->within = 1;
   out->value = 0;

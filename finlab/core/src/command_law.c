@@ -12,7 +12,7 @@ static void weights_at(const real *knot, int count, int each, real period, real 
   real begin = knot[0], end = period > 0 ? begin + period : knot[count - 1], held;
   if (period > 0) x -= period * FLOOR((x - begin) / period);
   held = CLIP(x, begin, end);
-  int guess = (int)((held - begin) / (end - begin) * cells); /* mostly right, as most knots are even */
+  int guess = (int)((held - begin) / (end - begin) * (real)cells); /* mostly right, as most knots are even */
   guess = CLIP(guess, 0, cells - 1);
   if (knot[guess] <= held && (guess + 1 == cells || held < knot[guess + 1]))
     low = guess;
@@ -133,10 +133,10 @@ static real on_curve(const real *curve, real value) {
 /* Amplitude and frequency of a fin for a share of its largest force, from a table at shares (j / k)^2. */
 static void beat_at(const real *beat, real share, real *command) {
   int cells = (int)beat[0];
-  real place = SQRT(CLIP(share, 0, 1)) * cells;
+  real place = SQRT(CLIP(share, 0, 1)) * (real)cells;
   int cell = MIN((int)place, cells - 1);
   const real *row = beat + 1 + 2 * cell;
-  for (int k = 0; k < 2; k++) command[k] = row[k] + (row[k + 2] - row[k]) * (place - cell);
+  for (int k = 0; k < 2; k++) command[k] = row[k] + (row[k + 2] - row[k]) * (place - (real)cell);
 }
 
 static void fin_command(const real *block, int i, const fl_box *box, const real *force, real *command) {
@@ -162,7 +162,7 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   real size = size_of(force) / (a->gauge > 0 ? fl_gauge_radius(block + (int)a->gauge, ATAN2(force[1], force[0])) : 1);
   real angle = size > 0 ? ATAN2(force[1], force[0]) : before, way[2][2], missing[2], watts[2];
   for (int k = 0; k < 2; k++) {
-    way[k][0] = fl_clip_number(box, i, 0, 0, angle + k * PI), way[k][1] = fl_clip_number(box, i, 1, 0, k ? -size : size);
+    way[k][0] = fl_clip_number(box, i, 0, 0, angle + (real)k * PI), way[k][1] = fl_clip_number(box, i, 1, 0, k ? -size : size);
     real dx = way[k][1] * COS(way[k][0]) - size * COS(angle), dy = way[k][1] * SIN(way[k][0]) - size * SIN(angle);
     missing[k] = SQRT(dx * dx + dy * dy), watts[k] = fl_power_of_force(block, i, way[k][1]);
   }
@@ -216,11 +216,11 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
 
 /* What commands within a box give: least and largest force [N], of planes below 0 in reverse, and the arc of their
    directions [rad]. */
-reach fl_force_range(const real *block, int i, const fl_box *box) {
+force_range fl_force_range(const real *block, int i, const fl_box *box) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *low = box->low[i];
   const real *high = box->high[i];
-  reach o = {0, 0, 0, 0};
+  force_range o = {0, 0, 0, 0};
   if (a->form == FL_THRUSTER) {
     o.low = a->sign > 0 ? low[0] : -high[0];
     o.high = a->sign > 0 ? high[0] : -low[0];

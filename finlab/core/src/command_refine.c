@@ -97,7 +97,7 @@ real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, con
       }
     new_cost = miss_of(block, work, aim, tried, other);
     if ((moved = new_cost <= cost)) {
-      memcpy(command, tried, n * sizeof *tried);
+      memcpy(command, tried, (size_t)n * sizeof *tried);
       memcpy(miss, other, sizeof miss);
       cost = new_cost, damping *= R(0.3);
     } else

@@ -79,7 +79,7 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
     const fl_actuator *a = ACTUATOR(block, i);
     real own[2], *slope = state->slope[i];
     own_price(work, i, price, own);
-    reply o = fl_response(block, i, work->set + i, own);
+    response o = fl_response(block, i, work->set + i, own);
     state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
     slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
     state->angle[i] = o.angle;

@@ -22,7 +22,7 @@ static void column_of(const real *block, const fl_span *span, int i, int row, re
   const real *axis = law_axis(a, row);
   real sign = 1;
   if (a->form == FL_THRUSTER) sign = a->sign;
-  if (row >= a->rows) sign = 0;
+  if ((real)row >= a->rows) sign = 0;
   if (span->lost[i]) sign = 0;
   for (int k = 0; k < 6; k++) {
     column[k] = 0;
@@ -75,8 +75,8 @@ static void basis_of(const real *block, fl_span *span) {
       span->basis[k][span->range] = q[k];
     }
     for (int p = 0; p < 2 * n; p++) {
-      const real along = dot(rest[p], q, 6);
-      for (int k = 0; k < 6; k++) rest[p][k] -= along * q[k];
+      const real projection = dot(rest[p], q, 6);
+      for (int k = 0; k < 6; k++) rest[p][k] -= projection * q[k];
     }
     span->range++;
   }
@@ -129,7 +129,7 @@ static int prepare_newton(const real *block, fl_work *work) {
   }
   const real trace = fl_trace(h);
   for (int j = 0; j < 6; j++)
-    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * span->range / MAX(trace, TINY) + (j == k ? NEARLY : 0);
+    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * (real)span->range / MAX(trace, TINY) + (j == k ? NEARLY : 0);
   for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
   work->least_trace = NEARLY * trace;
   return span->range == 0 || fl_factor(h);

@@ -60,7 +60,7 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
     full += MAX(fl_power_of_force(block, i, a->high), fl_power_of_force(block, i, a->low));
     if (fl_is_known_command(previous + 3 * i)) power += power_at(block, i, previous + 3 * i);
   }
-  return MAX(power, LEAST_POWER * full) / MAX(count, 1);
+  return MAX(power, LEAST_POWER * full) / (real)MAX(count, 1);
 }
 
 /* Whether rates leave a number of a command all of its range. */
@@ -75,12 +75,12 @@ static void tick_set(const real *block, fl_work *work, int i, const real *before
   fl_set *set = work->set + i;
   const int all_sizes = is_free(block, &work->box, i, 0) && is_free(block, &work->box, i, 1);
   const int all_angles = is_free(block, &work->box, i, 2);
-  reach own = fl_force_range(block, i, &work->box);
+  force_range own = fl_force_range(block, i, &work->box);
   if (a->form == FL_FIN && all_sizes) {
     own.low = a->low;
     own.high = a->high;
   }
-  if (all_sizes && all_angles && !(kappa > 0)) own = (reach){a->least, a->high, a->middle, a->half};
+  if (all_sizes && all_angles && !(kappa > 0)) own = (force_range){a->least, a->high, a->middle, a->half};
   const real low = CLIP(own.low, a->low, a->high);
   const real high = CLIP(own.high, a->low, a->high);
   fl_limit_set(block, i, set, low, high, own.middle, own.half);

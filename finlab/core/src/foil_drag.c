@@ -210,12 +210,12 @@ static real proved_value(const real *block, const fl_work *work, real *most) {
       real limit, own[2], more = 0;
       if (!may_stall(block, work, i, end, &limit)) continue;
       own_price(work, i, work->now->price, own);
-      reply known = fl_response(block, i, work->set + i, own);
+      response known = fl_response(block, i, work->set + i, own);
       real last = end_of(block, a)[1];
       real begin = a->turned + (end ? last : -last);
       for (int k = 1; k <= ROUNDS; k++) {
         fl_tangent t;
-        foil_at(block, i, begin + (limit - begin) * k / ROUNDS, &t);
+        foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &t);
         real worth = dot(own, t.force, 2) - t.cost;
         more = MAX(more, worth - known.conjugate);
       }
@@ -285,7 +285,7 @@ static void lay_nodes(const real *block, const fl_work *work, lattice *l) {
     l->first[f] = node;
     for (int k = 0; k < l->branches[f] * l->each; k++, node++) {
       const real *edge = l->edge[f] + k / l->each;
-      real share = (k % l->each + R(0.5)) / l->each;
+      real share = ((real)(k % l->each) + R(0.5)) / (real)l->each;
       fl_tangent t;
       l->angle[node] = edge[0] + share * (edge[1] - edge[0]);
       foil_at(block, l->foil[f], l->angle[node], &t);

@@ -34,12 +34,12 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
-    memcpy(force + 2 * n * k, out.force, 2 * n * sizeof *force);
+    memcpy(force + 2 * n * k, out.force, (size_t)2 * (size_t)n * sizeof *force);
     memcpy(price + 6 * k, out.price, sizeof out.price);
     memcpy(aim + 6 * k, out.aim, sizeof out.aim);
-    memcpy(command + 3 * n * k, out.command, 3 * n * sizeof *command);
+    memcpy(command + 3 * n * k, out.command, (size_t)3 * (size_t)n * sizeof *command);
     value[k] = out.value;
-    within[k] = out.within;
+    within[k] = (unsigned char)out.within;
     error[k] = out.error;
     ended |= out.ended;
   }
@@ -51,7 +51,7 @@ real fl_look(const real *block, fl_work *work, const real *wrench, const real *i
   real target[6];
   fl_reduce_wrench(work, wrench, target);
   fl_dual_at(block, work, target, inner, work->state);
-  memcpy(force, work->state->force, 2 * COUNT(block) * sizeof *force);
+  memcpy(force, work->state->force, (size_t)2 * (size_t)COUNT(block) * sizeof *force);
   return work->state->value;
 }
 
@@ -68,9 +68,9 @@ int fl_worth(const real *block, fl_work *work, const fl_question *question, cons
       real own[2];
       wide force[2];
       own_price(work, i, inner, own);
-      const real along = fl_support_of_set(block, i, set, own, force);
-      worth->price = set->flipped ? 0 : along;
-      worth->price_back = set->flipped ? along : 0;
+      const real along_force = fl_support_of_set(block, i, set, own, force);
+      worth->price = set->flipped ? 0 : along_force;
+      worth->price_back = set->flipped ? along_force : 0;
       worth->low = set->flipped ? -set->high : set->low;
       worth->high = set->flipped ? -set->low : set->high;
       if (set->reverse > 0) {

@@ -9,10 +9,10 @@ static const real *table_of(const real *block, const fl_actuator *a, int back) {
   return block + (int)(back && a->back > 0 ? a->back : a->ahead);
 }
 
-static along at_price(const real *block, const fl_actuator *a, int back, real price) {
+static line_response at_price(const real *block, const fl_actuator *a, int back, real price) {
   real per = a->share == a->worth ? 1 : a->share / a->worth;
-  along o = fl_force_of_price(table_of(block, a, back), price * per);
-  return (along){o.force * a->share, o.slope * a->share * per, o.conjugate * a->worth};
+  line_response o = fl_force_of_price(table_of(block, a, back), price * per);
+  return (line_response){o.force * a->share, o.slope * a->share * per, o.conjugate * a->worth};
 }
 
 /* Power [W] of a force of an actuator within its tables, of planes below 0 in reverse. */
@@ -77,17 +77,17 @@ void fl_fix_force(const real *block, int i, fl_set *set, const real *force) {
 }
 
 /* The force that is worth most at a price along it, between the limits of a set. */
-along fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
+line_response fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set, int line, real price) {
   int back = set->flipped, narrow = !line && set->half < PI;
   real sign = line && price < 0 ? -1 : 1, size = sign * price;
   if (line) back = price < 0;
-  along o = at_price(block, a, back, narrow ? MAX(size, 0) : size);
+  line_response o = at_price(block, a, back, narrow ? MAX(size, 0) : size);
   o.force *= sign;
   if (narrow && !(size > 0)) o.slope = 0;
   if (o.force <= set->low)
-    o = (along){set->low, 0, price * set->low - set->low_cost};
+    o = (line_response){set->low, 0, price * set->low - set->low_cost};
   else if (o.force >= set->high)
-    o = (along){set->high, 0, price * set->high - set->high_cost};
+    o = (line_response){set->high, 0, price * set->high - set->high_cost};
   return o;
 }
 

@@ -6,18 +6,18 @@
 static const real *knots(const real *table) { return table + 3; }
 
 /* Force, its derivative and the conjugate at a price from 0 on. */
-along fl_force_of_price(const real *table, real price) {
+line_response fl_force_of_price(const real *table, real price) {
   price = MAX(price, 0); /* NaN is 0, too */
   real top = table[0], per = 1 / top, t = price * per, scale = top;
   int cells = (int)table[1];
   const real *knot = knots(table);
   if (!(price < top)) {
     knot += 3 * cells;
-    return (along){knot[0], 0, knot[2] + (price - top) * knot[0]};
+    return (line_response){knot[0], 0, knot[2] + (price - top) * knot[0]};
   }
   if (cells > 1) {
-    int cell = MIN((int)(SQRT(SQRT(t)) * cells), cells - 1);
-    real each = (real)1 / cells, first = cell * each, last = (cell + 1) * each;
+    int cell = MIN((int)(SQRT(SQRT(t)) * (real)cells), cells - 1);
+    real each = 1 / (real)cells, first = (real)cell * each, last = (real)(cell + 1) * each;
     first *= first, last *= last;
     real begin = first * first, width = last * last - begin, over = 1 / width;
     t = (t - begin) * over, per *= over, scale *= width;
@@ -25,7 +25,7 @@ along fl_force_of_price(const real *table, real price) {
   }
   real m0 = knot[1] * scale, m1 = knot[4] * scale, rise = knot[3] - knot[0];
   real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
-  return (along){knot[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) * per,
+  return (line_response){knot[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) * per,
                  knot[2] + scale * t * (knot[0] + t * (m0 * R(0.5) + t * (b * THIRD + t * c * R(0.25))))};
 }
 
@@ -40,7 +40,7 @@ real fl_marginal_cost(const real *table, real size, real *price) {
     else
       high = between;
   }
-  real first = (real)low / cells, last = (real)high / cells;
+  real first = (real)low / (real)cells, last = (real)high / (real)cells;
   first *= first, last *= last;
   real begin = first * first, width = last * last - begin, scale = table[0] * width;
   knot += 3 * low;
@@ -66,15 +66,15 @@ static real place_of(const real *gauge, real angle) {
 }
 
 /* Support function of a gauge in the direction (x, y) of the price, and its two derivatives by the angle. */
-support fl_gauge_support(const real *gauge, real x, real y) {
+gauge_point fl_gauge_support(const real *gauge, real x, real y) {
   int points = (int)gauge[0];
-  real step = 2 * PI / points, place = place_of(gauge, ATAN2(y, x));
+  real step = 2 * PI / (real)points, place = place_of(gauge, ATAN2(y, x));
   int cell = (int)place, next = (cell + 1) % points;
   real t = place - FLOOR(place);
   const real *a = gauge + 1 + 4 * cell, *z = gauge + 1 + 4 * next;
   real m0 = a[1] * step, m1 = z[1] * step, rise = z[0] - a[0];
   real b = 3 * rise - 2 * m0 - m1, c = m0 + m1 - 2 * rise;
-  return (support){a[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / step,
+  return (gauge_point){a[0] + t * (m0 + t * (b + t * c)), (m0 + t * (2 * b + 3 * t * c)) / step,
                    (2 * b + 6 * t * c) / (step * step)};
 }
 

@@ -124,6 +124,6 @@ int fl_answer_with_drag(const real *block, fl_work *work, const real *target, in
       if (work->state->value > value) memcpy(out->inner, work->near, sizeof out->inner);
     }
   }
-  memcpy(out->command, work->placed, COUNT(block) * sizeof out->command[0]);
+  memcpy(out->command, work->placed, (size_t)COUNT(block) * sizeof out->command[0]);
   return out->placed = 1;
 }

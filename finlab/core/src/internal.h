@@ -1,6 +1,6 @@
 /* What the files of the core share. */
-#ifndef FINLAB_INNER_H
-#define FINLAB_INNER_H
+#ifndef FL_INTERNAL_H
+#define FL_INTERNAL_H
 #include "finlab.h"
 #include <math.h>
 #include <string.h>
@@ -57,18 +57,13 @@ typedef fl_wide wide;
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
 #define COUNT(block) ((int)HEAD(block)->n)
 
-/* linear.c */
+/* linear_algebra.c: linear algebra of 6 x 6 matrices */
 static inline real dot(const real *a, const real *b, int n) {
   real sum = 0;
   for (int i = 0; i < n; i++) sum += a[i] * b[i];
   return sum;
 }
 static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
-real fl_wrap_angle(real angle);
-void fl_add_square(real h[6][6], const real *b, real weight);
-real fl_trace(real h[6][6]);
-int fl_factor(real a[6][6]);
-void fl_solve(real a[6][6], const real *right, real *x);
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
@@ -77,78 +72,126 @@ static inline void own_price(const fl_work *work, int i, const real *price, real
   own[0] = dot(work->span.matrix[i][0], price, 6);
   own[1] = dot(work->span.matrix[i][1], price, 6);
 }
+real fl_wrap_angle(real angle);
+void fl_add_square(real h[6][6], const real *b, real weight);
+real fl_trace(real h[6][6]);
+int fl_factor(real a[6][6]);
+void fl_solve(real a[6][6], const real *right, real *x);
 
-/* span.c */
-int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared);
-void fl_offset_wrench(const real *block, fl_span *span);
-int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free);
-
-/* table.c */
-typedef struct { real force, slope, conjugate; } along;
-along fl_force_of_price(const real *table, real price);
+/* force_table.c: tables of force over price, gauges of directions */
+typedef struct { real force, slope, conjugate; } line_response;
+typedef struct { real value, slope, bend; } gauge_point;
+line_response fl_force_of_price(const real *table, real price);
 real fl_marginal_cost(const real *table, real size, real *price);
-typedef struct { real value, slope, bend; } support;
-support fl_gauge_support(const real *gauge, real x, real y);
+gauge_point fl_gauge_support(const real *gauge, real x, real y);
 real fl_gauge_radius(const real *gauge, real angle);
 real fl_gauge_lean(const real *gauge, real angle);
 
-/* reply.c */
-typedef struct { real force[2], xx, xy, yy, conjugate, angle; } reply; /* angle: where turning costs */
+/* force_set.c: what one actuator may give */
 void fl_empty_set(const real *block, int i, fl_set *set);
-along fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set, int line, real price);
-void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, real middle, real half);
+line_response fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set,
+                                  int line, real price);
+void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, real middle,
+                  real half);
 void fl_prepare_set(const real *block, int i, fl_set *set);
 void fl_fix_force(const real *block, int i, fl_set *set, const real *force);
 real fl_power_of_force(const real *block, int i, real force);
-reply fl_response(const real *block, int i, const fl_set *set, const real *price);
-real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force);
 fl_set fl_reversed_set(const fl_set *set);
+
+/* actuator_response.c: forces that are worth most at multipliers, Eq. 5 */
+typedef struct { real force[2], xx, xy, yy, conjugate, angle; } response; /* angle: where turning costs */
+response fl_response(const real *block, int i, const fl_set *set, const real *price);
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force);
 real fl_drag_of_lift(const real *block, int i, real force);
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
-/* turning.c */
-reply fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price);
-int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one, const fl_state *other,
-               const real *step, int is_short);
+/* turning_cost.c: responses where turning costs */
+response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price);
+int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,
+                  const fl_state *other, const real *step, int is_short);
 void fl_mark_jump(fl_set *set, real one, real other);
 
-/* newton.c */
+/* effectiveness.c: what the actuators that work span in the axes that count */
+int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared);
+void fl_offset_wrench(const real *block, fl_span *span);
+int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
+                        const unsigned char *free);
+
+/* command_box.c: commands within their limits */
+int fl_is_known_command(const real *command);
+void fl_clip_commands(const real *block, const fl_box *box, real command[][3]);
+int fl_angle_number(const fl_actuator *a);
+real fl_clip_number(const fl_box *box, int i, int k, int angle, real value);
+void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
+void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
+int fl_force_number(const fl_actuator *a);
+int fl_is_in_dead_band(const fl_actuator *a, const real *command);
+
+/* command_law.c: forces of commands and commands for forces */
+typedef struct { real low, high, middle, half; } force_range;
+void fl_force_of_command(const real *block, int i, const real *command, real *force,
+                         real (*slope)[3]);
+void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force,
+                          const real *before, real *command);
+force_range fl_force_range(const real *block, int i, const fl_box *box);
+void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2],
+                            const real *previous, real command[][3]);
+
+/* command_refine.c: steps on the commands, Eq. 11 */
+real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim,
+                        real command[][3], int steps);
+
+/* feasible_set.c: what may be given now */
+void fl_limits_without_tick(const real *block, fl_work *work);
+void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
+int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
+
+/* dual_newton.c: Newton's method on the dual, Eq. 8 */
 #define MOST_STEPS 200
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
 void fl_dual_start(const real *block, fl_work *work, const real *target, const real *price);
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state);
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price, real *ridge);
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price, int most);
+void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price,
+                fl_state *state);
+void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price,
+                     real *ridge);
+int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price,
+                   int most);
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target);
 void fl_reduce_lambda(const fl_work *work, const real *price, real *inner);
 int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
-/* gaps.c */
+/* set_gaps.c: sets with gaps */
 #define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
 #define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
 int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force);
 int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]);
-real fl_gap_of(const real *block, const fl_work *work, int i, const real *force, real largest, const real *price);
+real fl_gap_of(const real *block, const fl_work *work, int i, const real *force, real largest,
+               const real *price);
 real fl_largest_force(const real *block, real force[][2]);
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force);
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side);
 fl_node *fl_cut_set(const real *block, fl_work *work, int *depth, int cut, const real *force);
 void fl_take_side(const real *block, fl_work *work, const fl_node *node, int side);
 fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *value);
 
-/* drag.c */
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3], real force[][2]);
+/* gap_search.c: least power where sets have gaps */
+int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *value);
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
+                        fl_answer *out);
+
+/* foil_drag.c: commands of robots whose foils drag */
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
+                          real force[][2]);
 void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
 int fl_are_forces_sure(const real *block, fl_work *work);
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out);
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out);
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
+                          real most, fl_answer *out);
 
-/* nearest.c */
+/* nearest_point.c: points near to a wrench beyond reach */
 static inline wide product(const wide *a, const wide *b, int n) {
   wide sum = 0;
   for (int k = 0; k < n; k++) sum += a[k] * b[k];
@@ -164,34 +207,30 @@ static inline void add(wide *to, wide times, const wide *other) {
 wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight);
 void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point);
-wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close, wide apart, fl_mixture *m);
-wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from, const wide *ray, wide least, wide most,
-                    wide close, fl_mixture *m, wide *plane);
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close,
+                      wide apart, fl_mixture *m);
+wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from,
+                           const wide *ray, wide least, wide most, wide close, fl_mixture *m,
+                           wide *plane);
 void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
 
-/* law.c */
-void fl_force_of_command(const real *block, int i, const real *command, real *force, real (*slope)[3]);
-void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force, const real *before, real *command);
-typedef struct { real low, high, middle, half; } reach;
-reach fl_force_range(const real *block, int i, const fl_box *box);
+/* out_of_reach.c: what a policy gives beyond reach */
+void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                     fl_answer *out);
 
-/* now.c */
-void fl_limits_without_tick(const real *block, fl_work *work);
-void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
-int fl_is_known_command(const real *command);
-int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
-void fl_clip_commands(const real *block, const fl_box *box, real command[][3]);
+/* sequential_convex.c, jets.c: actuators that act on each other */
+/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
+typedef void (*fl_effect)(const real *known, const real *force, int count, const real *inflow, real *change, real *wrench,
+                       real *slope);
+typedef struct {
+  fl_effect effect;
+  const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
+  const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
+  real counts[6];     /* 1 of axes that count, else 0 */
+} fl_whole;
+int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns,
+              real *forces, fl_answer *out, real *end);
+void fl_jets(const real *known, const real *force, int count, const real *inflow, real *change,
+             real *wrench, real *slope);
 
-/* command.c */
-int fl_angle_number(const fl_actuator *a);
-real fl_clip_number(const fl_box *box, int i, int k, int angle, real value);
-void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2], const real *previous, real command[][3]);
-real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps);
-void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
-void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
-int fl_force_number(const fl_actuator *a);
-int fl_is_in_dead_band(const fl_actuator *a, const real *command);
-
-/* policy.c */
-void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy, fl_answer *out);
 #endif

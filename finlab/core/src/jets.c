@@ -32,14 +32,14 @@ static meeting meeting_of(const water *w, const outlet *from, const jet *j, cons
   meeting o;
   for (int c = 0; c < 3; c++) o.way[c] = (to->position[c] - from->position[c]) / from->diameter;
   real x = o.along = -dot(o.way, j->ahead, 3), beside = dot(o.way, o.way, 3) - x * x, q = x / w->length;
-  real wide = x * x + w->width * w->width, falls = 1 + q * q * q * q;
+  real width2 = x * x + w->width * w->width, falls = 1 + q * q * q * q;
   o.speed = o.slope = 0; /* to rounding, in double precision: */
-  if (x < -20 * w->behind || w->spread * beside > 40 * wide) return o;
+  if (x < -20 * w->behind || w->spread * beside > 40 * width2) return o;
   real turn = TANH(x / w->behind);
-  real plain = j->speed * EXP(-w->spread * beside / wide) / SQRT(SQRT(falls)) / 2;
+  real plain = j->speed * EXP(-w->spread * beside / width2) / SQRT(SQRT(falls)) / 2;
   o.speed = plain * (1 + turn);
   o.slope = plain * (1 - turn * turn) / w->behind +
-            o.speed * (2 * w->spread * x * (wide + beside) / (wide * wide) - q * q * q / (falls * w->length));
+            o.speed * (2 * w->spread * x * (width2 + beside) / (width2 * width2) - q * q * q / (falls * w->length));
   return o;
 }
 
@@ -90,9 +90,9 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
   int n = (int)w->n;
   jet jets[FL_MOST];
   meeting meets[FL_MOST];
-  memset(change, 0, 3 * n * sizeof *change);
+  memset(change, 0, (size_t)3 * (size_t)n * sizeof *change);
   memset(wrench, 0, 6 * sizeof *wrench);
-  if (slope) memset(slope, 0, 18 * n * sizeof *slope);
+  if (slope) memset(slope, 0, (size_t)18 * (size_t)n * sizeof *slope);
   for (int i = 0; i < n; i++) jets[i] = jet_of(w, p + i, force + 3 * i);
   for (int i = 0; i < n; i++, change += 3) {
     real u[3] = {0}, by_force[3][3] = {{0}}, by_water[3][3] = {{0}}, by[3][6] = {{0}};

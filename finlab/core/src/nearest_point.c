@@ -60,10 +60,10 @@ static void farthest(const real *block, const fl_work *work, const wide *normal,
 
 static void drop(fl_mixture *m, int k) {
   m->count--, m->done = MIN(m->done, k);
-  memmove(m->force + k, m->force + k + 1, (m->count - k) * sizeof m->force[0]);
-  memmove(m->point + k, m->point + k + 1, (m->count - k) * sizeof m->point[0]);
-  memmove(m->share + k, m->share + k + 1, (m->count - k) * sizeof m->share[0]);
-  memmove(m->along + k, m->along + k + 1, (m->count - k) * sizeof m->along[0]);
+  memmove(m->force + k, m->force + k + 1, (size_t)(m->count - k) * sizeof m->force[0]);
+  memmove(m->point + k, m->point + k + 1, (size_t)(m->count - k) * sizeof m->point[0]);
+  memmove(m->share + k, m->share + k + 1, (size_t)(m->count - k) * sizeof m->share[0]);
+  memmove(m->along + k, m->along + k + 1, (size_t)(m->count - k) * sizeof m->along[0]);
 }
 
 static int least_share(const fl_mixture *m) {

@@ -137,7 +137,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
                      fl_answer *out) {
   real wrench[6], aim[6], target[6], size = 0, most = R(1e30);
   fl_wrench_of_forces(block, work, force, wrench);
-  memcpy(out->force, force, COUNT(block) * sizeof out->force[0]);
+  memcpy(out->force, force, (size_t)COUNT(block) * sizeof out->force[0]);
   memcpy(out->aim, wrench, sizeof wrench);
   for (int k = 0; k < 6; k++) {
     real way = (inside[k] - wrench[k]) / work->span.scale[k];
@@ -150,7 +150,7 @@ static void cheapest(const real *block, fl_work *work, real force[][2], const re
     fl_dual_newton(block, work, target, 0, STEPS_AT_KINK);
     if (work->now->size > MAX(AT_RIM, ENOUGH) || work->now->value > most) continue;
     memcpy(out->inner, work->now->price, sizeof out->inner);
-    memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+    memcpy(out->force, work->now->force, (size_t)COUNT(block) * sizeof out->force[0]);
     memcpy(out->aim, aim, sizeof aim);
     if (TOLERANCE < AT_RIM && work->now->size > TOLERANCE) fl_wrench_of_forces(block, work, out->force, out->aim);
     most = (1 - FINE) * work->now->value;
@@ -172,7 +172,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench, co
     real kept = score[k];
     score[k] = node->score[k], node->score[k] = kept;
   }
-  memcpy(force, other, COUNT(block) * sizeof *other);
+  memcpy(force, other, (size_t)COUNT(block) * sizeof *other);
   node->first = -node->first;
   fl_take_side(block, work, node, node->first);
 }
@@ -208,7 +208,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   }
   fl_restore_sets(block, work, work->best_set);
   work->close = CLOSE_BY;
-  if (!are_same(work->best_set, work->kept, n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
+  if (!are_same(work->best_set, work->kept, (size_t)n * sizeof *work->kept)) serve(block, work, wrench, policy, force, best);
   *share = 1 - best[1];
 }
 
@@ -231,16 +231,16 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   if (work->drags) {
     for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + work->span.beside[k];
     int met = fl_answer_with_drag(block, work, target, status, out);
-    if (policy->policy == FL_DIRECTION) fl_largest_ray_share(block, work, wrench, met * share, most, out);
+    if (policy->policy == FL_DIRECTION) fl_largest_ray_share(block, work, wrench, (real)met * share, most, out);
     return;
   }
   if (status == FL_BEYOND) return;
   memcpy(out->inner, work->now->price, sizeof out->inner); /* those of all sets prove more than those of a part */
   int gap = fl_worst_gap(block, work, work->now->force, work->now->price);
   if (gap < 0 && status == FL_MET)
-    memcpy(out->force, work->now->force, COUNT(block) * sizeof out->force[0]);
+    memcpy(out->force, work->now->force, (size_t)COUNT(block) * sizeof out->force[0]);
   else if (gap >= 0 && fl_search_gaps(block, work, target, status, &value)) {
-    memcpy(out->force, work->best, COUNT(block) * sizeof out->force[0]);
+    memcpy(out->force, work->best, (size_t)COUNT(block) * sizeof out->force[0]);
     out->value = work->turns ? 0 : value * (1 - FINE); /* with turning it is more than power */
   }
 }

@@ -5,18 +5,8 @@
 #define TURN_PARTS 200 /* of sets with gaps that are looked at after the first turn, which begins near its answer */
 #define STEPS (ROUNDS / 3) /* of commands, to be exact on the whole model; most times that a step is made shorter */
 
-/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
-typedef void (*effect)(const real *known, const real *force, int count, const real *inflow, real *change, real *wrench,
-                       real *slope);
-typedef struct {
-  effect effect;
-  const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
-  const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
-  real counts[6];     /* 1 of axes that count, else 0 */
-} whole;
-
 /* Makes the wrench of a block linear at commands; their miss of an aim, on the yardstick. */
-static real linear_at(const whole *w, real *block, fl_work *work, const real *aim, real command[][3], real *miss) {
+static real linear_at(const fl_whole *w, real *block, fl_work *work, const real *aim, real command[][3], real *miss) {
   const fl_span *span = &work->span;
   int n = COUNT(block);
   real force[FL_MOST][3], body[FL_MOST][3] = {{0}}, none[FL_MOST][3], offset[6], slope[FL_MOST][3][6];
@@ -54,7 +44,7 @@ static real linear_at(const whole *w, real *block, fl_work *work, const real *ai
 }
 
 /* Has fins of a block commanded as they are, or by direction and size of the force, without their tables. */
-static void command_fins(const whole *w, real *block, int by_force) {
+static void command_fins(const fl_whole *w, real *block, int by_force) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *from = ACTUATOR(w->plain, i);
     fl_actuator *to = (fl_actuator *)ACTUATOR(block, i);
@@ -68,17 +58,17 @@ static void command_fins(const whole *w, real *block, int by_force) {
 
 /* Steps on commands to the aim, by the whole model, which the block is linear at where they end, until an error is
    enough; what is left. */
-static real exact(const whole *w, real *block, fl_work *work, const fl_box *box, const real *aim, real enough,
+static real exact(const fl_whole *w, real *block, fl_work *work, const fl_box *box, const real *aim, real enough,
                   real command[][3]) {
   real miss[6], share = 1, error = linear_at(w, block, work, aim, command, miss);
   for (int k = 0; k < STEPS && error > enough; k++) {
     real tried[FL_MOST][3], near[6], other[6], new_error;
-    memcpy(tried, command, COUNT(block) * sizeof *tried);
+    memcpy(tried, command, (size_t)COUNT(block) * sizeof *tried);
     for (int c = 0; c < 6; c++) near[c] = aim[c] - (1 - share) * miss[c] * HEAD(block)->yard[c];
     fl_refine_commands(block, work, box, near, tried, 1);
     new_error = linear_at(w, block, work, aim, tried, other);
     if (new_error < error) {
-      memcpy(command, tried, COUNT(block) * sizeof *tried);
+      memcpy(command, tried, (size_t)COUNT(block) * sizeof *tried);
       memcpy(miss, other, sizeof miss);
       error = new_error, share = 1;
     } else
@@ -103,7 +93,7 @@ static void box_now(const real *block, fl_work *work, const fl_question *q, fl_b
    commands, and what they end with (4,): power [W], what an error as large as the yardstick counts [W], the error,
    steps of Newton's method and on commands. The second and the last are also taken: what an error counts at least; steps after which no other turn
    is begun. */
-int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *forces,
+int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns, real *forces,
               fl_answer *out, real *end) {
   fl_question q = *question;
   fl_answer own;
@@ -126,7 +116,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   if (previous) enough = 1 / NOTHING;
   real error = exact(w, block, work, &box, q.wrench, enough, command);
   real power = fl_power_of_commands(block, work, command, here);
-  for (int turn = 0; turn < turns && (turn == 0 || steps + work->refined < most_steps); turn++) {
+  for (int turn = 0; turn < turns && (turn == 0 || steps + (real)work->refined < most_steps); turn++) {
     int better = 0;
     if (!fl_prepare_span(block, work, 0)) return FL_BAD_NUMBER;
     const fl_settings usual = work->settings;
@@ -134,7 +124,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
     const int failed = fl_answer_one(block, work, &q, &own);
     work->settings = usual;
     if (failed) return failed;
-    steps += own.steps;
+    steps += (real)own.steps;
     real scaled[6], size = 1;
     for (int k = 0; k < 6; k++) scaled[k] = own.price[k] * HEAD(block)->yard[k];
     worth = MAX(worth, 2 * SQRT(dot(scaled, scaled, 6))); /* twice what it is worth at these prices: an exact penalty */
@@ -153,7 +143,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
       power = new_power;
       error = new_error;
       *out = own;
-      memcpy(here, there, COUNT(block) * sizeof *here);
+      memcpy(here, there, (size_t)COUNT(block) * sizeof *here);
       memcpy(price, out->price, sizeof price);
       q.price = price;
     }
@@ -162,7 +152,7 @@ int fl_settle(const whole *w, real *block, fl_work *work, const fl_question *que
   end[0] = power;
   end[1] = worth;
   end[2] = error;
-  end[3] = steps + work->refined;
+  end[3] = steps + (real)work->refined;
   if (turns == 0) return 0;
   command_fins(w, block, 0);
   box_now(block, work, &q, &box);

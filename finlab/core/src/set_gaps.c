@@ -15,7 +15,7 @@ static real between_ways(const fl_actuator *a, const fl_set *set, const real *fo
   real angle = off_middle(set, force), ends[2] = {set->high, set->reverse};
   if (size <= NEARLY * a->most[0]) return 0;
   for (int way = 0; way < 2; way++)
-    if (FABS(fl_wrap_angle(angle + way * PI)) - set->half <= CLOSE && size <= ends[way] + NEARLY * a->most[0]) return 0;
+    if (FABS(fl_wrap_angle(angle + (real)way * PI)) - set->half <= CLOSE && size <= ends[way] + NEARLY * a->most[0]) return 0;
   return PI;
 }
 
@@ -157,7 +157,7 @@ static void narrow_by_angle(fl_set *set, const real *force, int side) {
   if (set->half >= PI)
     set->middle = fl_wrap_angle(angle + (side > 0 ? 0 : PI));
   else
-    set->middle = fl_wrap_angle(set->middle + side * set->half / 2);
+    set->middle = fl_wrap_angle(set->middle + (real)side * set->half / 2);
   set->half /= 2;
   set->at = set->middle + fl_wrap_angle(set->at - set->middle);
 }

@@ -34,16 +34,16 @@ typedef struct { /* what the pod gives at one angle */
 } at_angle;
 
 /* Best force along a direction at a price v of a newton along it: ahead, or in reverse where it pushes either way. */
-static along best_along(const pod_at_price *x, real v) {
+static line_response best_along(const pod_at_price *x, real v) {
   const fl_set *set = x->set;
   if (v >= 0) return fl_limited_response(x->block, x->a, set, 0, v);
   if (set->reverse > 0) {
     const fl_set back = fl_reversed_set(set);
-    along o = fl_limited_response(x->block, x->a, &back, 0, -v);
+    line_response o = fl_limited_response(x->block, x->a, &back, 0, -v);
     o.force = -o.force;
     return o;
   }
-  return (along){set->low, 0, v * set->low - set->low_cost};
+  return (line_response){set->low, 0, v * set->low - set->low_cost};
 }
 
 static at_angle look_at(const pod_at_price *x, real alpha) {
@@ -51,7 +51,7 @@ static at_angle look_at(const pod_at_price *x, real alpha) {
   const real v = x->p * COS(alpha - x->sigma);
   const real ddv = -v;
   o.dv = -x->p * SIN(alpha - x->sigma);
-  const along best = best_along(x, v);
+  const line_response best = best_along(x, v);
   const real kappa = x->set->turn;
   const real d = alpha - x->set->at;
   o.T = best.force;
@@ -93,7 +93,7 @@ static void window_of(const fl_set *set, real *low, real *high) {
   }
 }
 
-reply fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
+response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   pod_at_price x = {block, a, set, size_of(price), 0};
   if (x.p > 0) x.sigma = ATAN2(price[1], price[0]);
@@ -110,7 +110,7 @@ reply fl_response_with_turning(const real *block, int i, const fl_set *set, cons
     best_alpha = from;
   }
   for (int k = 1; k <= cells && high > low; k++) {
-    const real to = k == cells ? high : low + (high - low) * k / cells;
+    const real to = k == cells ? high : low + (high - low) * (real)k / (real)cells;
     const at_angle after = look_at(&x, to);
     if (before.slope > 0 && after.slope <= 0) {
       const real alpha = root_between(&x, from, to);
@@ -140,7 +140,7 @@ reply fl_response_with_turning(const real *block, int i, const fl_set *set, cons
     const real least = NOTHING * (set->turn + FABS(best.T) * x.p) + TINY;
     over = 1 / MAX(-best.bend, least);
   }
-  reply o;
+  response o;
   o.force[0] = best.T * b[0];
   o.force[1] = best.T * b[1];
   o.xx = best.dT * b[0] * b[0] + over * m[0] * m[0];

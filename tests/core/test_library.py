@@ -1,0 +1,81 @@
+"""The core as a C library that others link: warnings, names of the linker, several robots in one program."""
+
+import itertools
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from finlab import core
+from finlab.core.library import PATH
+from finlab.deploy.c_sources import c_sources, write_c
+from finlab.layout import load_layout
+
+CORE = Path(core.__path__[0])
+STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wshadow -pedantic -Wmissing-prototypes -Werror".split()
+MAIN = """
+#include "A/fl_a.h"
+#include "catamaran/fl_catamaran.h"
+#include <cmath>
+
+int main() {
+  const double wrench[6] = {1, 0, 0, 0, 0, 0};
+  const double broken[6] = {NAN, 0, 0, 0, 0, 0};
+  double fins[FL_A_COUNT][3];
+  double later[FL_A_COUNT][3];
+  double pods[FL_CATAMARAN_COUNT][3];
+  if (fl_a_allocate(wrench, nullptr, fins) || fl_catamaran_allocate(wrench, nullptr, pods)) return 1;
+  if (fl_a_allocate(wrench, fins, later)) return 2;
+  if (!fl_a_allocate(broken, nullptr, later)) return 3;
+  if (!(pods[FL_CATAMARAN_LEFT][1] > 0)) return 4;
+  return fl_a_selftest() + fl_catamaran_selftest();
+}
+"""
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("single", [[], ["-DFL_SINGLE"]], ids=["double", "single"])
+def test_no_compiler_warns(compiler: str, single: list[str]) -> None:
+    for source in sorted((CORE / "src").glob("*.c")):
+        words = [compiler, *STRICT, *single, "-fsyntax-only", f"-I{CORE}", str(source)]
+        subprocess.run(words, check=True)
+
+
+def _global_names(binary: Path) -> set[str]:
+    words = ["nm", "-g", "--defined-only", str(binary)]
+    text = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    return {line.split()[-1] for line in text.splitlines() if len(line.split()) == 3}
+
+
+def test_the_linker_sees_no_name_without_prefix() -> None:
+    names = {name for name in _global_names(PATH) if not name.startswith("_")}
+    assert "fl_answer_one" in names
+    assert not {name for name in names if not name.startswith("fl_")}
+
+
+def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
+    objects = []
+    for name in ("A", "catamaran"):
+        folder = tmp_path / name
+        write_c(c_sources(load_layout(name)), folder)
+        for source in sorted(folder.glob("*.c")):
+            made = folder / f"{source.stem}.o"
+            words = ["gcc", *STRICT, "-DFL_NO_MAIN", "-c", str(source), "-o", str(made)]
+            subprocess.run(words, check=True, cwd=folder)
+            objects.append(made)
+    names = set(itertools.chain.from_iterable(map(_global_names, objects)))
+    assert {"fl_a_answer_one", "fl_catamaran_answer_one"} < names
+    assert not {name for name in names if not name.startswith("fl_")}
+    (tmp_path / "main.cpp").write_text(MAIN)
+    program = tmp_path / "main"
+    words = ["g++", "-std=c++17", "-Wall", "-Wextra", "-pedantic", "-Werror", "main.cpp"]
+    subprocess.run([*words, *map(str, objects), "-lm", "-o", str(program)], check=True, cwd=tmp_path)
+    subprocess.run([str(program)], check=True)
+
+
+def test_every_header_compiles_alone_in_c_and_cpp() -> None:
+    for header in ("finlab.h", "fl_work.h"):
+        for words in (["gcc", *STRICT], ["g++", "-std=c++17", "-Wall", "-pedantic", "-Werror"]):
+            language = "c" if words[0] == "gcc" else "c++"
+            command = [*words, "-x", language, "-fsyntax-only", str(CORE / header)]
+            subprocess.run(command, check=True)
