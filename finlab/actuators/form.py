@@ -1,4 +1,7 @@
-"""Numbers for the core (finlab/core/src/command_law.c): how forces of actuators become commands, and commands forces."""
+"""Numbers for the core: how forces of actuators become commands, and commands forces.
+
+finlab/core/src/command_law.c reads them.
+"""
 
 from collections.abc import Callable, Sequence
 from itertools import product

@@ -265,11 +265,7 @@ class Core:
         if error:
             raise CommandError(_REFUSED.format(CODES[error]))
         return Worth(
-            worth["price"],
-            worth["price_back"],
-            worth["conjugate"],
-            worth["low"][:1],
-            worth["high"][:1],
+            worth["price"], worth["price_back"], worth["conjugate"], worth["low"][:1], worth["high"][:1]
         )
 
 

@@ -144,7 +144,7 @@ def _rows_of_commands(layout: Layout, prefix: str) -> str:
     return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"
 
 
-_HEADER = """/* The robot {title} for the functions of finlab.h. One robot in a file: for several use fl_{name}.h. */
+_HEADER = """/* The robot {title} for the functions of finlab.h. One robot a file; for several use fl_{name}.h. */
 #ifndef FL_ROBOT_H
 #define FL_ROBOT_H
 #include "finlab.h"
@@ -161,7 +161,8 @@ extern "C" {{
 extern const fl_real robot[];    /* its block of numbers */
 extern const int robot_length;   /* how many */
 int robot_selftest(void);        /* how many answers differ from the library's */
-#define ROBOT_ACTUATOR(i) ((const fl_actuator *)(const void *)((const fl_head *)(const void *)robot + 1) + (i))
+#define ROBOT_HEAD ((const fl_head *)(const void *)robot)
+#define ROBOT_ACTUATOR(i) ((const fl_actuator *)(const void *)(ROBOT_HEAD + 1) + (i))
 
 {rows}
 #ifdef __cplusplus
@@ -170,7 +171,7 @@ int robot_selftest(void);        /* how many answers differ from the library's *
 #endif
 """
 
-_PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++; several robots may be in one program. */
+_PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++; a program may have several robots. */
 #ifndef FL_{upper}_H
 #define FL_{upper}_H
 #ifdef __cplusplus
@@ -178,8 +179,8 @@ extern "C" {{
 #endif
 
 {rows}
-/* Finds commands of least power for a wrench; beyond reach those that give the largest share of it. Not for several
-   threads at once.
+/* Finds commands of least power for a wrench; beyond reach those that give the largest share of
+   it. Not for several threads at once.
 
    @param wrench    (6,) Fx, Fy, Fz [N], Tx, Ty, Tz [N m], body frame: x forward, y left, z up
    @param previous  (count, 3) commands of the tick before, from which rates hold; 0 for none

@@ -52,7 +52,9 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     copy = copied(tmp_path)
     sources = sorted(map(str, (copy / "core" / "src").glob("*.c")))
     library = str(copy / "core" / "libfinlab.so")
-    subprocess.run(["gcc", *FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"], check=True)
+    subprocess.run(
+        ["gcc", *FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"], check=True
+    )
     said = {}
     for name, place in (("now", Path(finlab.__file__).parents[1]), ("more", tmp_path)):
         out = tmp_path / name

@@ -12,7 +12,16 @@ from finlab.deploy.c_sources import c_sources, write_c
 from finlab.layout import load_layout
 
 CORE = Path(core.__path__[0])
-STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wshadow -pedantic -Wmissing-prototypes -Werror".split()
+STRICT = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Wmissing-prototypes",
+    "-Werror",
+]
 MAIN = """
 #include "A/fl_a.h"
 #include "catamaran/fl_catamaran.h"

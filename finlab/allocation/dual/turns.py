@@ -4,7 +4,8 @@ With y the forces and o(y) what the actuators do to each other, a turn takes o(y
 the last forces. Its answer is exact and cheapest on that linear model; Levenberg-Marquardt steps make it
 exact on the whole one, and shorter steps are taken where it is no cheaper. Where the turns settle, the
 gradient of the power lies in the range of the slope of the whole model: the conditions of Karush, Kuhn and
-Tucker hold there (sequential convex programming). The turns themselves are in finlab/core/src/sequential_convex.c.
+Tucker hold there (sequential convex programming). The turns themselves are in
+finlab/core/src/sequential_convex.c.
 """
 
 from typing import Any

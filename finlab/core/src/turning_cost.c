@@ -13,7 +13,7 @@
                  T' b b'                   at its ends
 
    Where kappa is large beside p T, h is concave and there is one answer: a pod that pushes either way passes through rest
-   without turning. Else there may be two maxima, and the answer jumps between them as the price moves: newton.c sees it. */
+   without turning. Else there may be two maxima, and the answer jumps between them as the price moves: dual_newton.c sees it. */
 #include "internal.h"
 
 #define CELL R(0.12)   /* width [rad] of the cells of a window in which h' is taken to change its sign once at most */
