@@ -144,7 +144,8 @@ def _rows_of_commands(layout: Layout, prefix: str) -> str:
     return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"
 
 
-_HEADER = """/* The robot {title} for the functions of finlab.h. One robot a file; for several use fl_{name}.h. */
+_HEADER = """/* The robot {title} for the functions of finlab.h. One robot a file; else see
+   fl_{name}.h. */
 #ifndef FL_ROBOT_H
 #define FL_ROBOT_H
 #include "finlab.h"
@@ -171,7 +172,8 @@ int robot_selftest(void);        /* how many answers differ from the library's *
 #endif
 """
 
-_PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++; a program may have several robots. */
+_PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++.
+   A program may have several robots. */
 #ifndef FL_{upper}_H
 #define FL_{upper}_H
 #ifdef __cplusplus

@@ -62,8 +62,8 @@ def _compiled() -> bytes:
     headers = package_files("ziglang") / "lib" / "libc" / "include"
     words = "cc -std=c99 -O2 -ffp-contract=off -fno-math-errno -mbulk-memory -target wasm32-wasi -nostdlib -s"
     words += " -DFL_MOST=16 -Wl,--no-entry -Wl,--import-symbols"
-    include = [f"-I{core}", *(f"-isystem{headers / name}" for name in ("wasm-wasi-musl", "generic-musl"))]
     core = ROOT / "finlab" / "core"
+    include = [f"-I{core}", *(f"-isystem{headers / name}" for name in ("wasm-wasi-musl", "generic-musl"))]
     sources = sorted(map(str, (core / "src").glob("*.c")))
     with TemporaryDirectory() as folder:
         made = Path(folder) / "finlab.wasm"
