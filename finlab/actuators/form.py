@@ -31,9 +31,20 @@ class Form(NamedTuple):
     foil: coefficients of lift, rising, and angles (K, 2)."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
-    numbers: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    """Sign of a thruster's command; lean, unevenness and its angle of a fin, or the course of a foil as lean;
-    pressure [N], angle without lift and drag there of a foil."""
+    sign: float = 1.0
+    """Of a thruster's command over its force: -1 where it only pulls."""
+    lean: float = 0.0
+    """Angle [rad] from the command of a fin to its force; of a foil the direction of travel."""
+    uneven: float = 0.0
+    """Of a fin, whose force grows by the factor 1 + uneven cos(angle - uneven_at)."""
+    uneven_at: float = 0.0
+    """See `uneven` [rad]."""
+    pressure: float = 1.0
+    """Dynamic pressure times area of a foil [N]."""
+    zero_lift_angle: float = 0.0
+    """Command of a foil at which it has no lift [rad]."""
+    zero_lift_drag: float = 0.0
+    """Coefficient of its drag there."""
 
 
 def grid_numbers(

@@ -170,9 +170,8 @@ def given_force(part: Any) -> tuple[float, float]:
 def form_of(kind: Literal["thruster", "pod"], given: Array, sign: float = 1.0) -> Form:
     """Returns how the forces of one become commands, by the least and most force (2,) that it gives [N] and
     the sign of a thruster's command: the law of one whose commands all lie in its dead band gives nothing."""
-    usual = Form(kind)
-    axes = None if given.any() else np.zeros((3, 3))
-    return usual._replace(axes=axes, numbers=(sign, *usual.numbers[1:]))
+    gives_nothing = not given.any()
+    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, sign=sign)
 
 
 def _law_of(table: PowerTable) -> PowerLaw:

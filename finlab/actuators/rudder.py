@@ -66,7 +66,8 @@ class Met(NamedTuple):
 
     def force(self, lift: Array, drag: Array) -> Array:
         """Returns forces (..., n, 3) [N] in own frames of coefficients (..., n)."""
-        cos, sin = np.cos(self.course), np.sin(self.course)
+        cos = np.cos(self.course)
+        sin = np.sin(self.course)
         force = np.zeros((*lift.shape, 3))
         force[..., 1] = -self.pressure * (drag * cos + lift * sin)
         force[..., 2] = self.pressure * (lift * cos - drag * sin)
@@ -93,23 +94,39 @@ class RudderLaw(ActuatorLaw):
         return Met(np.sqrt(square), self.half_density_area * square, course)
 
     def coefficients(self, angle: Array) -> Coefficients:
-        """Returns lift and drag of angles (..., n) [rad] from the direction of travel to the chord."""
+        """Returns lift and drag of foils with stall (Beard and McLain, 2012, section 4.2).
+
+        Args:
+            angle: from the direction of travel to the chord (..., n) [rad].
+
+        Returns:
+            Coefficients (..., n), with their derivatives [1/rad].
+        """
         a = np.mod(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+        sin = np.sin(a)
+        cos = np.cos(a)
+
+        # The logistic blend sigma: 0 below stall, 1 beyond it, either way.
         up = 0.5 * (1.0 + np.tanh(0.5 * SHARPNESS * (a - self.stall)))
         down = 0.5 * (1.0 - np.tanh(0.5 * SHARPNESS * (a + self.stall)))
-        parted = up + down - up * down
-        by_parted = SHARPNESS * (1.0 - up) * (1.0 - down) * (up - down)
-        sin, cos = np.sin(a), np.cos(a)
-        lift, plate = self.slope * a, 2.0 * np.abs(sin) * sin * cos
-        drag, behind = self.induced * lift * lift, 2.0 * sin * sin
-        plate_slope = 4.0 * np.abs(sin) * cos * cos - 2.0 * np.abs(sin) * sin * sin
+        sigma = up + down - up * down
+        sigma_slope = SHARPNESS * (1.0 - up) * (1.0 - down) * (up - down)
+
+        # Below stall: CL = slope a, CD = CD0 + k CL^2. Beyond it: those of a flat plate.
+        lift = self.slope * a
+        induced_drag = self.induced * lift * lift
+        plate_lift = 2.0 * np.abs(sin) * sin * cos
+        plate_drag = 2.0 * sin * sin
+        plate_lift_slope = 4.0 * np.abs(sin) * cos * cos - 2.0 * np.abs(sin) * sin * sin
         return Coefficients(
-            lift + parted * (plate - lift),
-            self.drag + drag + parted * (behind - drag),
-            self.slope + parted * (plate_slope - self.slope) + by_parted * (plate - lift),
-            2.0 * self.induced * self.slope * lift * (1.0 - parted)
-            + parted * 4.0 * sin * cos
-            + by_parted * (behind - drag),
+            lift=lift + sigma * (plate_lift - lift),
+            drag=self.drag + induced_drag + sigma * (plate_drag - induced_drag),
+            lift_slope=self.slope
+            + sigma * (plate_lift_slope - self.slope)
+            + sigma_slope * (plate_lift - lift),
+            drag_slope=2.0 * self.induced * self.slope * lift * (1.0 - sigma)
+            + sigma * 4.0 * sin * cos
+            + sigma_slope * (plate_drag - induced_drag),
         )
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
@@ -142,27 +159,46 @@ class RudderGroup(Group):
     feels_flow = True
 
     def __init__(self, rudders: Sequence["Rudder"], effectiveness: Array) -> None:
-        """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; they are at rest."""
-        self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
+        """Prepares rudders at rest.
+
+        Args:
+            rudders: m of them.
+            effectiveness: wrench (m, 3, 6) per newton along each own axis [1, m].
+        """
+        count = len(rudders)
+        self._law = RudderLaw(rudders)
+        self._effectiveness = effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
-        angle = np.linspace(0.0, 0.3 * np.pi, CELLS)[:, None] + np.zeros(len(rudders))
-        result = self._law.coefficients(angle)
-        self._curves, self._tables = [], []
-        around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, CELLS, endpoint=False)
-        whole = self._law.coefficients(around[:, None] + np.zeros(len(rudders)))
-        still = np.zeros(1)
-        self._grids = [
-            grid_numbers((still, still, around), np.stack(pair, axis=-1)[None, None], period=np.pi)
-            for pair in zip(whole.lift.T, whole.drag.T, strict=True)
-        ]
+        self._grids = self._coefficient_grids(count)
+        self._curves: list[tuple[Array, Array, Array]] = []
+        self._tables: list[RadialTable] = []
+        angle = np.linspace(0.0, 0.3 * np.pi, CELLS)
+        result = self._law.coefficients(np.repeat(angle[:, None], count, axis=1))
         for lift, drag in zip(result.lift.T, result.drag.T, strict=True):
-            falls = np.append(np.diff(lift) <= 0.0, True)
-            last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
-            self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
-            rise = np.maximum(drag[:last] - drag[0], LEAST_DRAG * lift[:last] ** 2)
-            curve = Curve(*lower_hull(lift[:last], drag[0] + rise))
-            self._tables.append(radial_table(curve, 1, 0.0, float(lift[last - 1])))
-        self._meet(np.zeros((len(rudders), 3)))
+            self._add_curve(angle, lift, drag)
+        self._meet(np.zeros((count, 3)))
+
+    def _coefficient_grids(self, count: int) -> list[Array]:
+        """Lift and drag of each of `count` foils over all angles, as grids for the core."""
+        around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, CELLS, endpoint=False)
+        result = self._law.coefficients(np.repeat(around[:, None], count, axis=1))
+        no_axis = np.zeros(1)
+        grids = []
+        for lift, drag in zip(result.lift.T, result.drag.T, strict=True):
+            values = np.stack([lift, drag], axis=-1)[None, None]
+            grids.append(grid_numbers((no_axis, no_axis, around), values, period=np.pi))
+        return grids
+
+    def _add_curve(self, angle: Array, lift: Array, drag: Array) -> None:
+        """Adds the rising part of the curve of one foil's coefficients over angles (CELLS,) from 0 on, and
+        the table of lift over price that follows from it."""
+        falls = np.append(np.diff(lift) <= 0.0, True)
+        largest = lift[np.argmax(falls)]
+        last = int(np.argmax(lift >= PEAK * largest)) + 1
+        self._curves.append((lift[:last], angle[:last], drag[:last]))
+        induced_drag = np.maximum(drag[:last] - drag[0], LEAST_DRAG * lift[:last] ** 2)
+        curve = Curve(*lower_hull(lift[:last], drag[0] + induced_drag))
+        self._tables.append(radial_table(curve, 1, 0.0, float(lift[last - 1])))
 
     def at(self, inflow: Array | None) -> "RudderGroup":
         other = copy(self)
@@ -197,21 +233,30 @@ class RudderGroup(Group):
 
     def worth(self, price: Array) -> Array:
         """See `Group`: by the law at many deflections, more around the best of them, a parabola."""
-        gain, cost = price @ self._across.T, self._met.speed - price @ self._against.T
-        low, high = (ends + 0.0 * gain for ends in self._limits.T)
+        gain = price @ self._across.T
+        drag_cost = self._met.speed - price @ self._against.T
+        low = self._limits[:, 0] + 0.0 * gain
+        high = self._limits[:, 1] + 0.0 * gain
         for count in (POINTS, 16, 16):
             step = (high - low) / count
             angle = low + step * np.arange(count + 1)[:, None, None]
             result = self._law.coefficients(angle - self._met.course)
-            worth = gain * result.lift - cost * (result.drag - self._law.drag)
-            best = np.clip(worth.argmax(axis=0)[None], 1, count - 1)
+            conjugate = gain * result.lift - drag_cost * (result.drag - self._law.drag)
+            best = np.clip(conjugate.argmax(axis=0)[None], 1, count - 1)
             middle = np.take_along_axis(angle, best, axis=0)[0]
-            low, high = middle - step, middle + step
-        before, at, after = (np.take_along_axis(worth, best + k, axis=0)[0] for k in (-1, 0, 1))
-        rise, bend = 0.5 * (after - before), np.minimum(before - 2.0 * at + after, -1e-300)
-        offset = np.clip(-rise / bend, -1.0, 1.0)
-        most = np.maximum(worth.max(axis=0), at + offset * (rise + 0.5 * offset * bend))
-        return np.asarray(self._met.pressure * (most - self._met.speed * self._law.drag))
+            low = middle - step
+            high = middle + step
+
+        # The parabola through the best of the last angles and its neighbours.
+        before = np.take_along_axis(conjugate, best - 1, axis=0)[0]
+        at = np.take_along_axis(conjugate, best, axis=0)[0]
+        after = np.take_along_axis(conjugate, best + 1, axis=0)[0]
+        slope = 0.5 * (after - before)
+        curvature = np.minimum(before - 2.0 * at + after, -1e-300)
+        x = np.clip(-slope / curvature, -1.0, 1.0)
+        peak = at + x * (slope + 0.5 * x * curvature)
+        largest = np.maximum(conjugate.max(axis=0), peak)
+        return np.asarray(self._met.pressure * (largest - self._met.speed * self._law.drag))
 
     @property
     def beside(self) -> Array:
@@ -235,15 +280,24 @@ class RudderGroup(Group):
 
     @property
     def forms(self) -> list[Form]:
-        forms, (pressure, course) = [], (self._met.pressure, self._met.course)
+        forms = []
         for i, (lifts, angles, _) in enumerate(self._curves):
-            cos, sin = np.cos(course[i]), np.sin(course[i])
-            axes = np.array([[0.0, -sin, cos], [0.0, -cos, -sin], [0.0, 0.0, 0.0]])
-            foil = (max(pressure[i], NOTHING), self._turned[i], self._law.drag[i])
-            numbers = (1.0, course[i], 0.0, 0.0, *foil)
-            forms.append(
-                Form("foil", axes, self._grids[i], np.stack([lifts, angles], axis=-1), numbers=numbers)
+            course = self._met.course[i]
+            cos = np.cos(course)
+            sin = np.sin(course)
+            lift_axis = [0.0, -sin, cos]
+            drag_axis = [0.0, -cos, -sin]
+            form = Form(
+                "foil",
+                axes=np.array([lift_axis, drag_axis, [0.0, 0.0, 0.0]]),
+                law=self._grids[i],
+                beat=np.stack([lifts, angles], axis=-1),
+                lean=course,
+                pressure=max(self._met.pressure[i], NOTHING),
+                zero_lift_angle=self._turned[i],
+                zero_lift_drag=self._law.drag[i],
             )
+            forms.append(form)
         return forms
 
 

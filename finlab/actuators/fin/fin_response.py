@@ -151,10 +151,17 @@ def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
 
 
 def _form(law: FinLaw, box: "_Box", beat: Array, gauge: Array | None, deflection: Array) -> Form:
-    uneven, lean = law.unevenness, float(deflection[0]) if gauge is None else float(law.offset)
-    numbers = (1.0, lean, *uneven, 1.0, 0.0, 0.0)
-    grid = law.grid_numbers(box.lower, box.upper)
-    return Form("fin", None, grid, beat, None if gauge is None else deflection, numbers)
+    uneven, uneven_at = law.unevenness
+    is_even = gauge is None
+    return Form(
+        "fin",
+        law=law.grid_numbers(box.lower, box.upper),
+        beat=beat,
+        deflection=None if is_even else deflection,
+        lean=float(deflection[0]) if is_even else float(law.offset),
+        uneven=uneven,
+        uneven_at=uneven_at,
+    )
 
 
 class _Box:

@@ -31,57 +31,87 @@ class DualRobot:
         doubt: Array | None = None,
         counts: Array | None = None,
     ) -> None:
-        """Takes what the actuators offer, how forces become commands, least and largest commands, largest
-        changes in a tick and free angles (n, 3), the wrench (n, 3, 6) per newton along their own axes, the
-        yardstick (6,) of errors, the wrench (6,) on top of that of the forces [N, N m], what a squared
-        force of each foil costs beside its power (n,) [W/N^2], and 1 of axes (6,) that count, else 0."""
-        self.responses, self._forms, self._limits = responses, forms, limits
-        self.yardstick, self.beside = yardstick, np.zeros(6) if beside is None else beside
+        """Prepares a robot for the core.
+
+        Args:
+            responses: what each actuator offers for prices.
+            forms: how the forces of each become commands.
+            limits: least and largest commands (n, 3), largest changes in a tick (n, 3), and which angles
+                turn freely (n, 3).
+            effectiveness: wrench (n, 3, 6) per newton along the actuators' own axes [1, m].
+            yardstick: scale (6,) of errors [N, N m].
+            beside: wrench (6,) on top of that of the forces [N, N m], such as the drag of foils; None for
+                none.
+            doubt: what a squared force of each foil costs beside its power (n,) [W/N^2]; None for nothing.
+            counts: 1 of axes (6,) that the robot commands, else 0; None where it commands all.
+        """
+        n = len(responses)
+        self.responses = responses
+        self._forms = forms
+        self._limits = limits
+        self.yardstick = yardstick
+        self.beside = np.zeros(6) if beside is None else beside
         self._counts = np.ones(6) if counts is None else counts
-        self._doubt = np.zeros(len(responses)) if doubt is None else doubt
-        self.ends = np.array([each.ends for each in responses])
+        self._doubt = np.zeros(n) if doubt is None else doubt
+        self.ends = np.array([response.ends for response in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
-        self.lines = np.array([isinstance(each, Line) for each in responses])
+        self.lines = np.array([isinstance(response, Line) for response in responses])
         """Which have one direction (n,)."""
-        speeds = [
-            each.speed if isinstance(each, Line) and each.drag is not None else 0.0 for each in responses
-        ]
-        self.speed = np.array(speeds)
+        self.speed = np.array([_drag_speed(response) for response in responses])
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
-        sizes = np.abs(self.ends).max(axis=1)
-        drag = np.array([self._drag(i, size) for i, size in enumerate(sizes)])
-        second = np.where(self.lines, drag, sizes)
-        self._sizes = np.stack([sizes, second], axis=1)
+        self._sizes = self._largest_forces()
         self.most = self._sizes + 1e-12
         """Largest force (n, 2) [N] along each direction."""
-        gain = self.most[:, :1] / np.array([[_usual_price(each)] for each in responses])
-        self._gain = gain * (self.most / self.most[:, :1]) ** [0.0, 2.0]
-        tables = _Tables(tables_begin(len(responses)))
-        self._places = [tables.of(*each) for each in zip(responses, forms, strict=True)]
+        self._gain = self._gains()
+        tables = _Tables(tables_begin(n))
+        self._offsets = [tables.of(*pair) for pair in zip(responses, forms, strict=True)]
         self._tables = tables.numbers
-        self.effectiveness = np.array([each.rows for each in responses])
+        self.effectiveness = np.array([response.rows for response in responses])
         """Wrench (n, 2, 6) per newton along each direction."""
-        self.axes = np.array([np.eye(3) if form.axes is None else form.axes for form in forms])
+        self.axes = np.array([_axes_of(form) for form in forms])
         """Axes (n, 3, 3) of the laws' forces in the actuators' own ones."""
         self._own = self.axes @ effectiveness / yardstick
-        scaled = (self.effectiveness * self._sizes[..., None]).reshape(-1, 6)
-        size = np.sqrt((scaled**2).sum(axis=0))
-        self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
+        self.scale = self._wrench_sizes()
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
-        self.basis = self.span(np.ones(len(responses), bool), np.ones(6, bool))
+        self.basis = self.span(np.ones(n, bool), np.ones(6, bool))
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
         self.block = self._block()
         """The numbers that the core reads; see finlab/core/fl_fields.h."""
-        self.core = Core(self.block, len(responses))
+        self.core = Core(self.block, n)
         """The robot in the core."""
+
+    def _largest_forces(self) -> Array:
+        """Largest forces (n, 2) [N] along both directions; the second one of a foil is its drag."""
+        largest = np.abs(self.ends).max(axis=1)
+        drag = np.array([self._drag(i, force) for i, force in enumerate(largest)])
+        second = np.where(self.lines, drag, largest)
+        return np.stack([largest, second], axis=1)
+
+    def _gains(self) -> Array:
+        """Forces over prices (n, 2) [N^2/W] at the largest force, by half of it; of drag, which grows with
+        the square of lift, by the square of its share."""
+        usual_price = np.array([[_usual_price(response)] for response in self.responses])
+        gain = self.most[:, :1] / usual_price
+        share = self.most / self.most[:, :1]
+        exponent = [0.0, 2.0]
+        return np.asarray(gain * share**exponent)
+
+    def _wrench_sizes(self) -> Array:
+        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
+        columns = (self.effectiveness * self._sizes[..., None]).reshape(-1, 6)
+        size = np.sqrt((columns**2).sum(axis=0))
+        largest = max(size.max(), 1e-300)
+        return np.where(size > NOTHING * largest, size, 1.0)
 
     def span(self, works: NDArray[np.bool_], counts: NDArray[np.bool_]) -> Array:
         """Returns directions (6, r) of scaled wrenches, orthonormal, that the actuators which work (n,) drive
         in the axes that count (6,)."""
         scaled = self.effectiveness * self._sizes[..., None] / self.scale
-        columns = np.where(works[:, None, None] & counts, scaled, 0.0).reshape(-1, 6).T
-        left, values, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.asarray(left[:, values > NOTHING * max(values[0], 1e-300)])
+        is_driven = works[:, None, None] & counts
+        columns = np.where(is_driven, scaled, 0.0).reshape(-1, 6).T
+        left, singular_values, _ = np.linalg.svd(columns, full_matrices=False)
+        least = NOTHING * max(singular_values[0], 1e-300)
+        return np.asarray(left[:, singular_values > least])
 
     @cached_property
     def largest_power(self) -> float:
@@ -93,8 +123,10 @@ class DualRobot:
         """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
         if self.speed[i] == 0.0:
             return 0.0
-        cost, rest = power_of(self.responses[i], np.array(force)), self.responses[i].table.rest
-        return float((cost - rest) / self.speed[i])
+        response = self.responses[i]
+        power = power_of(response, np.array(force))
+        power_at_rest = response.table.rest
+        return float((power - power_at_rest) / self.speed[i])
 
     def _block(self) -> Array:
         """The robot as the core reads it: head, actuators, then the tables."""
@@ -124,15 +156,15 @@ class DualRobot:
         actuators["upper"] = upper
         actuators["step"] = np.minimum(step, 1e30)  # C reads no infinity
         actuators["turns"] = np.any(turns, axis=1)
-        described = zip(actuators, self.responses, self._forms, self._places, strict=True)
-        for actuator, response, form, places in described:
-            _describe(actuator, response, form, places)
+        described = zip(actuators, self.responses, self._forms, self._offsets, strict=True)
+        for actuator, response, form, offsets in described:
+            _describe(actuator, response, form, offsets)
 
         head["length"] = tables_begin(len(actuators)) + len(self._tables)
         return np.concatenate([numbers_of(head), numbers_of(actuators), self._tables])
 
 
-def _describe(actuator: Any, response: Response, form: Form, places: "TablePlaces") -> None:
+def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffsets") -> None:
     """Writes what one actuator offers, and how its forces become commands, into its fields."""
     _, share, worth = response.table.origin
     actuator["share"] = share
@@ -149,14 +181,19 @@ def _describe(actuator: Any, response: Response, form: Form, places: "TablePlace
             actuator["least"] = 0.0
 
     actuator["form"] = _KINDS.index(form.kind)
-    for field, place in places._asdict().items():
-        actuator[field] = place
-    for field, number in zip(_CONVERSION, form.numbers, strict=True):
-        actuator[field] = number
+    for field, offset in offsets._asdict().items():
+        actuator[field] = offset
+    actuator["sign"] = form.sign
+    actuator["lean"] = form.lean
+    actuator["uneven"] = form.uneven
+    actuator["uneven_at"] = form.uneven_at
+    actuator["pressure"] = form.pressure
+    actuator["turned"] = form.zero_lift_angle
+    actuator["rest"] = form.zero_lift_drag
 
 
-class TablePlaces(NamedTuple):
-    """Where the tables of one actuator lie in the block, by the fields that name them; 0 for none."""
+class TableOffsets(NamedTuple):
+    """Offsets of one actuator's tables in the block, by the fields that hold them; 0 for none."""
 
     ahead: int
     back: int
@@ -166,45 +203,47 @@ class TablePlaces(NamedTuple):
 
 
 _KINDS = "thruster", "pod", "fin", "foil"
-
-
-_CONVERSION = ("sign", "lean", "uneven", "uneven_at", "pressure", "turned", "rest")
-"""Fields of an actuator that turn a force into a command, in the order of `Form.numbers`."""
+"""In the order of FL_THRUSTER ... in finlab/core/finlab.h."""
 
 
 class _Tables:
-    """Tables at the end of a block, each once."""
+    """Tables at the end of a block; what several actuators share stands there once."""
 
-    def __init__(self, start: int) -> None:
+    def __init__(self, begin: int) -> None:
+        """Takes the offset of the first table in the block."""
         self._numbers: list[Array] = []
         self._known: dict[int, int] = {}
-        self._end = start
+        self._end = begin
 
-    def place(self, key: object, make: Callable[[], Array]) -> int:
-        """The place of the table of a thing, 0 for None."""
+    def offset(self, key: object, make: Callable[[], Array]) -> int:
+        """Returns the offset of the table of a thing, which is made where it is new; 0 for None."""
         if key is None:
             return 0
         if id(key) not in self._known:
-            self._numbers.append(make())
+            table = make()
+            self._numbers.append(table)
             self._known[id(key)] = self._end
-            self._end += len(self._numbers[-1])
+            self._end += len(table)
         return self._known[id(key)]
 
     def radial(self, table: RadialTable | None) -> int:
-        """The place of a table of force over price."""
-        return 0 if table is None else self.place(table.origin[0], lambda: table.origin[0].numbers)
+        """Returns the offset of a table of force over price; 0 for None."""
+        if table is None:
+            return 0
+        original = table.origin[0]
+        return self.offset(original, lambda: original.numbers)
 
-    def of(self, response: Response, form: Form) -> TablePlaces:
-        """Places of an actuator's tables."""
+    def of(self, response: Response, form: Form) -> TableOffsets:
+        """Returns the offsets of an actuator's tables."""
         gauge = response.gauge if isinstance(response, Plane) else None
         law = form.law
         beat = form.beat
-        return TablePlaces(
+        return TableOffsets(
             ahead=self.radial(response.table),
             back=self.radial(response.reverse),
-            gauge=self.place(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
-            law=self.place(law, lambda: cast(Array, law)),
-            beat=self.place(beat, lambda: _counted(cast(Array, beat), form.kind)),
+            gauge=self.offset(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
+            law=self.offset(law, lambda: cast(Array, law)),
+            beat=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
 
     @property
@@ -213,28 +252,65 @@ class _Tables:
         return np.concatenate(self._numbers)
 
 
+def _drag_speed(response: Response) -> float:
+    """Power per newton of drag [m/s] of a foil; 0 of all else."""
+    if isinstance(response, Line) and response.drag is not None:
+        return response.speed
+    return 0.0
+
+
+def _axes_of(form: Form) -> Array:
+    """Axes (3, 3) of a law's forces in the actuator's own ones."""
+    return np.eye(3) if form.axes is None else form.axes
+
+
 def _counted(rows: Array, kind: str) -> Array:
     """A curve, or a beat: how many points, or cells, then these."""
-    return np.concatenate([[len(rows) - (kind == "fin")], rows.ravel()])
+    count = len(rows) - 1 if kind == "fin" else len(rows)
+    return np.concatenate([[count], rows.ravel()])
 
 
 def gauge_numbers(gauge: Array, deflection: Array) -> Array:
-    """A gauge (G,) as the core takes it: in each of POINTS directions the support function, its derivative,
-    the gauge and the deflection (POINTS,); the parabola through the best three directions stands for the
-    gauge between them."""
-    count, angle = len(gauge), np.arange(POINTS) * TURN / POINTS
-    step, psi = TURN / count, np.arange(count) * TURN / count
-    worth = gauge * np.cos(angle[:, None] - psi)
-    best, row = worth.argmax(axis=1), np.arange(POINTS)
-    before, at, after = (worth[row, (best + k) % count] for k in (-1, 0, 1))
-    bend = before - 2.0 * at + after
-    offset = np.clip(np.where(bend < 0.0, 0.5 * (before - after) / np.minimum(bend, -1e-300), 0.0), -0.5, 0.5)
-    sigma = at + offset * (0.5 * (after - before) + 0.5 * offset * bend)
-    g0, g1, g2 = (gauge[(best + k) % count] for k in (-1, 0, 1))
-    rho = g1 + offset * (0.5 * (g2 - g0) + 0.5 * offset * (g0 - 2.0 * g1 + g2))
-    slope = -rho * np.sin(angle - psi[best] - offset * step)
-    own = np.interp(angle, np.append(psi, TURN), np.append(gauge, gauge[0]))
-    return np.concatenate([[POINTS], np.stack([sigma, slope, own, deflection], axis=-1).ravel()])
+    """Returns a gauge as the core takes it.
+
+    A force in direction psi is at most gauge(psi) times that of the table, so a price in direction theta is
+    worth the support function h(theta) = max over psi of gauge(psi) cos(theta - psi). The parabola through
+    the best three directions stands for the gauge between them.
+
+    Args:
+        gauge: radii (G,) in G even directions around the circle.
+        deflection: angles (POINTS,) [rad] from the command's direction to the force's.
+
+    Returns:
+        POINTS, then in each of as many directions the support function, its derivative, the gauge and the
+        deflection.
+    """
+    count = len(gauge)
+    theta = np.arange(POINTS) * TURN / POINTS
+    step = TURN / count
+    psi = np.arange(count) * TURN / count
+    reached = gauge * np.cos(theta[:, None] - psi)
+    best = reached.argmax(axis=1)
+    row = np.arange(POINTS)
+
+    # The parabola h(x) = h_1 + x (h_2 - h_0) / 2 + x^2 (h_0 - 2 h_1 + h_2) / 2 around the best direction.
+    h0 = reached[row, (best - 1) % count]
+    h1 = reached[row, best]
+    h2 = reached[row, (best + 1) % count]
+    curvature = h0 - 2.0 * h1 + h2
+    peak = 0.5 * (h0 - h2) / np.minimum(curvature, -1e-300)
+    x = np.clip(np.where(curvature < 0.0, peak, 0.0), -0.5, 0.5)
+    support = h1 + x * (0.5 * (h2 - h0) + 0.5 * x * curvature)
+
+    # The radius there by the same parabola, and h'(theta) = -rho sin(theta - psi).
+    g0 = gauge[(best - 1) % count]
+    g1 = gauge[best]
+    g2 = gauge[(best + 1) % count]
+    rho = g1 + x * (0.5 * (g2 - g0) + 0.5 * x * (g0 - 2.0 * g1 + g2))
+    slope = -rho * np.sin(theta - psi[best] - x * step)
+    radius = np.interp(theta, np.append(psi, TURN), np.append(gauge, gauge[0]))
+    rows = np.stack([support, slope, radius, deflection], axis=-1)
+    return np.concatenate([[POINTS], rows.ravel()])
 
 
 def _usual_price(response: Response) -> float:
@@ -250,9 +326,12 @@ def _usual_price(response: Response) -> float:
 
 def _needs_no_reverse(plane: Plane) -> bool:
     """Whether a plane that turns all round gives forward what it gives in reverse, at no more power."""
-    ahead, back = plane.table, plane.reverse
-    if back is None or plane.half < np.pi or back.largest > ahead.largest or back.rest < ahead.rest:
+    ahead = plane.table
+    back = plane.reverse
+    if back is None or plane.half < np.pi:
+        return False
+    if back.largest > ahead.largest or back.rest < ahead.rest:
         return False
     price = price_grid(back.top)
-    own = np.interp(price, price_grid(ahead.top), ahead.force)
-    return bool((own >= back.force * (1.0 - NEARLY)).all())
+    force_ahead = np.interp(price, price_grid(ahead.top), ahead.force)
+    return bool((force_ahead >= back.force * (1.0 - NEARLY)).all())
