@@ -118,15 +118,17 @@ class RudderLaw(ActuatorLaw):
         plate_lift = 2.0 * np.abs(sin) * sin * cos
         plate_drag = 2.0 * sin * sin
         plate_lift_slope = 4.0 * np.abs(sin) * cos * cos - 2.0 * np.abs(sin) * sin * sin
+        lift_slope = self.slope + sigma * (plate_lift_slope - self.slope) + sigma_slope * (plate_lift - lift)
+        drag_slope = (
+            2.0 * self.induced * self.slope * lift * (1.0 - sigma)
+            + sigma * 4.0 * sin * cos
+            + sigma_slope * (plate_drag - induced_drag)
+        )
         return Coefficients(
             lift=lift + sigma * (plate_lift - lift),
             drag=self.drag + induced_drag + sigma * (plate_drag - induced_drag),
-            lift_slope=self.slope
-            + sigma * (plate_lift_slope - self.slope)
-            + sigma_slope * (plate_lift - lift),
-            drag_slope=2.0 * self.induced * self.slope * lift * (1.0 - sigma)
-            + sigma * 4.0 * sin * cos
-            + sigma_slope * (plate_drag - induced_drag),
+            lift_slope=lift_slope,
+            drag_slope=drag_slope,
         )
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:

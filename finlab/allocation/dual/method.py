@@ -118,8 +118,17 @@ class Dual(Method):
         return self.at(flow).solve_now(targets, policy, now, prices)
 
     def solve_now(self, targets: Array, policy: Policy, now: Now, prices: Array | None = None) -> Solution:
-        """Solves for targets (N, 6), at least one, with what may be given now, in the water of `flow`; the
-        others as for `solve`."""
+        """Solves for targets with what may be given now, in the water of `flow`.
+
+        Args:
+            targets: wrenches (N, 6), at least one [N, N m].
+            policy: what to give beyond reach.
+            now: limits, rates, losses and free axes that hold now.
+            prices: (6,) [W/N, W/(N m)] at which Newton's method begins, for a single target.
+
+        Returns:
+            Commands, with the lower bound of their power.
+        """
         if self.plant.interaction is not None:
             return settled(self, targets, policy, now, prices)
         found = self.forces(targets, policy, prices, now)
@@ -177,39 +186,66 @@ class Dual(Method):
         return problem if now.previous is None else problem.after(self.rates.box(now.previous))
 
     def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array, now: Now) -> str:
-        """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
-        not, by the largest share that does; the sentence where there is none."""
-        along, aim = target / self.scale, found.aim
-        size = max(float(along @ along), 1e-300)
-        low, high = 0.0, float(aim[row] / self.scale @ along)
-        given = self.error(command[row : row + 1], aim[row : row + 1], now)[0]
-        aside = aim[row] / self.scale - high / size * along
-        if given <= NEARLY and np.abs(aside).max() <= NEARLY:
+        """Keeps one answer on the ray of its target, where the laws differ from the core's tables.
+
+        Args:
+            target: wrench (6,) [N, N m] along which the answer is to lie.
+            row: of the answer in `found` and `command`, which are overwritten by the largest share of the
+                target that the laws give (Eq. 14), found by bisection.
+            found: aims (N, 6), prices and values of all answers.
+            command: (N, n, 3).
+            now: what may be given.
+
+        Returns:
+            The sentence where no share can be given; else none.
+        """
+        ray = target / self.scale
+        aim = found.aim
+        size_squared = max(float(ray @ ray), 1e-300)
+        projection = float(aim[row] / self.scale @ ray)
+        error = self.error(command[row : row + 1], aim[row : row + 1], now)[0]
+        off_ray = aim[row] / self.scale - projection / size_squared * ray
+        if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
             return ""
         if now.previous is not None:
             return ""  # what the drives' rates leave is nearest to the ray already
-        kept = False
-        while high > low + NEARLY * size:
-            share = 0.5 * (low + high)
-            tried = share / size * target[None]
-            one = self.forces(tried, None, None, now)
-            its = self.exact(one, now)
-            if self.error(its, tried, now)[0] <= NEARLY:
-                low, kept, command[row], aim[row] = share, True, its[0], tried[0]
-                found.price[row], found.value[row] = one.price[0], one.value[0]
-            else:
-                high = share
-        if not kept and (rest := self._cancelled(now)) is not None:
-            kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
-        return "" if kept else "no share of the target was found that the actuators can give alone"
+
+        low = 0.0
+        high = projection
+        is_kept = False
+        while high > low + NEARLY * size_squared:
+            middle = 0.5 * (low + high)
+            tried = middle / size_squared * target[None]
+            answer = self.forces(tried, None, None, now)
+            answer_command = self.exact(answer, now)
+            if self.error(answer_command, tried, now)[0] > NEARLY:
+                high = middle
+                continue
+            low = middle
+            is_kept = True
+            command[row] = answer_command[0]
+            aim[row] = tried[0]
+            found.price[row] = answer.price[0]
+            found.value[row] = answer.value[0]
+        if is_kept:
+            return ""
+        cancelled = self._cancelled(now)
+        if cancelled is None:
+            return "no share of the target was found that the actuators can give alone"
+        command[row] = cancelled
+        aim[row] = 0.0
+        found.price[row] = 0.0
+        found.value[row] = 0.0
+        return ""
 
     def _cancelled(self, now: Now) -> Array | None:
         """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None without
         any."""
-        lower, upper = self.layout.lower, self.layout.upper
+        lower = self.layout.lower
+        width = self.layout.upper - lower
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
-        share[..., :-1] **= 4
-        start = lower + share * (upper - lower)
+        share[..., :-1] **= 4  # most of them near the least forces
+        start = lower + share * width
         return self._meeting(self.problem_now(now), np.zeros(6), start)
 
     def _meeting(self, problem: CommandProblem, wrench: Array, starts: Array) -> Array | None:
@@ -217,7 +253,10 @@ class Dual(Method):
         lead; None where none does."""
         ends = refine(problem, wrench[None], starts, 2 * ROUNDS, EXACT)
         met = ends.command[ends.error <= NEARLY]
-        return met[self.plant.power(met).sum(axis=-1).argmin()] if len(met) else None
+        if len(met) == 0:
+            return None
+        power = self.plant.power(met).sum(axis=-1)
+        return np.asarray(met[power.argmin()])
 
     def _span(self, now: Now) -> Array:
         """Directions (6, r) of scaled wrenches that the actuators drive now, orthonormal."""
@@ -264,32 +303,57 @@ class Dual(Method):
         return np.asarray(driven if now.free is None else driven & ~now.free)
 
     def bound(self, aim: Array, price: Array, value: Array, now: Now, command: Array) -> Array:
-        """Power (N,) [W] that no answer undercuts which gives, with what may be given now, the wrenches that
-        commands (N, n, 3) give."""
+        """Proves a lower bound of the power by weak duality (Eq. 3).
+
+        Args:
+            aim: wrenches (N, 6) that were found [N, N m].
+            price: multipliers (N, 6) of them [W/N, W/(N m)].
+            value: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
+            now: what may be given.
+            command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as the laws
+                come.
+
+        Returns:
+            Power (N,) [W] that no answer undercuts which gives these wrenches now; never above theirs.
+        """
         works, command = self._working(command, now)
         force = np.where(works[:, None], self.plant.force(command), 0.0)
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if now.free is not None:  # its price is 0
             wrench = np.where(now.free, 0.0, wrench)
-        price = np.where(np.isfinite(price).all(axis=-1, keepdims=True), price, 0.0)
+        is_finite = np.isfinite(price).all(axis=-1, keepdims=True)
+        price = np.where(is_finite, price, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
+
         at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
         bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
+        largest_power = self.compiled.robot.largest_power
         if not self._measured:
             # The value is one of tables, which are off by a share of full power, at the least forces by more.
-            sure = (1.0 - 10.0 * CLOSE) * value - NEARLY * self.compiled.robot.largest_power
-            sure = np.minimum(sure, power)
+            value_by_laws = (1.0 - 10.0 * CLOSE) * value - NEARLY * largest_power
+            value_by_laws = np.minimum(value_by_laws, power)
             is_of_aim = _sizes((wrench - aim) / self.scale) <= NEARLY
-            bound = np.where(is_of_aim, np.maximum(bound, sure), bound)
-        elif len(rows := np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)) and works.all():
+            bound = np.where(is_of_aim, np.maximum(bound, value_by_laws), bound)
+        elif works.all():
             # The prices are those of the smooth shapes that stand for tables.
-            questions = zip(wrench[rows], price[rows], command[rows], strict=True)
-            raised = np.stack([raised_price(self.plant, self.scale, *one) for one in questions])
-            bound[rows] = np.maximum(bound[rows], proved_power(self.compiled, wrench[rows], raised, now))
+            rows = np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)
+            bound[rows] = np.maximum(bound[rows], self._bound_of_tables(wrench, price, command, rows, now))
+
         # Above the power it is off by what tables are off; by more than that it proves nothing.
-        above_by_tables = (1.0 + 10.0 * CLOSE) * power + NEARLY * self.compiled.robot.largest_power
+        above_by_tables = (1.0 + 10.0 * CLOSE) * power + NEARLY * largest_power
         bound = np.where(bound > above_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
+
+    def _bound_of_tables(
+        self, wrench: Array, price: Array, command: Array, rows: NDArray[np.intp], now: Now
+    ) -> Array:
+        """Lower bounds (R,) [W] for some rows (R,) of answers, at prices that are raised by the measured
+        tables themselves."""
+        if len(rows) == 0:
+            return np.empty(0)
+        questions = zip(wrench[rows], price[rows], command[rows], strict=True)
+        raised = np.stack([raised_price(self.plant, self.scale, *question) for question in questions])
+        return proved_power(self.compiled, wrench[rows], raised, now)
 
     @cached_property
     def _measured(self) -> bool:
