@@ -279,7 +279,8 @@ class Allocator:
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
-                follow answers the one that they will be in time for, which is then the result's target.
+                follow answers the one that they will be in time for, which is then the result's target; but
+                pods, whose turning costs, turn in time for what comes, and the target stays the wrench.
             free: names of axes that are free here: they take what the cheapest answer gives them, as those
                 do that the layout does not command.
             policy: what to do when the wrench is out of reach; see `Policy`.
@@ -307,7 +308,10 @@ class Allocator:
         start = time.perf_counter()
         target = values
         if reference is not None:
-            target = method.in_time(target, check_reference(reference))
+            expected = check_reference(reference)
+            target = method.in_time(target, expected)
+            if method.looks_ahead:
+                options["reference"] = ready.freed(expected, 0.0)
         solution = question.solution(ready.freed(target, 0.0)[None], before, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation.of(

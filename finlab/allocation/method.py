@@ -41,6 +41,8 @@ class Method(ABC):
     them."""
     begins_at_prices: ClassVar[bool] = False
     """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
+    looks_ahead: ClassVar[bool] = False
+    """Whether `solve` takes the `reference` of the next ticks."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 

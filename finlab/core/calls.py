@@ -70,6 +70,10 @@ class Now(NamedTuple):
     """Which axes (6,) may take any wrench, beside those that the robot does not command; None for none."""
     calm: float = 0.0
     """What turning costs in a tick; see `DualSettings.calm`."""
+    ticks: int = 1
+    """How many ticks after `previous` the commands are for."""
+    toward: Array | None = None
+    """Angles (n,) [rad] near which pods are to stand, NaN for others; None for nowhere else than before."""
 
 
 STILL = Now()
@@ -128,6 +132,8 @@ class Core:
         self._lost_at = question["lost"]
         self._free_at = question["free"]
         self._calm = question["calm"]
+        self._ticks = question["ticks"]
+        self._toward_at = question["toward"]
         answer = np.zeros(1, struct("fl_answer"))
         self._from = answer.ctypes.data
         self._force = answer["force"][:, :count]
@@ -144,10 +150,12 @@ class Core:
         self._previous = np.zeros((count, 3))
         self._lost = np.zeros(count, np.uint8)
         self._free = np.zeros(6, np.uint8)
+        self._toward = np.zeros(count)
         self._price_lies = self._price.ctypes.data
         self._previous_lies = self._previous.ctypes.data
         self._lost_lies = self._lost.ctypes.data
         self._free_lies = self._free.ctypes.data
+        self._toward_lies = self._toward.ctypes.data
 
         error = core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area)
         if error:
@@ -169,6 +177,11 @@ class Core:
     def _stand(self, now: Now) -> None:
         """Writes what holds now into the question."""
         self._calm[0] = now.calm
+        self._ticks[0] = now.ticks
+        self._toward_at[0] = 0
+        if now.toward is not None:
+            self._toward[:] = now.toward
+            self._toward_at[0] = self._toward_lies
         self._previous_at[0] = 0
         if now.previous is not None:
             self._previous[:] = now.previous

@@ -66,6 +66,8 @@ FL_FIELD(fl_reals, previous, , "address", "commands (n, 3) of the tick before, N
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
 FL_FIELD(fl_bytes, free, , "address", "(6,) which axes may take any wrench, beside those not commanded; 0 for none")
 FL_FIELD(fl_real, calm, , "1", "what turning costs in a tick: 0 nothing, 2 usual, up to 10")
+FL_FIELD(int, ticks, , "1", "how many ticks after `previous` the commands are for; 0 or 1 for the next")
+FL_FIELD(fl_reals, toward, , "address", "angles (n,) [rad] that turning of pods costs from, NaN: from that of `previous`; 0 for none")
 FL_END(fl_question)
 
 FL_BEGIN(fl_answer)

@@ -214,7 +214,7 @@ static int is_prepared;
 int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double (*command)[3]) {{
   fl_real before[ROBOT_COUNT][3];
   const fl_policy policy = {{FL_DIRECTION, 0, {{1, 1, 1, 1, 1, 1}}, {{{{0}}}}}};
-  fl_question question = {{{{0}}, 0, 0, 0, 0, 0, CALM}};
+  fl_question question = {{.calm = CALM}};
   if (!is_prepared) {{
     int code = fl_check(robot, robot_length);
     if (!code) code = fl_prepare(robot, &work);

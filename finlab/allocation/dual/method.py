@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.dual.ahead import turning_ahead
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.price_ascent import raised_price
 from finlab.allocation.dual.turns import settled, whole_of
@@ -57,6 +58,7 @@ class Dual(Method):
     policy_under_way = "direction"
     begins_at_prices = True
     takes_losses = True
+    looks_ahead = True
     settings_class = DualSettings
     settings: DualSettings
 
@@ -99,6 +101,7 @@ class Dual(Method):
         prices: Array | None = None,
         lost: NDArray[np.bool_] | None = None,
         free: NDArray[np.bool_] | None = None,
+        reference: Array | None = None,
     ) -> Solution:
         """Solves for targets; see `Method.solve`.
 
@@ -111,11 +114,30 @@ class Dual(Method):
             prices: (6,) [W/N, W/(N m)] at which Newton's method begins, for a single target.
             lost: which actuators (n,) do not work; None where all do.
             free: which axes (6,) may take any wrench; None for none.
+            reference: wrenches (K, 6) of the next ticks [N, N m]; pods turn in time for them.
         """
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
-        return self.at(flow).solve_now(targets, policy, now, prices)
+        method = self.at(flow)
+        if reference is not None and len(reference) and method.turns_ahead and previous is not None:
+            now = turning_ahead(method, reference, now)
+        return method.solve_now(targets, policy, now, prices)
+
+    @cached_property
+    def turning(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) are pods whose turning costs."""
+        is_pod = self.compiled.robot.pods
+        return np.asarray(is_pod & np.isfinite(self.layout.rates[:, 0]))
+
+    @property
+    def turns_ahead(self) -> bool:
+        """Whether wrenches to come tell where pods are to turn."""
+        return self.settings.calm > 0.0 and bool(self.turning.any())
+
+    def in_time(self, target: Array, reference: Array) -> Array:
+        # Turning is what makes pods late, and they turn ahead: what is asked for is given now.
+        return target if self.turns_ahead else super().in_time(target, reference)
 
     def solve_now(self, targets: Array, policy: Policy, now: Now, prices: Array | None = None) -> Solution:
         """Solves for targets with what may be given now, in the water of `flow`.

@@ -57,6 +57,8 @@ class DualRobot:
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.lines = np.array([isinstance(response, Line) for response in responses])
         """Which have one direction (n,)."""
+        self.pods = np.array([form.kind == "pod" for form in forms])
+        """Which push at an angle of their own (n,)."""
         self.speed = np.array([_drag_speed(response) for response in responses])
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
         self._sizes = self._largest_forces()

@@ -218,6 +218,7 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
   const fl_policy *policy = q->policy;
   if (!are_within(q->wrench, 6, LARGEST)) return FL_BAD_ARGUMENT;
   if (!(q->calm >= 0 && q->calm <= MOST_CALM)) return FL_BAD_ARGUMENT;
+  if (q->ticks < 0) return FL_BAD_ARGUMENT;
   if (policy) {
     if (policy->policy < FL_CLOSEST || policy->policy > FL_PRIORITY) return FL_BAD_ARGUMENT;
     if (policy->policy == FL_PRIORITY && (policy->groups < 0 || policy->groups > 6)) return FL_BAD_ARGUMENT;
@@ -225,6 +226,8 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
   }
   for (int k = 0; q->previous && k < 3 * COUNT(block); k++)
     if (FABS(q->previous[k]) > LARGEST) return FL_BAD_ARGUMENT;
+  for (int i = 0; q->toward && i < COUNT(block); i++)
+    if (FABS(q->toward[i]) > LARGEST) return FL_BAD_ARGUMENT;
   if (!fl_prepare_question(block, work, q)) return FL_BAD_NUMBER;
   answered(block, work, q, out);
   return are_within(out->aim, 6, R(1e30)) && are_within(&out->error, 1, R(1e30)) ? 0 : FL_BAD_NUMBER;

@@ -15,15 +15,17 @@ static void whole_box(const real *block, fl_box *box, int i) {
   box->free[i] = a->turns != 0;
 }
 
-/* The commands of an actuator that may follow one before; an angle that turns freely is counted from there. */
-static void box_after(const real *block, fl_box *box, int i, const real *before) {
+/* The commands of an actuator that may follow one before after so many ticks; an angle that turns freely is counted from
+   there. */
+static void box_after(const real *block, fl_box *box, int i, const real *before, real ticks) {
   const fl_actuator *a = ACTUATOR(block, i);
   for (int k = 0; k < 3; k++) {
     const int turns = k == fl_angle_number(a) && a->turns != 0;
-    if (turns && !(a->step[k] < PI)) continue;
+    const real step = a->step[k] * ticks;
+    if (turns && !(step < PI)) continue;
     if (turns) {
-      box->low[i][k] = before[k] - a->step[k];
-      box->high[i][k] = before[k] + a->step[k];
+      box->low[i][k] = before[k] - step;
+      box->high[i][k] = before[k] + step;
       box->free[i] = 0;
       continue;
     }
@@ -31,8 +33,8 @@ static void box_after(const real *block, fl_box *box, int i, const real *before)
     real center = before[k];
     if (k == fl_angle_number(a)) center = middle + fl_wrap_angle(center - middle); /* an arc may be told a turn off */
     center = CLIP(center, a->lower[k], a->upper[k]);
-    box->low[i][k] = MAX(center - a->step[k], a->lower[k]);
-    box->high[i][k] = MIN(center + a->step[k], a->upper[k]);
+    box->low[i][k] = MAX(center - step, a->lower[k]);
+    box->high[i][k] = MIN(center + step, a->upper[k]);
   }
 }
 
@@ -69,8 +71,8 @@ static int is_free(const real *block, const fl_box *box, int i, int k) {
   return box->low[i][k] <= a->lower[k] && box->high[i][k] >= a->upper[k];
 }
 
-/* The set of an actuator in a tick, and what turning costs there. */
-static void tick_set(const real *block, fl_work *work, int i, const real *before, real kappa) {
+/* The set of an actuator in a tick, and what turning from an angle costs there. */
+static void tick_set(const real *block, fl_work *work, int i, real angle, real kappa) {
   const fl_actuator *a = ACTUATOR(block, i);
   fl_set *set = work->set + i;
   const int all_sizes = is_free(block, &work->box, i, 0) && is_free(block, &work->box, i, 1);
@@ -85,7 +87,7 @@ static void tick_set(const real *block, fl_work *work, int i, const real *before
   const real high = CLIP(own.high, a->low, a->high);
   fl_limit_set(block, i, set, low, high, own.middle, own.half);
   if (!(kappa > 0)) return;
-  const real at = before[0] + (set->flipped ? PI : 0);
+  const real at = angle + (set->flipped ? PI : 0);
   set->turn = kappa;
   set->at = set->middle + fl_wrap_angle(at - set->middle);
 }
@@ -105,21 +107,27 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
 }
 
 /* The same of a tick after the previous commands (n, 3) of a question, of which rows may be NaN. Turning of a pod costs
-   kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn of a tick. Fins turn
+   kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn until the commands
+   asked for: of one tick, or of several. It costs from the angle before, or from one that is wanted. Fins turn
    through a right angle in a few ticks, and one that points away gives little: with such a cost it would stay for ever, and
    leave its work to others at a fifth more power. */
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
   real power = 0;
+  real ticks = 1;
+  if (q->ticks > 1) ticks = (real)q->ticks;
   fl_limits_without_tick(block, work);
   if (q->calm > 0) power = mean_power(block, work, q->previous);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const real *before = q->previous + 3 * i;
     real kappa = 0;
+    real angle = before[0];
     if (work->span.lost[i] || !fl_is_known_command(before)) continue;
-    if (a->form == FL_POD && a->step[0] > 0 && a->step[0] < R(1e6)) kappa = q->calm * power / a->step[0];
-    box_after(block, &work->box, i, before);
-    tick_set(block, work, i, before, kappa);
+    const int is_costly = a->form == FL_POD && a->step[0] > 0 && a->step[0] < R(1e6);
+    if (is_costly) kappa = q->calm * power / (a->step[0] * ticks);
+    if (q->toward && q->toward[i] == q->toward[i]) angle = q->toward[i];
+    box_after(block, &work->box, i, before, ticks);
+    tick_set(block, work, i, angle, kappa);
   }
   work->is_whole = 0;
   fl_prepare_sets(block, work);

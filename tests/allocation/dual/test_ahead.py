@@ -1,0 +1,106 @@
+"""Pods turn in time for wrenches that are known: less power, no more turning, nothing missed for it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab import Allocator, Azimuth, Layout, PowerLaw, load_layout
+from finlab.arrays import Array
+
+PERIOD_S = 0.1
+QUARTER = math.pi / 2.0
+PLACES = ((1.8, 0.8), (1.8, -0.8), (-1.8, 0.8), (-1.8, -0.8))
+ARCS = ((QUARTER, 2.0 * QUARTER), (-2.0 * QUARTER, -QUARTER), (0.0, QUARTER), (-QUARTER, 0.0))
+AHEAD = 8
+
+
+def four_pods() -> Layout:
+    """A small ferry whose pods turn slowly, each in a quarter of the circle."""
+    pods = tuple(
+        Azimuth(
+            name=f"pod_{i}",
+            position=(*place, 0.0),
+            turn_axis=(0.0, 0.0, 1.0),
+            zero=(1.0, 0.0, 0.0),
+            force=(-400.0, 400.0),
+            model=PowerLaw(forward=1.0, reverse=1.0, exponent=2.0),
+            arc=arc,
+            turn_rate=0.5,
+            rate=200.0,
+        )
+        for i, (place, arc) in enumerate(zip(PLACES, ARCS, strict=True))
+    )
+    return Layout(name="four", axes=("Fx", "Fy", "Tz"), actuators=pods)
+
+
+def waves(ticks: int, seed: int) -> Array:
+    """Wrenches (ticks + AHEAD, 6) of a slow load, waves and noise [N, N m]."""
+    time = PERIOD_S * np.arange(ticks + AHEAD)
+    wrench = np.zeros((len(time), 6))
+    wrench[:, 0] = 150.0 * np.sin(0.05 * time) + 60.0 * np.sin(0.9 * time)
+    wrench[:, 1] = 120.0 * np.sin(0.04 * time + 1.0) + 80.0 * np.sin(0.8 * time + 0.4)
+    wrench[:, 5] = 150.0 * np.sin(0.06 * time + 2.0) + 120.0 * np.sin(0.85 * time)
+    noise = np.random.default_rng(seed).normal(size=(len(time), 3)) * [8.0, 8.0, 12.0]
+    wrench[:, [0, 1, 5]] += noise
+    return wrench
+
+
+def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
+    """Returns mean power [W], turning of all pods [rad] and missed ticks, with so many wrenches known."""
+    allocator = Allocator(four_pods(), calm=10.0, period_s=PERIOD_S)
+    wrench = waves(ticks, seed)
+    command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in ARCS])
+    power, turned, missed = 0.0, 0.0, 0
+    for tick in range(ticks):
+        reference = wrench[tick + 1 : tick + 1 + known] if known else None
+        answer = allocator.allocate(wrench[tick], previous=command, reference=reference)
+        np.testing.assert_array_equal(np.nan_to_num(answer.target), wrench[tick])
+        turn = np.abs(answer.command[:, 0] - command[:, 0])
+        assert turn.max() <= 0.5 * PERIOD_S * (1.0 + 1e-6)
+        power += answer.power / ticks
+        turned += turn.sum()
+        missed += not answer.reachable
+        command = answer.command
+    return power, turned, missed
+
+
+@pytest.mark.parametrize("seed", [2, 11])
+def test_known_waves_take_a_tenth_less_power_for_no_more_turning(seed: int) -> None:
+    blind_power, blind_turned, blind_missed = ride(0, seed)
+    power, turned, missed = ride(AHEAD, seed)
+    assert power < 0.92 * blind_power
+    assert turned < 1.02 * blind_turned
+    assert missed <= blind_missed + 1
+
+
+def test_a_pod_turns_before_the_wrench_does() -> None:
+    """A push ahead becomes one to port in eight ticks: the stern's pods have begun to turn."""
+    allocator = Allocator(load_layout("catamaran"), calm=2.0, period_s=PERIOD_S)
+    now, later = np.zeros(6), np.zeros((AHEAD, 6))
+    now[0] = 40.0
+    later[:, 0], later[:, 1] = 10.0, 20.0
+    before = allocator.allocate(now).command
+    stays = allocator.allocate(now, previous=before).command
+    turns = allocator.allocate(now, previous=before, reference=later)
+    assert turns.reachable
+    assert np.abs(turns.command[:2, 0] - before[:2, 0]).max() > 0.02
+    assert np.abs(stays[:2, 0] - before[:2, 0]).max() < 0.01
+
+
+def test_what_stays_the_same_asks_for_no_turning() -> None:
+    allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S)
+    wrench = np.array([40.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    before = allocator.allocate(wrench).command
+    alone = allocator.allocate(wrench, previous=before).command
+    known = allocator.allocate(wrench, previous=before, reference=[wrench] * AHEAD).command
+    np.testing.assert_allclose(known, alone, atol=1e-3)
+
+
+def test_lost_pods_and_free_axes_keep_out_of_it() -> None:
+    allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S)
+    wrench = np.array([30.0, 0.0, 0.0, 0.0, 0.0, 2.0])
+    before = allocator.allocate(wrench).command
+    known = [wrench] * AHEAD
+    answer = allocator.allocate(wrench, previous=before, reference=known, lost=["left"], free=("Fy",))
+    assert np.isnan(answer.command[0]).all() and np.isfinite(answer.command[1:]).all()
