@@ -19,6 +19,7 @@ typedef struct { /* what one actuator may give now */
   fl_real gap2, cos_middle, sin_middle, cos_half, sin_half;
   fl_real turn;     /* kappa: turning by d from `at` costs kappa / 2 d^2 [W/rad^2]; 0 where it costs nothing */
   fl_real at;       /* angle from which it turns, within a turn of `middle` [rad] */
+  fl_real steepest; /* where turning costs: largest slope of its force by its price [N^2/W] */
   fl_real cut;      /* where it jumps: angle between the two answers [rad] */
   int flipped, forked;
   int jumps;        /* whether its answer jumps where Newton's method stood still */
@@ -80,6 +81,10 @@ struct fl_work {
   fl_set kept[FL_MOST], best_set[FL_MOST]; /* sets that a search began with, and those of its best part */
   fl_real best[FL_MOST][2];                /* forces of the best part */
   fl_tangent tangent[FL_MOST];
+  fl_real full_power[FL_MOST]; /* of each actuator [W] */
+  fl_real steepest[FL_MOST];   /* of each pod: largest slope of its force by its price [N^2/W] */
+  fl_real begin[6]; /* in a tick: prices in the basis at which the commands before were given */
+  int begins;       /* whether there are such prices */
   const fl_real *previous; /* commands of the tick before; 0 for none */
   fl_wide close;           /* distance, on the yardstick, up to which a point is the nearest one */
   const fl_wide *ray;      /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */

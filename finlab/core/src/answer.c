@@ -130,7 +130,7 @@ static void answer(const real *block, fl_work *work, const real *wrench, const f
 
 /* Prices in the basis to begin with; 0 where there are none, or none of use. */
 static const real *first_prices(const fl_work *work, const fl_question *q, real *inner) {
-  if (!q->price) return 0;
+  if (!q->price) return work->begins ? work->begin : 0;
   fl_reduce_lambda(work, q->price, inner);
   return are_within(inner, 6, LARGEST) ? inner : 0;
 }

@@ -17,8 +17,16 @@ static line_response at_price(const real *block, const fl_actuator *a, int back,
 
 /* Power [W] of a force of an actuator within its tables, of planes below 0 in reverse. */
 real fl_power_of_force(const real *block, int i, real force) {
+  return fl_power_and_price(block, i, force, 0);
+}
+
+/* The same, and the price [W/N] at which the force is given. */
+real fl_power_and_price(const real *block, int i, real force, real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return a->worth * fl_marginal_cost(table_of(block, a, force < 0), FABS(force) / a->share, 0);
+  const real *table = table_of(block, a, force < 0);
+  const real power = a->worth * fl_marginal_cost(table, FABS(force) / a->share, price);
+  if (price) *price *= a->worth / a->share;
+  return power;
 }
 
 /* What follows from the limits of a set, but for its angles. */
@@ -48,7 +56,7 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
   without_band(ACTUATOR(block, i)->band, &low, &high);
   int plane = is_plane(ACTUATOR(block, i)), back = plane && low < 0;
   set->flipped = back && high <= 0, set->tangent = 0;
-  set->turn = set->at = set->cut = 0, set->jumps = 0;
+  set->turn = set->at = set->cut = set->steepest = 0, set->jumps = 0;
   real near = set->flipped ? high : back ? 0 : low, far = set->flipped ? low : high;
   set->low_cost = fl_power_of_force(block, i, near), set->high_cost = fl_power_of_force(block, i, far);
   set->low = plane ? FABS(near) : near, set->high = plane ? FABS(far) : far;
@@ -98,4 +106,30 @@ fl_set fl_reversed_set(const fl_set *set) {
   r.at = set->at + PI, r.middle = set->middle + PI, r.cos_middle = -set->cos_middle, r.sin_middle = -set->sin_middle;
   set_ends(1, &r);
   return r;
+}
+
+/* The largest slope of a table of force over price, of all of its cubics: no slope is above the control points of its
+   parabola, which are the slopes at both knots and one between them. */
+static real steepest_in(const real *table) {
+  const int cells = (int)table[1];
+  const real *knot = table + 3;
+  real most = 0;
+  if (knot[0] > 0) return R(1e30); /* a force at no price is a jump */
+  for (int k = 0; k < cells; k++, knot += 3) {
+    real first = (real)k / (real)cells;
+    real last = (real)(k + 1) / (real)cells;
+    first *= first;
+    last *= last;
+    const real width = (last * last - first * first) * table[0];
+    const real middle = 3 * (knot[3] - knot[0]) / width - knot[1] - knot[4];
+    most = MAX(MAX(most, middle), MAX(knot[1], knot[4]));
+  }
+  return most;
+}
+
+/* The largest slope of the force of an actuator by its price [N^2/W]. */
+real fl_largest_slope(const real *block, int i) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real most = MAX(steepest_in(table_of(block, a, 0)), steepest_in(table_of(block, a, 1)));
+  return most * a->share * a->share / a->worth;
 }

@@ -96,6 +96,8 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
 void fl_prepare_set(const real *block, int i, fl_set *set);
 void fl_fix_force(const real *block, int i, fl_set *set, const real *force);
 real fl_power_of_force(const real *block, int i, real force);
+real fl_power_and_price(const real *block, int i, real force, real *price);
+real fl_largest_slope(const real *block, int i);
 fl_set fl_reversed_set(const fl_set *set);
 
 /* actuator_response.c: forces that are worth most at multipliers, Eq. 5 */

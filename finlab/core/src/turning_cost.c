@@ -13,74 +13,101 @@
                  T' b b'                   at its ends
 
    Where kappa is large beside p T, h is concave and there is one answer: a pod that pushes either way passes through rest
-   without turning. Else there may be two maxima, and the answer jumps between them as the price moves: dual_newton.c sees it. */
+   without turning. A bound of h'' proves it for most prices, and Newton's method then goes uphill from anywhere. Else
+   there may be two maxima, which are looked for in cells of the window, and the answer jumps between them as the price
+   moves: dual_newton.c sees it. */
 #include "internal.h"
 
 #define CELL R(0.12)   /* width [rad] of the cells of a window in which h' is taken to change its sign once at most */
 #define MOST_CELLS 48
 #define ROOT_STEPS 60  /* of a root of h' in a cell */
+#define SHORT_STEP (SQRT(ROUNDING)) /* [rad]: what such a step leaves out beyond first order is rounding */
 
 typedef struct { /* one pod at one price */
   const real *block;
   const fl_actuator *a;
   const fl_set *set;
-  real p, sigma; /* size and angle of the price */
+  real price[2];
 } pod_at_price;
 
 typedef struct { /* what the pod gives at one angle */
+  real alpha;
+  real b[2];               /* direction of the angle */
   real value, slope, bend; /* h, h', h'' */
   real T, dT;              /* best force, and its derivative by the price along it */
-  real dv;                 /* v' */
+  real v, dv;              /* v, v' */
 } at_angle;
 
-/* Best force along a direction at a price v of a newton along it: ahead, or in reverse where it pushes either way. */
+/* Best force along a direction at a price v of a newton along it: a pod that pushes either way is a line there. */
 static line_response best_along(const pod_at_price *x, real v) {
   const fl_set *set = x->set;
-  if (v >= 0) return fl_limited_response(x->block, x->a, set, 0, v);
-  if (set->reverse > 0) {
-    const fl_set back = fl_reversed_set(set);
-    line_response o = fl_limited_response(x->block, x->a, &back, 0, -v);
-    o.force = -o.force;
-    return o;
-  }
+  const int is_line = set->reverse > 0;
+  if (is_line || v >= 0) return fl_limited_response(x->block, x->a, set, is_line, v);
   return (line_response){set->low, 0, v * set->low - set->low_cost};
 }
 
-static at_angle look_at(const pod_at_price *x, real alpha) {
-  at_angle o;
-  const real v = x->p * COS(alpha - x->sigma);
+/* What the pod gives at an angle (cos, sin). */
+static void look_towards(const pod_at_price *x, real alpha, real c, real s, at_angle *o) {
+  o->alpha = alpha;
+  o->b[0] = c;
+  o->b[1] = s;
+  const real v = x->price[0] * c + x->price[1] * s;
+  const real dv = x->price[1] * c - x->price[0] * s;
   const real ddv = -v;
-  o.dv = -x->p * SIN(alpha - x->sigma);
   const line_response best = best_along(x, v);
   const real kappa = x->set->turn;
   const real d = alpha - x->set->at;
-  o.T = best.force;
-  o.dT = best.slope;
-  o.value = best.conjugate - kappa / 2 * d * d;
-  o.slope = o.T * o.dv - kappa * d;
-  o.bend = o.dT * o.dv * o.dv + o.T * ddv - kappa;
-  return o;
+  o->v = v;
+  o->dv = dv;
+  o->T = best.force;
+  o->dT = best.slope;
+  o->value = best.conjugate - kappa / 2 * d * d;
+  o->slope = o->T * dv - kappa * d;
+  o->bend = o->dT * dv * dv + o->T * ddv - kappa;
 }
 
-/* The root of h' between two angles at which it is above 0 and not above 0: Newton's method, kept in the bracket. */
-static real root_between(const pod_at_price *x, real low, real high) {
-  real alpha = (low + high) / 2;
+static void look_at(const pod_at_price *x, real alpha, at_angle *o) {
+  look_towards(x, alpha, COS(alpha), SIN(alpha), o);
+}
+
+/* Turns by a very short step: what it gives to first order, h to second; slopes hardly change. */
+static void turn_a_little(at_angle *o, real step) {
+  const real c = o->b[0];
+  const real s = o->b[1];
+  o->b[0] = c - step * s;
+  o->b[1] = s + step * c;
+  o->T += o->dT * o->dv * step;
+  o->value += o->slope * step / 2;
+}
+
+/* Goes from an angle to the root of h' between two angles at which it is above 0 and not above 0: Newton's method, kept
+   in the bracket. Where the ends are open, nobody has looked there, and h' may have one sign up to an end, which is the
+   answer then. */
+static void go_to_root(const pod_at_price *x, at_angle *o, real low, real high, int is_open) {
   for (int k = 0; k < ROOT_STEPS; k++) {
-    const at_angle o = look_at(x, alpha);
-    if (o.slope > 0)
-      low = alpha;
+    if (o->slope > 0)
+      low = o->alpha;
     else
-      high = alpha;
+      high = o->alpha;
     real next = (low + high) / 2;
-    if (o.bend < 0) {
-      const real newton = alpha - o.slope / o.bend;
-      if (newton > low && newton < high) next = newton;
+    if (o->bend < 0) {
+      const real newton = o->alpha - o->slope / o->bend;
+      const int is_within = newton >= low && newton <= high;
+      if (is_within)
+        next = newton;
+      else if (is_open) {
+        next = o->slope > 0 ? high : low;
+        is_open = 0;
+      }
     }
-    const real moved = FABS(next - alpha);
-    alpha = next;
-    if (moved <= 4 * ROUNDING * R(0.01) * (1 + FABS(alpha))) break;
+    const real step = next - o->alpha;
+    if (FABS(step) <= SHORT_STEP) {
+      turn_a_little(o, step);
+      o->alpha = next;
+      return;
+    }
+    look_at(x, next, o);
   }
-  return alpha;
 }
 
 /* The least and largest angles of the window, around the angle before. */
@@ -93,51 +120,67 @@ static void window_of(const fl_set *set, real *low, real *high) {
   }
 }
 
-response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  pod_at_price x = {block, a, set, size_of(price), 0};
-  if (x.p > 0) x.sigma = ATAN2(price[1], price[0]);
+/* Whether h is concave all over the window: only T' v'^2 can bend it up, and T v'' of a least force that is held against
+   the price. At the start v' is known, and it changes by the price times the angle at most. */
+static int is_concave(const pod_at_price *x, const at_angle *start, real farthest) {
+  const fl_set *set = x->set;
+  const real p = size_of(x->price);
+  const real most_dv = MIN(FABS(start->dv) + p * farthest, p);
+  const real least_v = MAX(start->v - p * farthest, -p);
+  const real held = set->low > 0 ? set->low * MAX(-least_v, 0) : 0;
+  return set->steepest * most_dv * most_dv + held < set->turn;
+}
 
-  real low, high;
-  window_of(set, &low, &high);
-  real best_alpha = CLIP(set->at, low, high);
-  at_angle best = look_at(&x, best_alpha);
+/* The largest h of any window, by cells. */
+static void go_to_best_cell(const pod_at_price *x, at_angle *best, real low, real high) {
+  at_angle before;
+  at_angle after;
+  look_at(x, CLIP(x->set->at, low, high), best);
+  look_at(x, low, &before);
+  if (before.slope <= 0 && before.value > best->value) *best = before;
   const int cells = (int)CLIP((high - low) / CELL + 2, 2, MOST_CELLS);
-  real from = low;
-  at_angle before = look_at(&x, from);
-  if (before.slope <= 0 && before.value > best.value) {
-    best = before;
-    best_alpha = from;
-  }
   for (int k = 1; k <= cells && high > low; k++) {
     const real to = k == cells ? high : low + (high - low) * (real)k / (real)cells;
-    const at_angle after = look_at(&x, to);
+    look_at(x, to, &after);
     if (before.slope > 0 && after.slope <= 0) {
-      const real alpha = root_between(&x, from, to);
-      const at_angle top = look_at(&x, alpha);
-      if (top.value > best.value) {
-        best = top;
-        best_alpha = alpha;
-      }
+      at_angle top;
+      look_at(x, (before.alpha + to) / 2, &top);
+      go_to_root(x, &top, before.alpha, to, 0);
+      if (top.value > best->value) *best = top;
     }
-    from = to;
     before = after;
   }
-  if (before.slope > 0 && before.value > best.value) {
-    best = before;
-    best_alpha = high;
+  if (before.slope > 0 && before.value > best->value) *best = before;
+}
+
+response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
+  fl_set signed_set = *set; /* its least force is the largest one in reverse */
+  if (set->reverse > 0) {
+    signed_set.low = -set->reverse;
+    signed_set.low_cost = set->reverse_cost;
   }
+  const pod_at_price x = {block, ACTUATOR(block, i), &signed_set, {price[0], price[1]}};
+  real low, high;
+  window_of(set, &low, &high);
+  at_angle best;
+  if (set->half < PI)
+    look_towards(&x, set->middle, set->cos_middle, set->sin_middle, &best);
+  else
+    look_at(&x, set->at, &best);
+  if (is_concave(&x, &best, MIN(set->half, PI)))
+    go_to_root(&x, &best, low, high, 1);
+  else
+    go_to_best_cell(&x, &best, low, high);
 
   /* Eq. of the head: y = T b, and its derivatives by the price. */
-  const real c = COS(best_alpha);
-  const real s = SIN(best_alpha);
-  const real b[2] = {c, s};
-  const real db[2] = {-s, c};
+  const real *b = best.b;
+  const real db[2] = {-b[1], b[0]};
   const real m[2] = {best.dT * best.dv * b[0] + best.T * db[0], best.dT * best.dv * b[1] + best.T * db[1]};
-  const int is_inside = best_alpha > low && best_alpha < high;
+  const real edge = ROUNDING * (1 + FABS(best.alpha)); /* a pod that stands at an end of its arc may be off by rounding */
+  const int is_inside = best.alpha > low + edge && best.alpha < high - edge;
   real over = 0;
   if (is_inside && best.bend < 0) {
-    const real least = NOTHING * (set->turn + FABS(best.T) * x.p) + TINY;
+    const real least = NOTHING * (set->turn + FABS(best.T) * size_of(price)) + TINY;
     over = 1 / MAX(-best.bend, least);
   }
   response o;
@@ -147,7 +190,7 @@ response fl_response_with_turning(const real *block, int i, const fl_set *set, c
   o.xy = best.dT * b[0] * b[1] + over * m[0] * m[1];
   o.yy = best.dT * b[1] * b[1] + over * m[1] * m[1];
   o.conjugate = best.value;
-  o.angle = best_alpha;
+  o.angle = best.alpha;
   return o;
 }
 
