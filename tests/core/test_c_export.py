@@ -137,11 +137,11 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
     said = ran(f"qemu-system-arm {machine} -kernel {elf}", folder)
     found = {name: int(value) for name, value in re.findall(r"(\w+) (\d+)", said)}
     assert found["differ"] == 0 and found["static"] + found["stack"] <= 17_000
-    core = [path.stem for path in folder.glob("*.c") if path.stem not in ("robot", "selftest")]
+    core = [path.stem for path in folder.glob("*.c") if path.stem not in ("robot", "allocate", "selftest")]
     for name in core:
         ran(f"{SMALL} -c {name}.c -o {tmp_path / name}.o", folder)
     sizes = ran(f"arm-none-eabi-size {shlex.join(f'{name}.o' for name in core)}", tmp_path)
-    assert 16_000 < sum(int(line.split()[0]) for line in sizes.splitlines()[1:]) <= 44_000
+    assert 16_000 < sum(int(line.split()[0]) for line in sizes.splitlines()[1:]) <= 48_000
 
 
 @pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
