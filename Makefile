@@ -1,7 +1,17 @@
 # `make app` and `make test` do everything on a fresh Debian or Ubuntu machine with Python 3.11.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
+
+# `make app` alone installs what the app needs (extra `app`); any other goal installs what developers need (extra
+# `dev`, with torch), which serves the app as well. Each has a stamp of its own.
+ifeq ($(MAKECMDGOALS)$(wildcard .venv/.ready),app)
+EXTRA := app
+STAMP := .venv/.ready-app
+else
+EXTRA := dev
 STAMP := .venv/.ready
+endif
+
 LIBRARY := finlab/core/libfinlab.$(if $(filter Darwin,$(shell uname)),dylib,so)
 HOST_PORT ?= 8080
 
@@ -15,9 +25,9 @@ THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 .PHONY: docs schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
-	@echo "make setup        make .venv with everything pinned in constraints.txt"
+	@echo "make setup        make .venv with all that developers need, pinned in constraints.txt (gigabytes, with torch)"
 	@echo "make core         compile the C files of finlab/core, a second; setup does it where they changed"
-	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
+	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT); installs what it needs and no more"
 	@echo "make test         every test, browser tests included; of long tables of cases a share"
 	@echo "make test-all     every test and every case"
 	@echo "make fuzz         a million mutated robots and wild wrenches for the core in C, under sanitizers"
@@ -36,8 +46,8 @@ setup: $(STAMP) $(LIBRARY)
 
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
-	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
-	$(BIN)/pip install --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev]'
+	test -x $(BIN)/pip || tools/make-venv "$(PYTHON)"
+	$(BIN)/pip install --disable-pip-version-check --no-compile -c constraints.txt hatchling -e '.[$(EXTRA)]'
 	@touch $@
 
 core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.h finlab/core/src/*.[ch])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the tables of figures in the documentation again: `make figures`, or `make figures PAGE=evaluation`.
+"""Make the tables of figures in README.md and docs again: `make figures`, or `make figures PAGE=evaluation`.
 
 A page holds a table between two marks,
 
@@ -21,8 +21,8 @@ from finlab.evaluation.document import Table, to_markdown
 from finlab.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = {path.stem: path for path in sorted((ROOT / "docs").rglob("*.md"))}
-MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,]+)*) -->\n)")
+PAGES = {path.stem: path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]}
+MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,-]+)*) -->\n)")
 END = "<!-- end of figures -->"
 
 
@@ -55,10 +55,13 @@ def table_of(name: str, keys: list[str]) -> str:
     return f"\n`{experiment.command(chosen)}`:\n\n{made.rstrip()}\n\n"
 
 
-def _value(text: str) -> int | str | tuple[int, ...]:
-    if "," in text:
-        return tuple(map(int, text.split(",")))
-    return int(text) if text.isdigit() else text
+def _value(text: str) -> int | str | tuple[int, ...] | tuple[str, ...]:
+    """An option as its experiment takes it: numbers or words, several with commas between."""
+    words = text.split(",")
+    if all(word.isdigit() for word in words):
+        numbers = tuple(int(word) for word in words)
+        return numbers if len(numbers) > 1 else numbers[0]
+    return tuple(words) if len(words) > 1 else text
 
 
 if __name__ == "__main__":

@@ -22,6 +22,9 @@ import reference
 from demo import demo_files
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+NUMBER = re.compile(r"\s*\\tag\{(\d+)\}")
+NUMBERED = re.compile(r"^\$\$(?:(?!\$\$).)*\\tag\{(\d+)\}\$\$$", re.MULTILINE | re.DOTALL)
+PYTHON = "reference/python/"
 _shown: dict[str, Any] = {}
 
 
@@ -80,25 +83,48 @@ def _in_navigation(nav: Any, made: list[str]) -> None:
         if isinstance(inside, list):
             _in_navigation(inside, made)
         elif inside.endswith("/"):
-            nav[i] = {title: [name for name in made if name.startswith(inside) and name.endswith(".md")]}
+            pages = [name for name in made if name.startswith(inside) and name.endswith(".md")]
+            nav[i] = {title: _by_package(pages) if inside == PYTHON else pages}
+
+
+def _by_package(pages: list[str]) -> list[Any]:
+    """The pages of Python names, those of each package in a section of its own, under their short names."""
+    entries: list[Any] = [f"{PYTHON}index.md"]
+    sections: dict[str, list[Any]] = {}
+    paths = {Path(page).stem: page for page in pages if page not in entries}
+    packages = {path.rpartition(".")[0] for path in paths} & set(paths)
+    for path, page in paths.items():
+        if path in packages:
+            sections[path] = [{"All names": page}]
+            entries.append({path: sections[path]})
+        else:
+            package, _, name = path.rpartition(".")
+            sections[package].append({name: page})
+    return entries
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Show what the blocks of a page gave."""
+    """Show what the blocks of a page gave, and give each numbered equation an anchor: #eq-8 of `\\tag{8}`."""
     source = f"docs/{page.file.src_uri}"
+    markdown = NUMBERED.sub(r'<a id="eq-\1" class="equation"></a>\n\n\g<0>', markdown)
     return blocks.with_output(markdown, _shown[source]) if source in _shown else markdown
 
 
 def on_page_content(content: str, page: Any, **_: Any) -> str:
-    """Formulas become MathML, which browsers draw themselves."""
+    """Formulas become MathML, which browsers draw themselves; their numbers stand at the right."""
 
     def draw(match: re.Match[str]) -> str:
         shown = "inline" if match.group(1) == "span" else "block"
-        formula = convert_to_element(html.unescape(match.group(2)), display=shown)
+        source = html.unescape(match.group(2))
+        formula = convert_to_element(NUMBER.sub("", source), display=shown)
         for part in formula.iter("msub"):
             if shown == "block" and part[0].text in ("min", "max"):
                 part.tag = "munder"
-        return tostring(formula, encoding="unicode").replace("&amp;#", "&#")
+        drawn = tostring(formula, encoding="unicode").replace("&amp;#", "&#")
+        number = NUMBER.search(source)
+        if number is None:
+            return drawn
+        return f'<div class="equation">{drawn}<span>({number.group(1)})</span></div>'
 
     return FORMULA.sub(draw, content)
 
