@@ -1,6 +1,7 @@
 """What `make docs` does with blocks and names, apart from building the whole site."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -41,3 +42,24 @@ def test_every_name_of_the_package_has_a_page(site: Any) -> None:
     pages = reference.python_pages()
     assert {f"reference/python/finlab.{name}.md" for name in finlab._HOME} <= set(pages)
     assert "reference/python/finlab.sim.ClosedLoop.md" in pages
+
+
+def test_a_numbered_equation_has_an_anchor_and_its_number(site: Any) -> None:
+    import hooks
+
+    page = SimpleNamespace(file=SimpleNamespace(src_uri="theory/nowhere.md"))
+    markdown = hooks.on_page_markdown("$$a = 1$$\n\n$$b = 2 \\tag{7}$$\n", page)
+    assert markdown.count("<a id=") == 1 and markdown.index('<a id="eq-7"') > markdown.index("a = 1")
+    content = hooks.on_page_content('<div class="arithmatex">\\[b = 2 \\tag{7}\\]</div>', page)
+    assert content.endswith("<span>(7)</span></div>") and "tag" not in content
+
+
+def test_names_of_a_package_stand_below_it_in_the_navigation(site: Any) -> None:
+    import hooks
+
+    names = ("index", "finlab", "finlab.Layout", "finlab.sim", "finlab.sim.ClosedLoop")
+    grouped = hooks._by_package([f"reference/python/{name}.md" for name in names])
+    assert grouped[0] == "reference/python/index.md"
+    sections = {title: pages for entry in grouped[1:] for title, pages in entry.items()}
+    assert [list(page) for page in sections["finlab.sim"]] == [["All names"], ["ClosedLoop"]]
+    assert sections["finlab"][1] == {"Layout": "reference/python/finlab.Layout.md"}

@@ -1,0 +1,41 @@
+"""Comments of the core and of the allocation cite equations of docs/theory/method.md that are there."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CITED = re.compile(r"\bEqs?\. (\d+)(?: (?:to|and) (\d+))?")
+"""`Eq. 8`, `Eqs. 6 to 10`; equations of papers are cited in brackets, `Eq. (1)`."""
+
+
+def numbers_of_page() -> list[int]:
+    page = (ROOT / "docs" / "theory" / "method.md").read_text()
+    return [int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)]
+
+
+def test_equations_are_numbered_in_the_order_of_the_page() -> None:
+    numbers = numbers_of_page()
+    assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) >= 14
+
+
+def test_no_equation_stands_within_a_sentence() -> None:
+    page = (ROOT / "docs" / "theory" / "method.md").read_text()
+    lines = page.splitlines()
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("$$"):
+            assert (before, after) == ("", ""), line
+            assert line.endswith("$$"), line
+
+
+def test_cited_equations_exist() -> None:
+    known = {str(number) for number in numbers_of_page()}
+    wrong = []
+    for room in ("core", "allocation"):
+        for path in sorted((ROOT / "finlab" / room).rglob("*.[pch]*")):
+            if path.suffix not in (".py", ".c", ".h"):
+                continue
+            for match in CITED.finditer(path.read_text(encoding="utf-8")):
+                cited = {number for number in match.groups() if number is not None}
+                if not cited <= known:
+                    wrong.append(f"{path.relative_to(ROOT)}: {match.group()}")
+    assert wrong == []
