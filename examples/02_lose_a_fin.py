@@ -10,11 +10,11 @@ from finlab.sim import ClosedLoop, make_trajectory
 
 layout = finlab.load_layout("A")
 allocator = finlab.Allocator(layout)
-for failed in ([], ["front_right"], ["front_right", "back_left"]):
-    result = allocator.allocate([0.5, 0, 0.5, 0, 0, 0.05], failed=failed, seed=0)
-    lost = ", ".join(failed) or "none"
+for lost in ([], ["front_right"], ["front_right", "back_left"]):
+    result = allocator.allocate([0.5, 0, 0.5, 0, 0, 0.05], lost=lost, seed=0)
     missing = ", ".join(f"{value:+.2f}" for value in result.unallocated)
-    print(f"lost: {lost:<22}  err_norm {result.err_norm:8.4f}  missing [{missing}]")
+    names = ", ".join(lost) or "none"
+    print(f"lost: {names:<22}  err_norm {result.err_norm:8.4f}  missing [{missing}]")
 
 # %% [markdown]
 # The score card says what the robot can do, and what is left of it without each fin.

@@ -26,7 +26,7 @@ for lift in (1.0, 10.0, 40.0, 100.0):
 
 # %%
 for policy in ("closest", "direction"):
-    result = allocator.allocate([10.0, 0.0, 150.0, 0.0, 0.0, 0.0], failed=["lift_left"], policy=policy)
+    result = allocator.allocate([10.0, 0.0, 150.0, 0.0, 0.0, 0.0], lost=["lift_left"], policy=policy)
     missing = ", ".join(f"{value:+.1f}" for value in result.unallocated)
     print(f"one thruster lost, {policy:<9}: err_norm {result.err_norm:.3f}, missing [{missing}]")
 

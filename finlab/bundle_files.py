@@ -17,7 +17,7 @@ from finlab.files.guarded import is_regular, read_file, unpacked
 from finlab.files.plain_values import parse_json
 
 FORMAT = "finlab-bundle"
-VERSION = 8
+VERSION = 9
 """Version of the bundle; a reader knows exactly one."""
 ROBOT, ABOUT = "robot.json", "bundle.json"
 NETWORKS = "checkpoint/"

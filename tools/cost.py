@@ -117,8 +117,8 @@ def _answers(
     method: MethodSpec, case: Case, objective: Name, sigma: Array, seed: int = 0
 ) -> tuple[Array, Array]:
     """Costs and normalized errors, each (N,)."""
-    answer = method.on(case.layout).allocate_batch(case.targets, failed=case.failed, seed=seed)
-    works = [name not in case.failed for name in case.layout.names]
+    answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)
+    works = [name not in case.lost for name in case.layout.names]
     command, plant = answer.command[:, works], plant_of(case.healthy)
     error = np.linalg.norm((plant.wrench(command) - case.targets) / sigma, axis=-1)
     # An answer outside its limits is none, whatever it would cost.

@@ -256,7 +256,7 @@ class Actuator(Checked, ABC):
         return max(abs(self.lower[self.THRUST or 0]), abs(self.upper[self.THRUST or 0]))
 
     def command(self, row: Array) -> Command | None:
-        """Returns a row (3,) as the kind's own type; None for a failed one, whose row is NaN."""
+        """Returns a row (3,) as the kind's own type; None for a lost one, whose row is NaN."""
         return None if np.isnan(row[0]) else self.COMMAND(*row[: len(self.NUMBERS)].tolist())
 
     def commands(self, rows: Array) -> Command:

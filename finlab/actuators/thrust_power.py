@@ -102,7 +102,7 @@ class Sides:
 
     def at(self, force: AnyArray) -> tuple[Array, Array]:
         """Returns power [W] and marginal cost [W/N] of forces [N]."""
-        marginal = 0.0 * force  # NaN of a failed one stays
+        marginal = 0.0 * force  # NaN of a lost one stays
         watts = self.rest + marginal
         for curve, sign in self.curves:
             on = force * sign > 0.0

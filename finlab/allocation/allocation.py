@@ -34,7 +34,7 @@ class Later(Protocol):
 
     @property
     def plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators, failed ones included, in the question's flow."""
+        """Judge of commands: the laws of all actuators, lost ones included, in the question's flow."""
         ...
 
     def notes(self) -> tuple[str, ...]: ...
@@ -66,13 +66,13 @@ class Answer(PlainData, Generic[Number]):
     """Fields with arrays."""
 
     layout: Layout
-    """The whole layout, failed actuators included, with the limits that damage has left."""
+    """The whole layout, lost actuators included, with the limits that damage has left."""
     damage: Damage = Damage()
     """What was known of damaged actuators; the lost ones were left out."""
     target: Array
     """Desired wrench (6,) or (N, 6), [N, N m], body frame; NaN along axes that do not count."""
     command: Array
-    """Command (n, 3) or (N, n, 3) of every actuator, as its law takes it; NaN if failed."""
+    """Command (n, 3) or (N, n, 3) of every actuator, as its law takes it; NaN if lost."""
     scale: Array
     """Yardstick (6,) of the error [N, N m]; see `finlab.physics.objective`."""
     method: str
@@ -113,7 +113,7 @@ class Answer(PlainData, Generic[Number]):
                 value.setflags(write=False)
 
     @property
-    def failed(self) -> tuple[str, ...]:
+    def lost(self) -> tuple[str, ...]:
         """Names of the actuators that were left out."""
         return tuple(self.damage.lost)
 
@@ -129,7 +129,7 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def forces(self) -> Array:
-        """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if failed."""
+        """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if lost."""
         return self._by_parts(Plant.body_forces)
 
     @cached_property
@@ -232,8 +232,8 @@ class BatchAllocation(Answer[Array]):
     @cached_property
     def commands(self) -> dict[str, Command | None]:
         """Commands of each actuator by its name, in a type of its own whose numbers are arrays (N,), such as
-        `commands["lift"].force`; with `input`, what a table of thrust says to send. None for a failed one."""
-        lost = set(self.failed)
+        `commands["lift"].force`; with `input`, what a table of thrust says to send. None for a lost one."""
+        lost = set(self.lost)
         parts = zip(self.layout.actuators, np.moveaxis(self.command, 1, 0), strict=True)
         return {part.name: None if part.name in lost else part.commands(rows) for part, rows in parts}
 
@@ -280,7 +280,7 @@ class Allocation(Answer[float]):
 
     @property
     def commands(self) -> dict[str, Command | None]:
-        """Command of each actuator by its name, in a type of its own; None for a failed one."""
+        """Command of each actuator by its name, in a type of its own; None for a lost one."""
         parts = zip(self.layout.actuators, self.command, strict=True)
         return {part.name: part.command(row) for part, row in parts}
 
@@ -347,10 +347,10 @@ class Allocation(Answer[float]):
         return self.of(**{**self.__dict__, "candidates": candidates, "samples": samples})
 
     def __repr__(self) -> str:
-        failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
+        lost = f", lost={', '.join(self.lost)!r:.60}" if self.lost else ""
         effort = "" if self.effort is None else f", effort={self.effort:.3f}"
         return (
-            f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.names)}{failed}, "
+            f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.names)}{lost}, "
             f"method={self.method!r}, err_norm={self.err_norm:.2e}, "
             f"power={self.power:.3g} W{effort}, reachable={self.reachable}, "
             f"solve_ms={self.solve_ms:.1f})"

@@ -137,7 +137,7 @@ class Allocator:
     """Turns a target wrench into one command per actuator, for one robot.
 
     All that a method needs of the robot is prepared when the allocator is made. A damaged robot is prepared
-    when it is first asked about; failed actuators are removed before a method solves and put back (as NaN)
+    when it is first asked about; lost actuators are removed before a method solves and put back (as NaN)
     after, so no method can use one. Force tables are read once. An allocator can be copied and pickled.
     """
 
@@ -260,7 +260,6 @@ class Allocator:
         *,
         lost: Sequence[str] = (),
         damage: Damage | None = None,
-        failed: Sequence[str] = (),
         previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
         free: Sequence[str] = (),
@@ -275,7 +274,6 @@ class Allocator:
             lost: names of actuators that do not work; they leave the graph.
             damage: these and actuators that work in part; the result's layout has what is left of their
                 limits.
-            failed: another word for `lost`.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
@@ -295,7 +293,7 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         values = check_target(wrench)
-        known = damage_of(damage, lost, failed)
+        known = damage_of(damage, lost)
         question = self._question(known, policy, flow, seed, free)
         ready = question.ready
         robot, method = ready.robot, ready.method
@@ -343,7 +341,6 @@ class Allocator:
         *,
         lost: Sequence[str] = (),
         damage: Damage | None = None,
-        failed: Sequence[str] = (),
         free: Sequence[str] = (),
         policy: Policy | str = CLOSEST,
         flow: ArrayLike | None = None,
@@ -355,7 +352,7 @@ class Allocator:
         computed when it is asked for.
         """
         values = check_wrenches(wrenches)
-        known = damage_of(damage, lost, failed)
+        known = damage_of(damage, lost)
         question = self._question(known, policy, flow, seed, free)
         ready = question.ready
         start = time.perf_counter()

@@ -26,7 +26,7 @@ SAME_SIZE = 0.25
 
 
 class ModeSignature(NamedTuple):
-    """What matters of commands: numbers per fin (..., n), NaN where the fin rests or has failed."""
+    """What matters of commands: numbers per fin (..., n), NaN where the fin rests or is lost."""
 
     resting: NDArray[np.bool_]
     """Fins that rest."""
@@ -43,7 +43,7 @@ class Mode(PlainData):
     """One way to deliver the wrench: the best of the alternatives that do the same."""
 
     command: Array
-    """(n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for failed fins."""
+    """(n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for lost fins."""
     err_norm: float
     """Normalized error of that wrench."""
     effort: float
@@ -98,7 +98,7 @@ def _row(signatures: ModeSignature, place: Any) -> ModeSignature:
 
 
 def force_sizes(layout: Layout, command: Array) -> Array:
-    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for failed fins."""
+    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for lost fins."""
     return np.asarray(np.linalg.norm(plant_of(layout).forces(command), axis=-1))
 
 

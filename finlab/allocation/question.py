@@ -1,4 +1,4 @@
-"""Checks of a question: wrenches, previous commands, flow, failed and damaged actuators."""
+"""Checks of a question: wrenches, previous commands, flow, lost and damaged actuators."""
 
 import math
 from collections.abc import Sequence
@@ -47,23 +47,25 @@ class Usable:
         return ~self.alive if self.damage.lost else None
 
     def among_all(self, command: Array) -> Array:
-        """Commands (..., m, 3) of the healthy ones put among all n; the failed ones hold NaN."""
+        """Commands (..., m, 3) of the healthy ones put among all n; the lost ones hold NaN."""
         return among_all(command, self.alive)
 
 
-def damage_of(damage: Damage | None, lost: Sequence[str], failed: Sequence[str]) -> Damage:
-    """What a question says of damage; `failed` means `lost`. Raises AllocationError: it is none, or names are
-    no list."""
+def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:
+    """What a question says of damage: `lost` actuators and those that `damage` names.
+
+    Raises:
+        AllocationError: `damage` is no `Damage`, or `lost` is no list of names.
+    """
     if damage is None:
         known = WHOLE
     elif isinstance(damage, Damage):
         known = damage
     else:
         raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
-    if not len(lost) and not len(failed):
+    if not len(lost):
         return known
-    more = [name for names in (lost, failed) if len(names) for name in lost_names(names)]
-    return replace(known, lost=[*known.lost, *more])
+    return replace(known, lost=[*known.lost, *lost_names(lost)])
 
 
 def usable(layout: Layout, damage: Damage) -> Usable:
@@ -197,10 +199,10 @@ def check_seed(seed: object) -> None:
 
 
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
-    """The previous command (n, 3), a copy, in which failed actuators may hold NaN."""
+    """The previous command (n, 3), a copy, in which lost actuators may hold NaN."""
     array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
     if not _size(array) < math.inf and np.isinf(array).any():
-        raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
+        raise CommandError("previous: expected finite commands (NaN only for lost fins), got infinity")
     if array.shape != (layout.n, 3):
         raise CommandError(
             f"previous: expected a command of shape ({layout.n}, 3) for layout {layout.name!r}, "

@@ -64,7 +64,7 @@ def allocation_blocks(result: Allocation) -> list[Block]:
     rows: list[tuple[str, ...]] = []
     for part, force in zip(result.layout.actuators, result.forces, strict=True):
         command = result.commands[part.name]
-        cells = ("failed", "") if command is None else (command.words, f"{math.hypot(*force):.3f}")
+        cells = ("lost", "") if command is None else (command.words, f"{math.hypot(*force):.3f}")
         rows.append((part.name, part.type, *cells))
     wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
     if result.expected_error:
@@ -115,7 +115,7 @@ def next_measurement(result: Allocation, plant: Plant) -> str:
 
 
 RECORD = (
-    *("failed", "target", "flow", "wrench_expected", "wrench_plant", "unallocated", "err_norm"),
+    *("lost", "target", "flow", "wrench_expected", "wrench_plant", "unallocated", "err_norm"),
     *("expected_error", "expected_miss", "effort", "power", "bound", "calm_power", "scale", "solve_ms"),
     *("method", "checkpoint", "reachable", "share", "binding", "unknown_fins", "notes"),
 )
@@ -138,7 +138,7 @@ def plain_target(target: Array) -> list[float | None]:
 
 def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
     """Commands (n, 3) with their forces (n, 3) [N], body frame, as plain values, along an axis of its own the
-    signed one; None for a failed actuator, whose row is NaN."""
+    signed one; None for a lost actuator, whose row is NaN."""
     values: list[dict[str, object]] = []
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
         own, axis = part.command(row), getattr(part, "axis", None)

@@ -50,7 +50,7 @@ def equal(a: Any, b: Any) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Candidates(PlainData):
-    """Several commands for one target, best first. Failed fins hold NaN."""
+    """Several commands for one target, best first. Lost fins hold NaN."""
 
     command: Array
     """Commands (K, n, 3): amplitude [rad], frequency [Hz], zero direction [rad]."""
@@ -109,7 +109,7 @@ class Solution(NamedTuple):
 
 
 def among_all(command: Array, alive: NDArray[np.bool_]) -> Array:
-    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the failed ones hold NaN."""
+    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the lost ones hold NaN."""
     if len(alive) == command.shape[-2]:
         return command
     full = np.full((*command.shape[:-2], len(alive), 3), np.nan)

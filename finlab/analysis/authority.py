@@ -78,25 +78,22 @@ class Loss:
     weakest: float  # scaled wrench [N] that is within reach in every direction afterwards
 
 
-def authority(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> Authority:
+def authority(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> Authority:
     """Returns what the working actuators hold; arguments and errors as for `losses`."""
-    return _authorities(layout, [failed], flow)[0]
+    return _authorities(layout, [lost], flow)[0]
 
 
 def losses(
-    layout: Layout,
-    failed: Collection[str] = (),
-    before: Authority | None = None,
-    flow: ArrayLike | None = None,
+    layout: Layout, lost: Collection[str] = (), before: Authority | None = None, flow: ArrayLike | None = None
 ) -> tuple[Loss, ...]:
-    """Returns what the loss of each working actuator, on top of `failed`, would cost; none when only one is
+    """Returns what the loss of each working actuator, on top of `lost`, would cost; none when only one is
     left. What these hold `before` may be known; `flow` is the velocity (6,) of the body relative to the water
-    [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no actuator of a name in `failed`."""
-    held = authority(layout, failed, flow) if before is None else before
-    working = [name for name in layout.names if name not in failed]
+    [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no actuator of a name in `lost`."""
+    held = authority(layout, lost, flow) if before is None else before
+    working = [name for name in layout.names if name not in lost]
     if len(working) < 2:
         return ()
-    left = _authorities(layout, [(*failed, name) for name in working], flow)
+    left = _authorities(layout, [(*lost, name) for name in working], flow)
     return tuple(_loss(held, name, after) for name, after in zip(working, left, strict=True))
 
 
@@ -105,8 +102,8 @@ def _authorities(
 ) -> list[Authority]:
     """What is held after each of several failures; one call for all is quicker than many."""
     sets = force_sets(layout, flow=flow).tile(len(failures))
-    for row, failed in enumerate(failures):
-        sets.lose(row, list(layout.indices(tuple(failed))))
+    for row, lost in enumerate(failures):
+        sets.lose(row, list(layout.indices(tuple(lost))))
     counting = sets.along(counted := np.flatnonzero(layout.commanded))
     values, vectors = singular_values(counting)
     held = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]

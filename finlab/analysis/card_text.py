@@ -29,8 +29,8 @@ def _span_lines(card: ScoreCard) -> list[str]:
     held = card.authority
     verb = "pushes" if card.n_actuators == 1 else "push"
     lines = [f"{card.counted} {verb} in {held.rank} of {held.counted} independent directions."]
-    if card.failed:
-        lines.append("Failed: " + ", ".join(card.failed) + ".")
+    if card.lost:
+        lines.append("Lost: " + ", ".join(card.lost) + ".")
     if held.free:
         lines.append("Not commanded, free: " + ", ".join(held.free) + ".")
     if held.without_authority:

@@ -31,9 +31,9 @@ class NullSpace:
     """What can be added to the forces of one answer without any change of the wrench that it gives."""
 
     def __init__(self, answer: Allocation) -> None:
-        """Takes an answer of any method to one wrench; its failed actuators have no part in any direction."""
-        self._alive: NDArray[np.bool_] = np.array([name not in answer.failed for name in answer.names])
-        layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
+        """Takes an answer of any method to one wrench; its lost actuators have no part in any direction."""
+        self._alive: NDArray[np.bool_] = np.array([name not in answer.lost for name in answer.names])
+        layout = answer.layout.without(answer.lost) if answer.lost else answer.layout
         counts = np.isfinite(answer.target)
         self._plant = plant_of(layout).at(answer.flow).counting(counts)
         compiled = Compiled(layout, self._plant, answer.scale).at(self._plant.inflow(None))
@@ -61,7 +61,7 @@ class NullSpace:
 
     def commands(self, shift: Array) -> Array:
         """Returns commands (R, n, 3) of all actuators for shifts (R, k) [N] along the directions, made exact
-        by the actuators' own laws, as an answer is (an error of at most 0.001); NaN for failed ones."""
+        by the actuators' own laws, as an answer is (an error of at most 0.001); NaN for lost ones."""
         exact = refine(self._problem, self._wrench, self._begin(shift), STEPS, EXACT).command
         moved = np.linalg.norm(shift, axis=1)[:, None, None] > 0.0
         return among_all(np.where(moved, exact, self._command), self._alive)

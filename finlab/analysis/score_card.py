@@ -20,14 +20,14 @@ from finlab.physics.objective import REACHED
 
 
 def least_power(
-    layout: Layout, wrenches: ArrayLike, *, failed: Collection[str] = (), flow: ArrayLike | None = None
+    layout: Layout, wrenches: ArrayLike, *, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Array:
     """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
-    as for an allocator. Raises LayoutError: there is no actuator of a name in `failed`."""
+    as for an allocator. Raises LayoutError: there is no actuator of a name in `lost`."""
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
-    if len(set(layout.indices(tuple(failed)))) == layout.n:
+    if len(set(layout.indices(tuple(lost)))) == layout.n:
         return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
-    answer = Allocator(layout).allocate_batch(wanted, failed=tuple(failed), flow=flow)
+    answer = Allocator(layout).allocate_batch(wanted, lost=tuple(lost), flow=flow)
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
 
 
@@ -39,7 +39,7 @@ class ScoreCard:
     """What a layout's working actuators can do. Torques meet forces at the lever 0.2 m."""
 
     layout: str
-    failed: tuple[str, ...]
+    lost: tuple[str, ...]
     flow: tuple[float, ...] | None
     """Velocity of the body relative to the water (6,) [m/s, rad/s], body frame; None at rest."""
     n_actuators: int  # how many work
@@ -74,26 +74,26 @@ class ScoreCard:
         return asdict(self) | {"axes": list(AXES), "reachable": reachable, "worst_loss": worst}
 
 
-def score_card(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `failed` push nothing, in a flow as for
-    `losses`. Raises LayoutError: there is no actuator of a name in `failed`; CommandError: `flow` is not six
+def score_card(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
+    """Returns the score card of a layout whose actuators called `lost` push nothing, in a flow as for
+    `losses`. Raises LayoutError: there is no actuator of a name in `lost`; CommandError: `flow` is not six
     finite numbers."""
     water = check_flow(flow)
-    held = authority(layout, failed, water)
-    power = least_power(layout, np.diag(UNIT), failed=failed, flow=water)
+    held = authority(layout, lost, water)
+    power = least_power(layout, np.diag(UNIT), lost=lost, flow=water)
     power = np.where(held.largest, power, np.nan)
-    lost = set(failed)
+    gone = set(lost)
     return ScoreCard(
         layout=layout.name,
-        failed=tuple(name for name in layout.names if name in failed),
+        lost=tuple(name for name in layout.names if name in gone),
         flow=None if water is None else tuple(water.tolist()),
-        n_actuators=layout.n - len(lost),
-        counted=layout.without(lost).counted if len(lost) < layout.n else "0 actuators",
+        n_actuators=layout.n - len(gone),
+        counted=layout.without(gone).counted if len(gone) < layout.n else "0 actuators",
         authority=held,
-        losses=losses(layout, failed, held, water),
+        losses=losses(layout, lost, held, water),
         unit_wrench=UNIT,
         unit_power=tuple(None if np.isnan(value) else float(value) for value in power),
-        notes=_notes(layout, failed, water),
+        notes=_notes(layout, lost, water),
     )
 
 
@@ -103,8 +103,8 @@ def _left(loss: Loss) -> tuple[float, ...]:
     return loss.rank, round(loss.weakest, 6), len(loss.reachable), round(sum(shares), 6)
 
 
-def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple[str, ...]:
-    sets = force_sets(layout, failed, flow)
+def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[str, ...]:
+    sets = force_sets(layout, lost, flow)
     notes = []
     n_wide = len(wide_arcs(sets))
     if n_wide:
@@ -112,12 +112,12 @@ def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple
         if n_wide > MAX_CUT:
             what = "Largest wrenches, the weakest direction and energies are"
         notes.append(f"{what} of the convex hull: some arcs are wider than half a turn but not full circles.")
-    still = [name for name in layout.by_flow if name not in failed]
+    still = [name for name in layout.by_flow if name not in lost]
     if flow is not None and still:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     if flow is None and still:
         notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
-    if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
+    if any(fin.model.type == "table" for fin in layout.fins if fin.name not in lost):
         notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
     if layout.interaction is not None:
         notes.append("Reach and power are those of the actuators' laws: what their jets take is not in them.")
@@ -132,17 +132,17 @@ class QuickCheck(HeldAxes):
     """Working actuators with the axes that the loss of each costs; those that cost none are left out."""
 
 
-def quick_check(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> QuickCheck:
+def quick_check(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> QuickCheck:
     """Returns what the working actuators hold in a flow as of `score_card`, from singular values alone.
-    Raises LayoutError: there is no actuator of a name in `failed`."""
-    working = [name for name in layout.names if name not in failed]
+    Raises LayoutError: there is no actuator of a name in `lost`."""
+    working = [name for name in layout.names if name not in lost]
     single = working if len(working) > 1 else []
-    sets = force_sets(layout, failed, check_flow(flow)).tile(1 + len(single))
+    sets = force_sets(layout, lost, check_flow(flow)).tile(1 + len(single))
     for row, name in enumerate(single, start=1):
         sets.lose(row, layout.index(name))
     held, *left = held_axes(layout, sets)
-    lost = {
+    costs = {
         name: tuple(axis for axis in held.alone if axis not in after.alone)
         for name, after in zip(single, left, strict=True)
     }
-    return QuickCheck(**vars(held), lost=tuple((name, axes) for name, axes in lost.items() if axes))
+    return QuickCheck(**vars(held), lost=tuple((name, axes) for name, axes in costs.items() if axes))

@@ -23,7 +23,7 @@ def allocate(
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[shared_options.Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
-    weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE", aliases=["--health"])] = (),
+    weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG|N")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG|DEG,N|N")] = (),

@@ -24,7 +24,7 @@ JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]  # where one
 Wrench = tuple[float, float, float, float, float, float]
 Flow = Annotated[Wrench | None, arg(metavar="VX VY VZ WX WY WZ", help=FLOW)]
 Robot = Annotated[Positional[str], arg(metavar="LAYOUT", help=LAYOUT)]
-Lost = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME", aliases=["--failed"])]
+Lost = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")]
 Free = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXIS")]
 Count = Annotated[int, arg(metavar="N")]
 Cluster = Annotated[str | None, arg(metavar="ADDRESS", help=CLUSTER)]
@@ -58,20 +58,20 @@ def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
         print(table)
 
 
-def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
+def open_robot(text: str, lost: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
     """The layout in a file, or the shipped one of that name, and the names of all actuators that do not work:
-    those that a bundle marks as failed and those named now, each once. Raises LayoutError: neither a readable
+    those that a bundle marks as lost and those named now, each once. Raises LayoutError: neither a readable
     file nor a shipped layout."""
     from finlab.assets import shipped_layouts
-    from finlab.layout.load import layout_and_failed
+    from finlab.layout.load import layout_and_lost
 
     if text in shipped_layouts():
-        layout, lost = layout_and_failed(text)
+        layout, known = layout_and_lost(text)
     else:
         from finlab.files.worker import in_worker
 
-        layout, lost = in_worker(layout_and_failed, text)
-    return layout, tuple(dict.fromkeys([*lost, *failed]))
+        layout, known = in_worker(layout_and_lost, text)
+    return layout, tuple(dict.fromkeys([*known, *lost]))
 
 
 def check_positive(**counts: int | None) -> None:

@@ -1,4 +1,4 @@
-"""`finlab simulate`: a robot swims a trajectory, fins fail on the way, a log is written."""
+"""`finlab simulate`: a robot swims a trajectory, actuators are lost on the way, a log is written."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from finlab.whole_file import make_folder
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
     from finlab.fit.robot.fitted_robot import OnlineFit
-    from finlab.sim import ClosedLoop, RunLog
+    from finlab.sim import ClosedLoop, Fault, RunLog
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,14 @@ class Options:
     excite: bool = False
     """shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and attitude;
     `finlab fit robot` learns the robot from the log."""
-    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = ()
-    """a fin and when it is lost, such as front_left@30; or what else becomes of it: front_left@30:torn=0.5
-    (half of its thrust is left), front_left@30:stuck (it no longer turns), front_left@60:whole (it is
-    repaired)."""
+    lost: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = ()
+    """an actuator and when it is lost, such as front_left@30; from the start where no time is said."""
+    torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE@SECONDS")] = ()
+    """one that gives a share of its thrust from then on, such as front_left=0.5@30."""
+    stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = ()
+    """one that no longer turns from then on."""
+    whole: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = ()
+    """one that is repaired."""
     announced: bool = True
     """whether what happens to fins is announced to the allocator."""
     monitor: bool = False
@@ -111,10 +115,10 @@ def _excitation(options: Options) -> ClosedLoop:
     from finlab.sim.excite import LONGEST_S, excitation
 
     robot, lost = open_robot(options.layout)
-    if options.fail or options.monitor or options.learn or options.controller != "tracking":
+    if _faults(options) or options.monitor or options.learn or options.controller != "tracking":
         raise FinlabError(
             "--excite: a robot is learned with the fins that it has, by a controller of its own; leave "
-            "--controller, --fail, --monitor and --learn out"
+            "--controller, --lost, --torn, --stuck, --whole, --monitor and --learn out"
         )
     seconds = LONGEST_S if options.duration is None else options.duration
     return excitation(robot.without(lost), seconds, **_world(options))
@@ -128,7 +132,7 @@ def _swim(options: Options) -> ClosedLoop:
 
     robot, lost = open_robot(options.layout)
     world = _world(options)
-    faults = [*(Fault(name, 0.0) for name in lost), *map(Fault.parse, options.fail)]
+    faults = [*(Fault(name, 0.0) for name in lost), *_faults(options)]
     allocator = load_method_spec(options.method, options.checkpoint).on(robot)
     return ClosedLoop(
         robot,
@@ -141,6 +145,17 @@ def _swim(options: Options) -> ClosedLoop:
         learner=_learner(allocator) if options.learn else None,
         **world,
     )
+
+
+def _faults(options: Options) -> list[Fault]:
+    """What becomes of actuators during the swim."""
+    from finlab.sim import Fault
+
+    faults = [Fault.parse("lost", text) for text in options.lost]
+    faults += [Fault.parse("torn", text) for text in options.torn]
+    faults += [Fault.parse("stuck", text) for text in options.stuck]
+    faults += [Fault.parse("whole", text) for text in options.whole]
+    return faults
 
 
 def _world(options: Options) -> dict[str, Any]:

@@ -128,12 +128,12 @@ class Completion:
     """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted axes."""
 
     def __init__(
-        self, layout: Layout, failed: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
+        self, layout: Layout, lost: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
     ) -> None:
         """Prepares for the actuators that work, at least one, the wanted and the free axes, by their names.
         Raises LayoutError: an unknown name, or no actuator is left."""
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
-        planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
+        planar = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
         chosen = mask_of(axes)
         wanted, held = planar[chosen], planar[~mask_of((*axes, *free))]
         left, values, right = np.linalg.svd(wanted)
@@ -168,13 +168,13 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
     return next(able, lifts)
 
 
-def steers(layout: Layout, failed: Sequence[str] = ()) -> bool:
+def steers(layout: Layout, lost: Sequence[str] = ()) -> bool:
     """Whether what works of a robot can give the axes that are commanded independently, in small."""
-    return Completion(layout, failed, axes_of(layout)).controllable
+    return Completion(layout, lost, axes_of(layout)).controllable
 
 
-def steerable_loss(layout: Layout, count: int, failed: Sequence[str] = ()) -> tuple[str, ...] | None:
-    """The first actuators, so many besides those that failed, without which a robot can still be steered."""
-    working = [name for name in layout.names if name not in failed]
+def steerable_loss(layout: Layout, count: int, lost: Sequence[str] = ()) -> tuple[str, ...] | None:
+    """The first actuators, so many besides the lost ones, without which a robot can still be steered."""
+    working = [name for name in layout.names if name not in lost]
     ways = combinations(working, count) if count < len(working) else ()
-    return next((way for way in ways if not count or steers(layout, (*failed, *way))), None)
+    return next((way for way in ways if not count or steers(layout, (*lost, *way))), None)

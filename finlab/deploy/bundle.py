@@ -74,24 +74,24 @@ class Bundle:
         return packed(self.files)
 
 
-def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
+def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     """Prepare what a robot runs: the robot, method (`dual`, `mdn` or `paper`) and settings of an allocator,
     and the names of fins that do not work; networks that do not come with finlab travel. Raises LayoutError:
-    an unknown failed fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a
+    an unknown lost fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a
     force table cannot be read, or something is too large to travel."""
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
-    layout, cases = allocator.layout, self_tests(allocator, failed)
+    layout, cases = allocator.layout, self_tests(allocator, lost)
     inside, tables = with_tables_inside(layout)
     sha256, networks = _networks(allocator.weights)
     files = {
-        bundle_files.ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
+        bundle_files.ROBOT: robot_bytes(Robot(inside, lost, sha256, cases)),
         bundle_files.ABOUT: _about(allocator),
         **tables,
         **networks,
-        bundle_files.README: _readme(allocator, failed).encode(),
+        bundle_files.README: _readme(allocator, lost).encode(),
     }
     if sum(map(len, files.values())) > bundle_files.LARGEST_BUNDLE:
         raise DataError(
@@ -147,7 +147,7 @@ def renamed(layout: Layout, names: Mapping[str, str]) -> Layout:
     )
 
 
-def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
+def _readme(allocator: Allocator, lost: tuple[str, ...]) -> str:
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(
         name=allocator.layout.name,
@@ -156,7 +156,7 @@ def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
         method=allocator.method,
         networks="" if allocator.checkpoint is None else f" with checkpoint `{allocator.checkpoint}`",
         actuators=", ".join(allocator.layout.names),
-        failed=list(failed),
+        lost=list(lost),
     )
 
 

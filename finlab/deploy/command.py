@@ -69,7 +69,7 @@ def allocate(arguments: argparse.Namespace) -> int:
 
     answer = _robot(arguments).allocate(
         arguments.wrench,
-        failed=arguments.failed,
+        lost=arguments.lost,
         free=arguments.free,
         policy=arguments.policy,
         flow=arguments.flow,
@@ -134,15 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     ).add_argument
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
     one("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
-    one(
-        "--lost",
-        "--failed",
-        dest="failed",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="actuator that is lost",
-    )
+    one("--lost", action="append", default=[], metavar="NAME", help="actuator that is lost")
     axes = "axis that may take any wrench, such as Ty"
     one("--free", action="append", default=[], metavar="AXIS", help=axes)
     one("--policy", choices=POLICIES, default="closest", help="what to do out of reach")

@@ -40,7 +40,7 @@ class DeployedRobot:
     """What `finlab-runtime` works with."""
 
     allocator: Allocator  # made of the bundle's settings and, where there are any, networks
-    failed: tuple[str, ...] = ()  # actuators that the bundle names as failed
+    lost: tuple[str, ...] = ()  # actuators that the bundle names as lost
     self_test: tuple[Case, ...] = ()
     """Targets with the answers of the computer that made the bundle."""
 
@@ -49,24 +49,24 @@ class DeployedRobot:
         """All fins."""
         return self.allocator.layout
 
-    def allocate(self, wrench: ArrayLike, *, failed: Sequence[str] = (), **options: Any) -> Allocation:
+    def allocate(self, wrench: ArrayLike, *, lost: Sequence[str] = (), **options: Any) -> Allocation:
         """Commands for a target (6,) [N, N m] in the body frame; arguments and errors as in
-        `finlab.Allocator.allocate`. What the bundle names as failed stays failed, whatever `failed` adds.
+        `finlab.Allocator.allocate`. What the bundle names as lost stays lost, whatever `lost` adds.
         Raises DataError: the answer is no number, as a broken bundle gives it."""
-        lost = (*self.failed, *(name for name in failed if name not in self.failed))
-        answer = self.allocator.allocate(wrench, failed=lost, **options)
-        works = [name not in lost for name in self.layout.names]
+        all_lost = (*self.lost, *(name for name in lost if name not in self.lost))
+        answer = self.allocator.allocate(wrench, lost=all_lost, **options)
+        works = [name not in all_lost for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():
             raise DataError(
                 "the bundle answers with NaN; export it again, and run `finlab-runtime check` on it"
             )
         return answer
 
-    def neutral(self, failed: Sequence[str] = (), now: Array | None = None) -> Array:
+    def neutral(self, lost: Sequence[str] = (), now: Array | None = None) -> Array:
         """Commands (n, 3) that push least, see `Actuator.neutral`, given the present ones (n, 3) if any."""
         rows = [None] * self.layout.n if now is None else now
         command = np.array([part.neutral(row) for part, row in zip(self.layout.actuators, rows, strict=True)])
-        command[[name in (*self.failed, *failed) for name in self.layout.names]] = np.nan
+        command[[name in (*self.lost, *lost) for name in self.layout.names]] = np.nan
         return command
 
 
@@ -76,8 +76,8 @@ def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
     if not is_bundle(path) and str(path).endswith((".json", ".yaml", ".yml")) and os.path.exists(path):
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
     robot = parse_robot(read_bundle_files(path), str(path))
-    if robot.failed:  # what is left is prepared now, not at the first answer
-        robot.allocator.allocate(np.zeros(6), failed=robot.failed)
+    if robot.lost:  # what is left is prepared now, not at the first answer
+        robot.allocator.allocate(np.zeros(6), lost=robot.lost)
     return robot
 
 
@@ -89,7 +89,7 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
     if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
         raise DataError(f"{source}: was made with other networks than this finlab's; export it with this one")
-    return DeployedRobot(allocator, robot.failed, robot.self_test)
+    return DeployedRobot(allocator, robot.lost, robot.self_test)
 
 
 class Finding(NamedTuple):
@@ -105,20 +105,20 @@ class Finding(NamedTuple):
         return self.value <= self.limit
 
 
-def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...]:
+def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
     """Targets that can be reached, wrenches of random commands, with an allocator's answers.
 
-    They depend on the layout and the allocator alone. Raises LayoutError: an unknown failed actuator, or none
+    They depend on the layout and the allocator alone. Raises LayoutError: an unknown lost actuator, or none
     left; DataError: a fin's force table cannot be read."""
     layout = allocator.layout
-    plant = plant_of(layout.without(failed) if failed else layout)
+    plant = plant_of(layout.without(lost) if lost else layout)
     cases = []
     for wrench in plant.wrench(plant.sample(np.random.default_rng(0), (N_SELF_TEST,))):
         target = _rounded(wrench)
-        answer = _rounded(allocator.allocate(target, failed=failed).command)
+        answer = _rounded(allocator.allocate(target, lost=lost).command)
         delivered = _rounded(plant.wrench(answer[~np.isnan(answer).any(axis=1)]))
         rows = [
-            None if name in failed else tuple(row)
+            None if name in lost else tuple(row)
             for name, row in zip(layout.names, answer.tolist(), strict=True)
         ]
         cases.append(Case(tuple(target.tolist()), tuple(rows), tuple(delivered.tolist())))
@@ -130,14 +130,14 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
     table cannot be read."""
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
-    layout, failed = robot.layout, robot.failed
-    alive = [i for i, name in enumerate(layout.names) if name not in failed]
-    plant, scale = plant_of(layout.without(failed) if failed else layout), robot.allocator.scale
+    layout, lost = robot.layout, robot.lost
+    alive = [i for i, name in enumerate(layout.names) if name not in lost]
+    plant, scale = plant_of(layout.without(lost) if lost else layout), robot.allocator.scale
     differs, errors, allowed = [], [], REACHED
     for case in robot.self_test:
         stored = plant.wrench(np.array([case.command[i] for i in alive], dtype=np.float64))
         differs.append(float(np.linalg.norm((stored - np.array(case.delivered_wrench)) / scale)))
-        errors.append(robot.allocator.allocate(case.wrench, failed=failed).err_norm)
+        errors.append(robot.allocator.allocate(case.wrench, lost=lost).err_norm)
         missing = (stored - np.array(case.wrench)) * layout.commanded / scale
         allowed = max(allowed, AS_GOOD * float(np.linalg.norm(missing)))
     return [
@@ -151,14 +151,14 @@ def extremes(robot: DeployedRobot) -> Finding:
     value is how many of these have no answer, and the question names the first of them."""
     layout, silent, n = robot.layout, [], 0
     kinds = KINDS if method_class(robot.allocator.method).every_policy else KINDS[:1]
-    alive = [name for name in layout.names if name not in robot.failed]
+    alive = [name for name in layout.names if name not in robot.lost]
     for lost in [(), *([name] for name in alive if len(alive) > 1)]:
         for policy, i in product(kinds, np.flatnonzero(layout.commanded)):
             for way in (-1.0, 1.0):
                 target = np.zeros(6)
                 target[i], n = way * FAR * robot.allocator.scale[i], n + 1
                 try:
-                    robot.allocate(target, failed=lost, policy=policy)
+                    robot.allocate(target, lost=lost, policy=policy)
                 except Exception as error:  # each is a finding
                     what = f"{policy} {'+' if way > 0.0 else '-'}{AXES[i]}, {' '.join(lost) or 'none'} lost"
                     silent.append(f"{what}: {type(error).__name__}: {error!s:.100}")

@@ -62,7 +62,7 @@ class Opened(NamedTuple):
     """Every file that it names is kept in that folder, under a name made from its content."""
     missing: tuple[str, ...] = ()
     """Files that it named and that did not come with it, though the layout makes sense without."""
-    failed: tuple[str, ...] = ()  # actuators that a bundle says are lost
+    lost: tuple[str, ...] = ()  # actuators that a bundle says are lost
     notes: tuple[str, ...] = ()  # what was taken where a robot description is silent
 
 
@@ -76,7 +76,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         parts = bundle_files_of(content, source)
         robot = robot_of(parts, source)
-        layout, failed = robot.layout, robot.failed
+        layout, lost = robot.layout, robot.lost
     else:
         parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
         layouts = [name for name in parts if name.endswith(LAYOUTS)]
@@ -88,9 +88,9 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
             )
         (file,) = layouts
         layout = layout_of(f"{source}/{file}", parts[file], (inside / file).parent)
-        failed = ()
+        lost = ()
     by_path = {str(inside / name): part for name, part in parts.items()}
-    return adopted(layout, by_path, folder, source)._replace(failed=failed)
+    return adopted(layout, by_path, folder, source)._replace(lost=lost)
 
 
 def read_design(source: str, content: bytes, folder: Path) -> Opened:

@@ -52,7 +52,6 @@ class Request(Struct, forbid_unknown_fields=True):
 
     wrench: Any
     id: Any = None
-    failed: list[str] = []
     lost: list[str] = []
     free: list[str] = []
     policy: str = "closest"
@@ -80,7 +79,7 @@ class Server:
         self._robot, self._watchdog = robot, watchdog
         self._sent: Allocation | Array | None = None  # the last answer, or commands of rest (n, 3)
         self._sent_at = 0.0
-        self._failed: tuple[str, ...] = ()
+        self._lost: tuple[str, ...] = ()
 
     def run(self, transport: StandardStreams) -> None:
         """Serve until the requests end or a signal asks to stop; then the fins rest. Raises Unsent: answers
@@ -127,10 +126,9 @@ class Server:
         try:
             request = parse_request(line)
             name = request.id
-            lost = (*request.lost, *request.failed)
             answer = self._robot.allocate(
                 request.wrench,
-                failed=lost,
+                lost=request.lost,
                 free=request.free,
                 previous=self._sent if fresh else None,
                 reference=request.reference,
@@ -148,13 +146,13 @@ class Server:
                 self._rest(),
                 _error(name, f"the target could not be answered ({what}); the robot rests, ask again"),
             ]
-        self._failed = lost
+        self._lost = tuple(request.lost)
         self._sent, self._sent_at = answer, time.monotonic()
         return [reply]
 
     def _rest(self) -> dict[str, Any]:
         now = self._sent.command if isinstance(self._sent, Allocation) else self._sent
-        rest = self._robot.neutral(self._failed, now)
+        rest = self._robot.neutral(self._lost, now)
         if self._sent is not None:  # what follows begins at rest
             self._sent, self._sent_at = rest, time.monotonic()
         return self._reply(None, "neutral", rest)

@@ -32,7 +32,7 @@ def run_method(
     """The columns of `score` of a method's answers to a case, whose targets, or only the first so many, are
     solved together; `number` is that of the layout in its split."""
     targets = case.targets[:first]
-    answer = method.on(case.layout).allocate_batch(targets, failed=case.failed, seed=seed)
+    answer = method.on(case.layout).allocate_batch(targets, lost=case.lost, seed=seed)
     return score(case, targets, answer.command, answer.solve_ms, number=number)
 
 

@@ -51,16 +51,16 @@ NOISE = 0.03  # standard deviation of each component of a force, as a share of i
 class Case(NamedTuple):
     """One layout with targets that its healthy fins can deliver, and what errors on it are divided by."""
 
-    layout: Layout  # all fins, failed ones included
+    layout: Layout  # all fins, lost ones included
     targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
-    failed: tuple[str, ...]  # names of the fins that do not work
+    lost: tuple[str, ...]  # names of the fins that do not work
     sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
     @property
     def healthy(self) -> Layout:
-        """The layout without the fins that have failed."""
-        return self.layout.without(self.failed)
+        """The layout without the fins that are lost."""
+        return self.layout.without(self.lost)
 
 
 def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
@@ -80,11 +80,11 @@ def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     """Case k of `make_split`."""
     entropy = (DOMAIN, SPLITS[split][0], seed, k)
     layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
-    layout, failed = SPLITS[split][1](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
-    plant = Plant(layout.without(failed))
+    layout, lost = SPLITS[split][1](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
+    plant = Plant(layout.without(lost))
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
     own = own_sigma(plant, np.random.default_rng(sigma_seed)) if split in OWN_SIGMA else None
-    return Case(layout, targets, failed, own)
+    return Case(layout, targets, lost, own)
 
 
 def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
@@ -95,11 +95,11 @@ def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
 
 
 Draw = Callable[[np.random.Generator, str], tuple[Layout, tuple[str, ...]]]
-"""From a generator and a name: a layout and its failed fins."""
+"""From a generator and a name: a layout and its lost fins."""
 
 
 def _whole(**options: Any) -> Draw:
-    """Layouts of which no fin has failed; options of `random_layout`."""
+    """Layouts of which no fin is lost; options of `random_layout`."""
     return lambda rng, name: (random_layout(rng, name, **options), ())
 
 
@@ -188,5 +188,5 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     ),
     "any-shaft": (21, _robots(random_shaft_fin, count=(2, 8))),
 }
-"""Name -> a number that is part of the seed and of no other split, and how a layout and its failed fins are
+"""Name -> a number that is part of the seed and of no other split, and how a layout and its lost fins are
 drawn."""

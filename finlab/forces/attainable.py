@@ -106,19 +106,19 @@ def attainable_set(
     layout: Layout,
     kind: Kind,
     *,
-    failed: Collection[str] = (),
+    lost: Collection[str] = (),
     tolerance: float = TOLERANCE,
     flow: ArrayLike | None = None,
 ) -> AttainableSet:
     """Returns what forces or torques (by `kind`) the actuators can give with all else at zero; those in
-    `failed` push nothing, and the body moves through the water with `flow` (6,) [m/s, rad/s], body frame,
+    `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s, rad/s], body frame,
     None at rest. A `LayoutError` at an unknown name.
 
     Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
     still lies further than `tolerance`, a share of the farthest vertex, inside the plane that touches the
     set, its normal is sent out too.
     """
-    support = _support(force_sets(layout, failed, flow), kind)
+    support = _support(force_sets(layout, lost, flow), kind)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
     # Flat robots have flat sets: directions are spread over a cube that has been scaled as the set is.

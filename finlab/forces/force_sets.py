@@ -160,13 +160,13 @@ class Shape(NamedTuple):
         return self.half <= 0.5 * math.pi and back >= -THINNEST * self.radius
 
 
-def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
+def force_sets(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
     """Returns what the actuators of one robot can push along the axes that it commands; nothing counts along
-    the others. Those in `failed` push nothing, and the body moves through the water with `flow` (6,) [m/s,
+    the others. Those in `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s,
     rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
-    lost = layout.indices(tuple(failed))
+    gone = layout.indices(tuple(lost))
     sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
-    sets.lose(0, list(lost))
+    sets.lose(0, list(gone))
     return sets
 
 

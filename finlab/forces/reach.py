@@ -92,12 +92,12 @@ class Ranges(NamedTuple):
 
 
 def axis_ranges(
-    layout: Layout, wrench: ArrayLike, failed: Collection[str] = (), flow: ArrayLike | None = None
+    layout: Layout, wrench: ArrayLike, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Ranges:
     """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by about a
-    millionth at most; `failed`, `flow` and errors are as for `force_sets`."""
+    millionth at most; `lost`, `flow` and errors are as for `force_sets`."""
     water = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
-    parts = _parts(layout, tuple(failed), water, layout.stamps)
+    parts = _parts(layout, tuple(lost), water, layout.stamps)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     held = np.where(axes == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
     rays, held = (np.tile(rows, (len(parts.radius) // len(axes), 1)) for rows in (axes, held))
@@ -110,10 +110,10 @@ def axis_ranges(
 
 @lru_cache(maxsize=16)
 def _parts(
-    layout: Layout, failed: tuple[str, ...], flow: tuple[float, ...] | None, stamps: object
+    layout: Layout, lost: tuple[str, ...], flow: tuple[float, ...] | None, stamps: object
 ) -> ForceSets:
     """Convex parts of a robot, each for both ways along all axes."""
-    return convex_parts(force_sets(layout, failed, flow)).repeat(12)
+    return convex_parts(force_sets(layout, lost, flow)).repeat(12)
 
 
 RANK_TOLERANCE = 1e-6

@@ -88,7 +88,7 @@ Wrench = tuple[float, float, float, float, float, float]
 
 
 class Case(Struct, frozen=True, forbid_unknown_fields=True):
-    """A target [N, N m], a command per actuator in SI and radians (null for a failed one), and its wrench."""
+    """A target [N, N m], a command per actuator in SI and radians (null for a lost one), and its wrench."""
 
     wrench: Wrench
     command: tuple[tuple[float, float, float] | None, ...]
@@ -99,8 +99,8 @@ class Robot(Struct, forbid_unknown_fields=True):
     """What a bundle holds beside the method's settings."""
 
     layout: Any
-    """The `Layout`, failed actuators included; in the file as a layout file has it."""
-    failed: tuple[Name, ...]
+    """The `Layout`, lost actuators included; in the file as a layout file has it."""
+    lost: tuple[Name, ...]
     """Actuators that do not work."""
     weights_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")] | None
     """SHA-256 of the weights of the method's networks, hexadecimal; None for methods without."""
@@ -124,7 +124,7 @@ def robot_of(files: Files, source: str) -> Robot:
     layout: Layout = parse_layout(robot.layout, f"{place}: layout", folder, may_open=False)
     tables = {str(folder / name) for name in files if name.startswith(TABLES)}
     with under(source=place):
-        layout.indices(robot.failed)
+        layout.indices(robot.lost)
         for fin in layout.fins:
             if fin.model.values().get("path", "") not in {"", *tables}:
                 problem = "names a force table that is not in the bundle; export it again"
@@ -156,17 +156,17 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     Raises LayoutError: the file cannot be read or is not a valid layout; the message names file and key;
     DataError: the bundle cannot be read, or was changed.
     """
-    return layout_and_failed(layout)[0]
+    return layout_and_lost(layout)[0]
 
 
-def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
+def layout_and_lost(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
     """Returns a layout as `load_layout` opens it, with its errors, and the names of the actuators that a
-    bundle marks as failed; none of a file."""
+    bundle marks as lost; none of a file."""
     file = layout_path(layout)
     source = str(layout)
     if is_bundle(file):
         robot = robot_of(read_bundle_files(file), source)
-        return robot.layout, robot.failed
+        return robot.layout, robot.lost
     content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
     return layout_in(content, file.suffix, source, file.resolve().parent), ()
 

@@ -97,7 +97,7 @@ class Source(NamedTuple):
 
 
 def expected_miss(plant: Plant, command: Array) -> Array:
-    """Returns the standard deviation (N, 6) [N, N m] of the wrench of commands (N, n, 3); failed ones (NaN)
+    """Returns the standard deviation (N, 6) [N, N m] of the wrench of commands (N, n, 3); lost ones (NaN)
     add nothing."""
     variances = [source.variance for source in sources_of_miss(plant, command)]
     return np.sqrt(sum(variances, np.zeros((len(command), 6))))
@@ -134,9 +134,9 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
 def _errors(layout: Layout, place: int, known: Known, command: Array, force: Array) -> Array:
     """One standard deviation of the errors (N, 3, 3) [N] of an actuator, each a force in its own frame: along
     its force (N, 3), across it and along the shaft."""
-    failed = np.isnan(command[:, 0])
+    lost = np.isnan(command[:, 0])
     deviation = known.deviation(np.nan_to_num(command), np.linalg.norm(force, axis=-1))
-    deviation = np.where(failed[:, None], 0.0, deviation)
+    deviation = np.where(lost[:, None], 0.0, deviation)
     part = layout.actuators[place]
     acting = force if len(part.PUSHES) == 1 else force * [0.0, 1.0, 1.0]
     size = np.linalg.norm(acting, axis=-1, keepdims=True)

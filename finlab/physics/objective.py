@@ -41,7 +41,7 @@ def fin_effort(command: Values, upper: Values) -> Values:
 
 
 def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
-    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN)
+    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Lost fins (NaN)
     count nothing."""
     effort = fin_effort(command, upper)
     return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
@@ -137,14 +137,14 @@ REACHED = 1e-3
 
 
 def judged_power(plant: Plant, command: Array) -> Array:
-    """Mean mechanical power (N,) [W] of commands (N, n, 3); what has failed (NaN) takes none."""
+    """Mean mechanical power (N,) [W] of commands (N, n, 3); what is lost (NaN) takes none."""
     return np.asarray(np.nansum(plant.power(command), axis=-1))
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:
-    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what has failed (NaN)."""
-    failed = np.isnan(command).any(axis=-1, keepdims=True)
-    return np.asarray(_meter(layout)(np.where(failed, 0.0, command) if failed.any() else command))
+    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what is lost (NaN)."""
+    lost = np.isnan(command).any(axis=-1, keepdims=True)
+    return np.asarray(_meter(layout)(np.where(lost, 0.0, command) if lost.any() else command))
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:

@@ -94,7 +94,7 @@ class Plant:
         or a value is infinite or partly NaN.
 
         Args:
-            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a failed one and gives no force.
+            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a lost one and gives no force.
             flow: (..., 6), or None at rest.
 
         Returns:
@@ -129,10 +129,10 @@ class Plant:
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
-        values, failed = self._checked(command)
+        values, lost = self._checked(command)
         force = self.force(values, flow=flow)
-        if failed is not None:
-            force[np.broadcast_to(failed, force.shape[:-1])] = 0.0
+        if lost is not None:
+            force[np.broadcast_to(lost, force.shape[:-1])] = 0.0
         return force
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
@@ -161,7 +161,7 @@ class Plant:
         return force
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns wrenches (..., 6) of commands (..., n, 3) without failed ones, and their derivatives
+        """Returns wrenches (..., 6) of commands (..., n, 3) without lost ones, and their derivatives
         (..., 6, 3 n), one actuator after the other."""
         force, jacobian = self.force_and_jacobian(command, flow=flow)
         offset, effectiveness = self.effect(force, flow=flow)
@@ -170,7 +170,7 @@ class Plant:
         return wrench, jacobian.swapaxes(-1, -2)
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's."""
+        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a lost one's."""
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
@@ -230,7 +230,7 @@ class Plant:
         return np.asarray(self.lower + rng.uniform(size=(*size, self.n, 3)) * self.width)
 
     def _checked(self, command: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Finite float64 commands (..., n, 3), and which have failed (..., n), None where none has."""
+        """Finite float64 commands (..., n, 3), and which are lost (..., n), None where none has."""
         try:
             values = np.asarray(command, dtype=np.float64)
         except (TypeError, ValueError):
@@ -243,14 +243,14 @@ class Plant:
             )
         if np.isfinite(values).all():
             return values, None
-        failed: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
-        values = np.where(failed[..., None], 0.0, values)
+        lost: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
+        values = np.where(lost[..., None], 0.0, values)
         if not np.isfinite(values).all():
             raise CommandError(
                 f"the command for layout {self.layout.name} holds NaN or infinite values; "
-                "a failed actuator has NaN in all three entries, any other has none"
+                "a lost actuator has NaN in all three entries, any other has none"
             )
-        return values, failed
+        return values, lost
 
 
 def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ Controllers, gains and allocators go on believing the layout; only the simulated
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, NamedTuple, cast
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from msgspec import Meta
@@ -98,33 +98,41 @@ class Fault(NamedTuple):
     """Share of the thrust that is left of a torn one, above 0 and below 1; of no meaning for the others."""
 
     @classmethod
-    def parse(cls, text: str) -> "Fault":
-        """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:torn=SHARE` says; else
-        a `FinlabError`."""
-        name, at, rest = text.rpartition("@")
-        number, _, what = rest.partition(":")
-        kind, equals, share = what.partition("=")
+    def parse(cls, kind: Kind, text: str) -> "Fault":
+        """The event that an option of the command line says.
+
+        Args:
+            kind: what becomes of the actuator, which is the name of the option.
+            text: `NAME@SECONDS`, or `NAME` for the start; of a torn one `NAME=SHARE@SECONDS` or `NAME=SHARE`.
+
+        Raises:
+            FinlabError: the text says something else, or the time or the share is out of range.
+        """
+        what, at, seconds = text.rpartition("@")
+        if not at:
+            what, seconds = text, "0"
+        name, equals, share = what.partition("=")
+        example = "front_left=0.5@30" if kind == "torn" else "front_left@30"
+        expected = "NAME=SHARE@SECONDS" if kind == "torn" else "NAME@SECONDS"
+        wrong = FinlabError(f"{kind}: expected {expected} such as {example}, got {text!r:.60}")
+        if not name or bool(equals) != (kind == "torn"):
+            raise wrong
         try:
-            known = cast(Kind, kind or "lost")
-            fault = cls(name, float(number), known, float(share) if equals else 0.5).checked()
-        except (ValueError, FinlabError):
-            fault = None
-        if not at or not name or fault is None or (equals and kind != "torn"):
-            raise FinlabError(
-                "--fail: expected NAME@SECONDS such as front_left@30, with :torn=0.5, :stuck or :whole after "
-                f"it for what is no loss, got {text!r:.60}"
-            )
-        return fault
+            time_s = float(seconds)
+            left = float(share) if equals else 0.5
+        except ValueError:
+            raise wrong from None
+        return cls(name, time_s, kind, left).checked()
 
     def checked(self) -> "Fault":
         """Itself; a `FinlabError` where a time, a kind or a share is none."""
         if not (math.isfinite(self.time_s) and self.time_s >= 0.0):
-            raise FinlabError(f"failure of {self.name}: expected a time of 0 s or more, got {self.time_s}")
+            raise FinlabError(f"fault of {self.name}: expected a time of 0 s or more, got {self.time_s}")
         if self.kind not in KINDS:
-            raise FinlabError(f"failure of {self.name}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
+            raise FinlabError(f"fault of {self.name}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
         if not 0.0 < self.share < 1.0:
             raise FinlabError(
-                f"failure of {self.name}: expected a share of the thrust between 0 and 1, got {self.share}"
+                f"fault of {self.name}: expected a share of the thrust between 0 and 1, got {self.share}"
             )
         return self
 

@@ -36,17 +36,15 @@ def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> No
     layout = load_layout("A")
     previous = allocator.allocate(layout, SURGE).command
     health = Damage(weak={"back_left": 0.5})
-    result = allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, damage=health)
+    result = allocator.allocate(layout, wrench, lost=["front_left"], previous=previous, damage=health)
     for twin in round_trips(result):
         assert twin == result
         for field in fields(result):
             if field.compare:
                 assert equal(getattr(twin, field.name), getattr(result, field.name)), field.name
         assert str(twin) == str(result) and repr(twin) == repr(result)
-    assert (
-        allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, damage=health) == result
-    )
-    assert allocator.allocate(layout, wrench, failed=["front_left"], damage=health) != result
+    assert allocator.allocate(layout, wrench, lost=["front_left"], previous=previous, damage=health) == result
+    assert allocator.allocate(layout, wrench, lost=["front_left"], damage=health) != result
 
 
 def test_every_field_counts_but_the_time() -> None:
@@ -85,14 +83,14 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
 @pytest.mark.parametrize("method", OF_FINS)
 def test_all_figures_are_those_of_the_plant(method: str) -> None:
     layout = load_layout("ucat")
-    for wrench, failed in ((SURGE, []), (FAR, [layout.names[1]])):
-        result = quick_allocator(method).allocate(layout, wrench, failed=failed)
+    for wrench, lost in ((SURGE, []), (FAR, [layout.names[1]])):
+        result = quick_allocator(method).allocate(layout, wrench, lost=lost)
         plant = Plant(layout)
         np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
         np.testing.assert_allclose(result.forces, plant.body_forces(result.command), atol=1e-12)
         assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.scale), abs=1e-12)
         assert isinstance(result.err_norm, float)
-        assert all(not np.any(result.forces[i]) for i in layout.indices(failed))
+        assert all(not np.any(result.forces[i]) for i in layout.indices(lost))
 
 
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
@@ -109,7 +107,7 @@ def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
 def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
     layout = Layout("the longest name of a layout that " + "x" * 30, fins)
-    result = search.allocate(layout, SURGE, failed=[fin.name for fin in fins[: n_fins // 2]])
+    result = search.allocate(layout, SURGE, lost=[fin.name for fin in fins[: n_fins // 2]])
     assert len(repr(result)) <= 400 and "err_norm=" in repr(result)
     batch = search.allocate_batch(layout, [SURGE] * 5)
     assert len(repr(batch)) <= 400 and "5 targets" in repr(batch)
@@ -118,7 +116,7 @@ def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
 
 def test_another_command_is_judged_anew(search: AnyRobot) -> None:
     layout = load_layout("A")
-    result = search.allocate(layout, SURGE, failed=["front_left"])
+    result = search.allocate(layout, SURGE, lost=["front_left"])
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
@@ -145,7 +143,7 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
 def test_random_robots_too(k: int, search: AnyRobot) -> None:
     rng = np.random.default_rng(k)
     layout = random_layout(rng, n_fins=2 + k)
-    result = search.allocate(layout, rng.normal(size=6), failed=[layout.names[0]], seed=k)
+    result = search.allocate(layout, rng.normal(size=6), lost=[layout.names[0]], seed=k)
     assert all(twin == result for twin in round_trips(result))
     assert len(repr(result)) <= 400
 
@@ -157,7 +155,7 @@ def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) 
     tables = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
     for answer in (allocator.allocate, lambda *asked, **how: allocator.allocate_batch(*asked, **how)):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
-            answer(tables, SURGE if answer == allocator.allocate else [SURGE], failed=["front_left"])
+            answer(tables, SURGE if answer == allocator.allocate else [SURGE], lost=["front_left"])
 
 
 def test_an_axis_that_nothing_drives_is_told_where_it_is_asked_for() -> None:
@@ -185,16 +183,16 @@ def wrenches(n: int = 6) -> np.ndarray:
 def test_policies_answer_as_in_single_calls(method: str, policy: Policy | str) -> None:
     allocator, layout, targets = quick_allocator(method), load_layout("octo"), wrenches()
     health = Damage(weak={layout.names[1]: 0.7})
-    failed = [layout.names[0]]
-    batch = allocator.allocate_batch(layout, targets, failed=failed, policy=policy, damage=health, seed=1)
+    lost = [layout.names[0]]
+    batch = allocator.allocate_batch(layout, targets, lost=lost, policy=policy, damage=health, seed=1)
     singles = [
-        allocator.allocate(layout, target, failed=failed, policy=policy, damage=health, seed=1)
+        allocator.allocate(layout, target, lost=lost, policy=policy, damage=health, seed=1)
         for target in targets
     ]
     assert 0 < batch.reachable.sum() < len(targets)
     assert batch.reachable.tolist() == [single.reachable for single in singles]
     for row, single in enumerate(singles):
-        assert batch.layout == single.layout and batch.failed == single.failed
+        assert batch.layout == single.layout and batch.lost == single.lost
         if not single.reachable:
             np.testing.assert_allclose(batch.command[row], single.command, rtol=0.0, atol=1e-12)
             np.testing.assert_allclose(batch.err_norm[row], single.err_norm, rtol=1e-12)
@@ -214,7 +212,7 @@ def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
 @pytest.mark.parametrize("method", OF_FINS)
 def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     allocator, layout, targets = quick_allocator(method), load_layout("ucat"), wrenches(4)
-    batch = allocator.allocate_batch(layout, targets, failed=[layout.names[2]], seed=5)
+    batch = allocator.allocate_batch(layout, targets, lost=[layout.names[2]], seed=5)
     np.testing.assert_allclose(batch.wrench, Plant(layout).wrench(batch.command), atol=1e-12)
     np.testing.assert_allclose(batch.forces, Plant(layout).body_forces(batch.command), atol=1e-12)
     np.testing.assert_allclose(batch.err_norm, np.linalg.norm((targets - batch.wrench) / batch.scale, axis=1))
@@ -223,8 +221,8 @@ def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     np.testing.assert_allclose(batch.power, np.nansum(Plant(layout).power(batch.command), axis=-1))
     for twin in (pickle.loads(pickle.dumps(batch)), copy.copy(batch), copy.deepcopy(batch)):
         assert twin == batch
-    assert allocator.allocate_batch(layout, targets, failed=[layout.names[2]], seed=5) == batch
-    assert allocator.allocate_batch(layout, 0.5 * targets, failed=[layout.names[2]], seed=5) != batch
+    assert allocator.allocate_batch(layout, targets, lost=[layout.names[2]], seed=5) == batch
+    assert allocator.allocate_batch(layout, 0.5 * targets, lost=[layout.names[2]], seed=5) != batch
 
 
 @pytest.mark.parametrize("method", OF_FINS)

@@ -1,4 +1,4 @@
-"""What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
+"""What every method has in common: problems are checked, lost fins left out, answers judge themselves."""
 
 import math
 from dataclasses import replace
@@ -85,9 +85,9 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
 @pytest.mark.parametrize(
     ("options", "kind", "sentence"),
     [
-        ({"failed": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
-        ({"failed": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
-        ({"failed": "bow"}, AllocationError, r"expected a list of names, got the text 'bow'; write"),
+        ({"lost": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
+        ({"lost": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
+        ({"lost": "bow"}, AllocationError, r"expected a list of names, got the text 'bow'; write"),
         ({"previous": np.zeros((4, 3))}, CommandError, r"previous: expected a command of shape \(3, 3\) for"),
         ({"previous": "rest"}, CommandError, "previous: "),
         ({"previous": [[math.inf] * 3] * 3}, CommandError, "previous: "),
@@ -101,23 +101,23 @@ def test_refuses_what_is_no_question(
 
 
 def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:
-    result = method.allocate(ROBOT, SURGE, failed=["left"])
+    result = method.allocate(ROBOT, SURGE, lost=["left"])
     assert Drawn.asked[0][0].names == ("bow", "stern")
-    assert result.names == ("bow", "left", "stern") and result.failed == ("left",)
+    assert result.names == ("bow", "left", "stern") and result.lost == ("left",)
     assert np.isnan(result.command[1]).all()
     expected = method.allocate(ROBOT.without(["left"]), SURGE).command
     np.testing.assert_array_equal(result.command[[0, 2]], expected)
     assert result.candidates is not None
     assert np.isnan(result.candidates.command[:, 1]).all()
     np.testing.assert_array_equal(result.candidates.command[0, [0, 2]], expected)
-    batch = method.allocate_batch(ROBOT, [SURGE, SURGE], failed=["left"])
+    batch = method.allocate_batch(ROBOT, [SURGE, SURGE], lost=["left"])
     assert batch.command.shape == (2, 3, 3) and np.isnan(batch.command[:, 1]).all()
 
 
 def test_previous_commands_reach_the_method_without_the_failed_fins(method: AnyRobot) -> None:
     previous = np.arange(9.0).reshape(3, 3)
     previous[0] = np.nan
-    method.allocate(ROBOT, SURGE, failed=["bow"], previous=previous)
+    method.allocate(ROBOT, SURGE, lost=["bow"], previous=previous)
     np.testing.assert_array_equal(Drawn.asked[0][1], [[3, 4, 5], [6, 7, 8]])
 
 
@@ -145,14 +145,14 @@ def test_the_target_is_a_copy(method: AnyRobot) -> None:
 
 
 def test_energy_counts_the_working_fins(method: AnyRobot) -> None:
-    result = method.allocate(ROBOT, SURGE, failed=["left"])
+    result = method.allocate(ROBOT, SURGE, lost=["left"])
     whole = 0.0
     for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
         whole += amplitude**2 + frequency**2 + 0.1 * direction**2 + amplitude * frequency
     assert result.effort == pytest.approx(whole)
     working = result.command[[0, 2]]
     assert result.power == pytest.approx(Blade().power(working[:, 0], working[:, 1]).sum())
-    batch = method.allocate_batch(ROBOT, [SURGE], failed=["left"])
+    batch = method.allocate_batch(ROBOT, [SURGE], lost=["left"])
     np.testing.assert_allclose([batch.power[0], batch.effort[0]], [result.power, result.effort])
 
 

@@ -72,9 +72,9 @@ def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -
 
 def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
     name = penta.names[1]
-    result = search.allocate(penta, TARGET, failed=[name], damage=Damage(stuck={"bow": 0.2}))
+    result = search.allocate(penta, TARGET, lost=[name], damage=Damage(stuck={"bow": 0.2}))
     assert np.isnan(result.command[1]).all() and result.command[penta.index("bow"), 2] == pytest.approx(0.2)
-    batch = search.allocate_batch(penta, [TARGET] * 2, failed=[name], damage=Damage(stuck={"bow": 0.2}))
+    batch = search.allocate_batch(penta, [TARGET] * 2, lost=[name], damage=Damage(stuck={"bow": 0.2}))
     assert batch.command[:, penta.index("bow"), 2] == pytest.approx(0.2)
 
 
@@ -100,7 +100,7 @@ def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
 
 def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
     wrench = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
-    damage = ["--health", "front_left=0.5", "--stuck", "back_left=30", "--running", "back_right=0.3,1,90"]
+    damage = ["--weak", "front_left=0.5", "--stuck", "back_left=30", "--running", "back_right=0.3,1,90"]
     assert main(["allocate", "A", *wrench, *damage]) == 0
     printed = capsys.readouterr().out
     assert "30.0" in printed

@@ -44,7 +44,7 @@ def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     names = [str(name) for name in rng.permutation(robot.names)]
     asked: dict[str, Any] = {}
     if len(names) > 1 and rng.random() < 0.3:
-        asked["failed"] = names[: int(rng.integers(1, len(names)))]
+        asked["lost"] = names[: int(rng.integers(1, len(names)))]
     if rng.random() < 0.3:
         kind = pick(rng, ("weak", "stuck", "running", "torn"))
         value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
@@ -91,13 +91,13 @@ def ask(seed: int) -> None:
         if result.bound is not None and result.reachable:
             assert 0.0 <= result.bound <= result.power * (1 + 1e-6) + 1e-12
         batch = allocator.allocate_batch(
-            robot, [target, 0.3 * target], policy=how, failed=asked.get("failed", ())
+            robot, [target, 0.3 * target], policy=how, lost=asked.get("lost", ())
         )
     for found, limited in ((result.command, result.layout), *((each, robot) for each in batch.command)):
-        works = [fin not in result.failed for fin in robot.names]
+        works = [fin not in result.lost for fin in robot.names]
         assert np.isfinite(found[works]).all() and np.isnan(np.delete(found, np.flatnonzero(works), 0)).all()
         assert ((found >= limited.lower) & (found <= limited.upper))[works].all()
-    healthy = result.layout.without(result.failed) if result.failed else result.layout
+    healthy = result.layout.without(result.lost) if result.lost else result.layout
     wrench = plant_of(healthy).wrench(result.command[works])
     rounding = 1e-12 * 20.0 * np.abs(result.forces).sum()
     np.testing.assert_allclose(result.wrench, wrench, rtol=1e-9, atol=rounding)

@@ -33,7 +33,7 @@ def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
 
 
 def drag(command: np.ndarray) -> np.ndarray:
-    """Sizes of forces (..., n) that grow with the squares of sin(A) and f; zero for failed fins."""
+    """Sizes of forces (..., n) that grow with the squares of sin(A) and f; zero for lost fins."""
     with np.errstate(invalid="ignore"):
         return np.nan_to_num((np.sin(command[..., 0]) * command[..., 1]) ** 2)
 
@@ -69,7 +69,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command
-    result = search.allocate(layout, target, failed=["bow"], previous=before)
+    result = search.allocate(layout, target, lost=["bow"], previous=before)
     assert result.candidates is not None
     force = force_sizes(layout, result.candidates.command)
     modes = find_modes(result.candidates, force, layout.lower, layout.upper)

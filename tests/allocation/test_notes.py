@@ -161,4 +161,4 @@ def test_the_note_names_the_fins_that_work(method: str) -> None:
     notes = allocator.allocate(layout, SURGE).notes
     assert len(notes) == (method == "paper")
     assert all("front_left" in note and "drag" in note for note in notes)
-    assert allocator.allocate(layout, SURGE, failed=["front_left"]).notes == ()
+    assert allocator.allocate(layout, SURGE, lost=["front_left"]).notes == ()

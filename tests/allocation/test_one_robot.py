@@ -32,14 +32,14 @@ def wrenches(n: int) -> np.ndarray:
 def test_copies_answer_the_same(method: str) -> None:
     layout = load_layout("bluerov2_heavy" if method in ("px4", "ardusub") else "A")
     allocator, lost = Allocator(layout, method, **QUICK.get(method, {})), layout.names[:1]
-    answer = allocator.allocate(SURGE, failed=lost)
+    answer = allocator.allocate(SURGE, lost=lost)
     for twin in (copy.copy(allocator), copy.deepcopy(allocator), pickle.loads(pickle.dumps(allocator))):
         assert (twin.layout, twin.method, twin.settings) == (
             allocator.layout,
             allocator.method,
             allocator.settings,
         )
-        assert twin.allocate(SURGE, failed=lost) == answer
+        assert twin.allocate(SURGE, lost=lost) == answer
 
 
 def test_another_process_answers_the_same(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.
     assert issubclass(kind, Method)
     for _ in range(3):
         allocator.allocate(SURGE)
-        allocator.allocate(SURGE, failed=["front_left"])
+        allocator.allocate(SURGE, lost=["front_left"])
         allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5}))
     assert len(made) == 1  # a loss prepares nothing
     for k in range(MOST_PREPARED + 3):
@@ -98,7 +98,7 @@ def test_errors_are_shares_of_what_the_robot_can_push() -> None:
     far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
     assert far.err_norm == pytest.approx((100.0 - far.wrench[0]) / allocator.scale[0], rel=1e-6)
     assert far.expected_error == 0.0 and not far.expected_miss.any()
-    lost = allocator.allocate(SURGE, failed=["front_left"])
+    lost = allocator.allocate(SURGE, lost=["front_left"])
     np.testing.assert_array_equal(lost.scale, allocator.scale)
 
 

@@ -181,8 +181,8 @@ def test_binding_limits_are_named(search: AnyRobot) -> None:
 
 
 def test_nothing_binds_where_the_target_is_delivered(search: AnyRobot) -> None:
-    for failed in ([], ["back_left"]):
-        assert search.allocate(shipped("A"), np.zeros(6), failed=failed).binding == ()
+    for lost in ([], ["back_left"]):
+        assert search.allocate(shipped("A"), np.zeros(6), lost=lost).binding == ()
 
 
 def test_methods_without_weights_say_so() -> None:

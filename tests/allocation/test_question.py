@@ -39,21 +39,21 @@ def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
 
 
 @pytest.mark.parametrize(
-    ("failed", "sentence"),
+    ("lost", "sentence"),
     [
         ("a", "lost: expected a list of names, got the text 'a'; write ['a']"),
         (["a", 2], "lost: expected a list of names, got ['a', 2]"),
         ({"a"}, "lost: expected a list of names, got {'a'}"),
     ],
 )
-def test_failed_fins_are_a_list_of_names(failed: object, sentence: str) -> None:
+def test_lost_fins_are_a_list_of_names(lost: object, sentence: str) -> None:
     with pytest.raises(AllocationError, match=f"^{re.escape(sentence)}$"):
-        question.damage_of(None, failed, ())  # type: ignore[arg-type]
+        question.damage_of(None, lost)  # type: ignore[arg-type]
 
 
 def test_damage_of_another_type_is_refused() -> None:
     with pytest.raises(AllocationError, match="damage: expected a Damage, got 'weak'"):
-        question.damage_of("weak", (), ())  # type: ignore[arg-type]
+        question.damage_of("weak", ())  # type: ignore[arg-type]
 
 
 def test_the_largest_wrench_is_still_taken() -> None:

@@ -42,15 +42,15 @@ def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
 
 
 def test_it_has_as_many_directions_as_forces_beyond_the_rank() -> None:
-    for name, failed in (("bluerov2_heavy", ()), ("hexa", ()), ("hexa", ("middle_left",)), ("catamaran", ())):
+    for name, lost in (("bluerov2_heavy", ()), ("hexa", ()), ("hexa", ("middle_left",)), ("catamaran", ())):
         layout = load_layout(name)
-        answer = Allocator(layout).allocate([1.0, 0, 0, 0, 0, 0.1], failed=failed)
-        left = layout_effectiveness(layout.without(failed) if failed else layout)[layout.commanded]
+        answer = Allocator(layout).allocate([1.0, 0, 0, 0, 0, 0.1], lost=lost)
+        left = layout_effectiveness(layout.without(lost) if lost else layout)[layout.commanded]
         space = NullSpace(answer)
         assert len(space.basis) == left.shape[1] - np.linalg.matrix_rank(left), name
-        assert not any(set(failed) & set(space.takers(k)) for k in range(len(space.basis)))
+        assert not any(set(lost) & set(space.takers(k)) for k in range(len(space.basis)))
         moved = space.commands(np.ones((1, len(space.basis))) * 0.1)[0]
-        assert [bool(np.isnan(row).all()) for row in moved] == [part in failed for part in layout.names]
+        assert [bool(np.isnan(row).all()) for row in moved] == [part in lost for part in layout.names]
 
 
 def test_beyond_a_range_an_actuator_has_no_command() -> None:

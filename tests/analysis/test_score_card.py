@@ -32,7 +32,7 @@ def test_a_card_is_json(shipped: Layouts) -> None:
 def test_failed_fins_are_left_out(shipped: Layouts) -> None:
     layout = shipped("A")
     card = score_card(layout, ("back_left",))
-    assert card.failed == ("back_left",)
+    assert card.lost == ("back_left",)
     assert card.n_actuators == 3
     assert card.authority == authority(layout, ("back_left",))
     assert "back_left" not in [loss.actuator for loss in card.losses]
@@ -78,12 +78,12 @@ def test_a_pair_shares_heave_evenly() -> None:
 def test_failures() -> None:
     layout, wrench = load_layout("A"), [[0.5, 0.0, 0.5, 0.0, 0.0, 0.05]]
     assert np.isfinite(least_power(layout, wrench)).all()
-    assert np.isnan(least_power(layout, wrench, failed=layout.names[:3])).all()
+    assert np.isnan(least_power(layout, wrench, lost=layout.names[:3])).all()
 
 
 def test_nothing_costs_nothing_even_without_fins() -> None:
     layout = load_layout("A")
-    power = least_power(layout, [np.zeros(6), np.eye(6)[0]], failed=layout.names)
+    power = least_power(layout, [np.zeros(6), np.eye(6)[0]], lost=layout.names)
     assert power[0] == 0.0 and np.isnan(power[1])
 
 

@@ -36,7 +36,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     force = page.vertices("/robot/fins/0/turn/force")
     page.press("2")
     page.until(lambda: session.state.failed == ("front_left",))
-    page.until(lambda: "failed" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
+    page.until(lambda: "lost" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
     page.until(lambda: page.vertices("/robot/fins/0/turn/force") != force)
     page.visible("/robot/fins/1/turn/force", False)
     for number in ("1", "3"):

@@ -18,7 +18,7 @@ from tests.terminal import refused
 
 WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
 KEYS = [
-    *("actuators", "fins", "command", "failed", "target", "flow", "wrench_expected"),
+    *("actuators", "fins", "command", "lost", "target", "flow", "wrench_expected"),
     *("wrench_plant", "unallocated", "err_norm", "expected_error", "expected_miss", "effort"),
     *("power", "bound", "calm_power", "scale", "solve_ms", "method", "checkpoint", "reachable", "share"),
     *("binding", "unknown_fins", "notes"),
@@ -52,7 +52,7 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
     result = answer(allocate("A", *WRENCH, "--json"))
     assert list(result) == KEYS
     assert result["fins"] == ["front_right", "front_left", "back_left", "back_right"]
-    assert result["failed"] == []
+    assert result["lost"] == []
     assert [len(row) for row in result["command"]] == [3, 3, 3, 3]
     assert result["target"] == [1.0, 0.0, -0.5, 0.0, 0.0, 0.1]
     assert result["method"] == "dual" and result["checkpoint"] is None
@@ -67,9 +67,9 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
 
 
 def test_failed_fins_have_no_command(allocate: Callable[..., tuple[int, str, str]]) -> None:
-    flags = ["--failed", "front_right", "--failed", "back_left"]
+    flags = ["--lost", "front_right", "--lost", "back_left"]
     result = answer(allocate("A", *WRENCH, *flags, "--json"))
-    assert result["failed"] == ["front_right", "back_left"]
+    assert result["lost"] == ["front_right", "back_left"]
     assert [row is None for row in result["command"]] == [True, False, True, False]
 
 
@@ -82,11 +82,11 @@ def test_same_seed_same_answer(method: str, allocate: Callable[..., tuple[int, s
 
 
 def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None:
-    code, out, _ = allocate("A", *WRENCH, "--failed", "front_left")
+    code, out, _ = allocate("A", *WRENCH, "--lost", "front_left")
     assert code == 0
     lines = out.splitlines()
     assert lines[0].split() == ["actuator", "type", "command", "force", "[N]"]
-    assert lines[2].split() == ["front_left", "fin", "failed"]
+    assert lines[2].split() == ["front_left", "fin", "lost"]
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
@@ -110,8 +110,8 @@ def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, st
         (["A", "--wrench", "1", "0", "0", "0", "0", "0", "0"], "Unrecognized options: 0"),
         (["A", "--wrench", "1", "0", "0", "0", "0", "up"], "Error parsing --wrench"),
         (["A"], "--wrench"),
-        (["A", *WRENCH, "--failed", "nobody"], "has no fin 'nobody', it has front_right"),
-        (["pair", *WRENCH, "--failed", "left", "--failed", "right"], "has no fin left"),
+        (["A", *WRENCH, "--lost", "nobody"], "has no fin 'nobody', it has front_right"),
+        (["pair", *WRENCH, "--lost", "left", "--lost", "right"], "has no fin left"),
         (["A", *WRENCH, "--method", "magic"], "method: expected one of dual, mdn, paper"),
         (["A", *WRENCH, "--policy", "hope"], "closest, direction, priority"),
         (["A", *WRENCH, "--method", "mdn", "--checkpoint", "no/"], "no: no such checkpoint folder"),

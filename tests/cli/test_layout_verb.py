@@ -42,7 +42,7 @@ def test_check_names_file_and_key_of_each_bad_file(
         (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions.",
                        "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing"]),
         (["torpedo", "--flow", "1.5", *"00000"], ["push in 3 of 3 independent directions"]),
-        (["D", "--failed", "back"], ["2 fins push in 4 of 6 independent directions.", "Failed: back.",
+        (["D", "--lost", "back"], ["2 fins push in 4 of 6 independent directions.", "Lost: back.",
                                      "Out of reach: sway", "Weakest direction: 0.00 N",
                                      "Share of the largest wrench that is left without one fin"]),
     ],
@@ -66,9 +66,9 @@ def test_show_works_from_any_folder(
 def test_check_and_json_take_any_actuator(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layout", "check", "turtle_hybrid"]) == 0
     assert capsys.readouterr().out == "turtle_hybrid: ok, layout turtle_hybrid with 4 fins and 2 thrusters\n"
-    assert main(["layout", "show", "turtle_hybrid", "--failed", "lift_left", "--json"]) == 0
+    assert main(["layout", "show", "turtle_hybrid", "--lost", "lift_left", "--json"]) == 0
     values = json.loads(capsys.readouterr().out)
-    assert (values["counted"], values["failed"]) == ("4 fins and 1 thruster", ["lift_left"])
+    assert (values["counted"], values["lost"]) == ("4 fins and 1 thruster", ["lift_left"])
     assert (values["layout"], values["authority"]["rank"]) == ("turtle_hybrid", 6)
     assert values["axes"][0] == "surge"
 
@@ -102,8 +102,8 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
     ("argv", "message"),
     [
         ("check", "expected at least one file"),
-        ("show A --failed nobody", "has no fin 'nobody'"),
-        ("show turtle_hybrid --failed bow", "has no actuator 'bow'"),
+        ("show A --lost nobody", "has no fin 'nobody'"),
+        ("show turtle_hybrid --lost bow", "has no actuator 'bow'"),
         ("optimize A -o OUT --fins nobody", "has no fin 'nobody'"),
         ("optimize A -o OUT --fins front_right --goal beauty", "goal: expected one of"),
         ("optimize A -o OUT --fins front_right --reach -1", "expected --reach from 0 m"),

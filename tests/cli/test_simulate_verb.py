@@ -25,7 +25,7 @@ def line(tmp_path: Path) -> list[str]:
 
 def test_a_log_is_written(line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    argv = [*line, "--fail", "front_left@4", "--output", str(out)]
+    argv = [*line, "--lost", "front_left@4", "--output", str(out)]
     assert main(argv) == 0
     printed = capsys.readouterr().out
     assert "ATE" in printed and "lost: front_left" in printed and "written log.npz" in printed
@@ -60,7 +60,7 @@ def test_a_monitor_says_what_it_finds(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "line.csv").write_text("t,x,y,z\n0,0,0,-1\n16,2,0,-1\n")
-    argv = [*line, "--fail", "front_left@10", "--no-announced"]
+    argv = [*line, "--lost", "front_left@10", "--no-announced"]
     assert main([*argv, "--monitor", "-o", str(tmp_path / "swim")]) == 0
     assert "s: the monitor takes front_left lost" in capsys.readouterr().out
     log = load_log(tmp_path / "swim" / "log.npz")
@@ -73,7 +73,7 @@ def test_the_papers_controllers_and_a_picture(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     picture, out = tmp_path / "path.svg", tmp_path / "out"
-    argv = [*line, "--controller", "waypoint", "--fail", "front_left@4"]
+    argv = [*line, "--controller", "waypoint", "--lost", "front_left@4"]
     assert main([*argv, "--plot", str(picture), "-o", str(out)]) == 0
     assert load_log(out / "log.npz").controller == "waypoint"
     assert b"front_left lost" in picture.read_bytes()
@@ -96,13 +96,14 @@ def test_without_matplotlib_a_picture_is_refused_before_the_swim(
     [
         (["--controller", "pd"], "one of tracking, waypoint, velocity, got 'pd'"),
         (["--plot", "path.doc"], "ends in .png, .svg, .pdf"),
-        (["--fail", "front_left"], "expected NAME@SECONDS"),
-        (["--fail", "front_left@3:melted"], "expected NAME@SECONDS"),
-        (["--fail", "front_left@3:stuck=0.5"], "expected NAME@SECONDS"),
-        (["--fail", "front_left@3:torn=2"], "expected NAME@SECONDS"),
-        (["--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
+        (["--lost", "front_left@soon"], "lost: expected NAME@SECONDS"),
+        (["--lost", "front_left@-1"], "expected a time of 0 s or more"),
+        (["--stuck", "front_left=0.5@3"], "stuck: expected NAME@SECONDS"),
+        (["--torn", "front_left@3"], "torn: expected NAME=SHARE@SECONDS"),
+        (["--torn", "front_left=2@3"], "a share of the thrust between 0 and 1"),
+        (["--lost", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
-        (["--excite", "--monitor"], "leave --controller, --fail, --monitor and --learn out"),
+        (["--excite", "--monitor"], "leave --controller, --lost, --torn, --stuck, --whole, --monitor and"),
         (["-o", __file__], "cannot be made a folder: File exists"),
     ],
 )

@@ -114,7 +114,7 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
     line = ["allocate", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
     assert main(line) == 0
     values = json.loads(capsys.readouterr().out)
-    assert values["failed"] == ["back_left"] and values["method"] == "dual"
+    assert values["lost"] == ["back_left"] and values["method"] == "dual"
 
 
 def test_settings_travel(tmp_path: Path) -> None:
@@ -130,9 +130,9 @@ def test_settings_travel(tmp_path: Path) -> None:
         ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
         ({"period_s": -1.0}, "period_s: expected a number"),
         ({"robust": float("nan")}, "holds NaN, expected a finite number"),
-        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 8; export it again"),
-        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 8; export it again"),
-        ({"version": 3}, "is a bundle of version 3, this finlab reads version 8; export it again"),
+        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 9; export it again"),
+        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 9; export it again"),
+        ({"version": 3}, "is a bundle of version 3, this finlab reads version 9; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"method": "sqp"}, "method must be one of dual, mdn, paper, got 'sqp'"),
@@ -178,12 +178,12 @@ def test_force_tables_travel_and_answer_from_folder_and_archive(
     assert str(force_table.parent).encode() not in b"".join(measured_bundle.files.values()), "no path leaks"
     measured_bundle.write(tmp_path / "robot")
     measured_bundle.write_zip(tmp_path / "robot.zip")
-    truth = shipped_allocator.allocate(measured, WRENCH, failed=["front_left"])
+    truth = shipped_allocator.allocate(measured, WRENCH, lost=["front_left"])
     for place in (tmp_path / "robot", tmp_path / "robot.zip"):
         layout = finlab.load_layout(place)
         path = Path(str(layout.fins[2].model.values()["path"]))
         assert path == place / table_name(content)
-        answer = Allocator.from_bundle(place).allocate(WRENCH, failed=["front_left"])
+        answer = Allocator.from_bundle(place).allocate(WRENCH, lost=["front_left"])
         np.testing.assert_array_equal(answer.command, truth.command)
         np.testing.assert_array_equal(answer.wrench, truth.wrench)
         # And out of the bundle another one can be made.
@@ -295,7 +295,7 @@ def test_export_refuses_the_name_of_a_file(capsys: pytest.CaptureFixture[str]) -
     [
         (lambda d: d.update(surprise=1), "surprise: unknown key"),
         (lambda d: d.pop("layout"), "layout: required key is missing"),
-        (lambda d: d.update(failed=["nobody"]), "no fin 'nobody'"),
+        (lambda d: d.update(lost=["nobody"]), "no fin 'nobody'"),
         (lambda d: d["layout"].update(surprise=1), "layout: surprise: unknown key"),
         (lambda d: d["self_test"][0]["command"].pop(), r"self_test\[0\].command: expected 4 rows"),
         (lambda d: d["self_test"][0].pop("wrench"), r"self_test\[0\].wrench: required key is missing"),

@@ -52,20 +52,20 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
 
 
 def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> None:
-    question = ["allocate", str(folder), *WRENCH, "--failed", "back_left"]
-    truth = finlab.Allocator(finlab.load_layout("A")).allocate(TARGET, failed=["back_left"])
+    question = ["allocate", str(folder), *WRENCH, "--lost", "back_left"]
+    truth = finlab.Allocator(finlab.load_layout("A")).allocate(TARGET, lost=["back_left"])
     assert main([*question, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     lost = shown["fins"].index("back_left")
-    assert shown["failed"] == ["back_left"] and shown["target"] == TARGET and shown["command"][lost] is None
+    assert shown["lost"] == ["back_left"] and shown["target"] == TARGET and shown["command"][lost] is None
     kept = [row for row in shown["command"] if row is not None]
     np.testing.assert_array_equal(kept, np.delete(truth.command, lost, axis=0))
     assert (shown["power"], shown["wrench_plant"]) == (truth.power, truth.wrench.tolist())
     far = ["--wrench", "90", "0", "0", "0", "0", "0", "--policy", "direction"]
-    assert main(["allocate", str(folder), *far, "--failed", "back_left"]) == 0
+    assert main(["allocate", str(folder), *far, "--lost", "back_left"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split()[:5] == ["actuator", "type", "command", "force", "[N]"], "the table of the library"
-    assert lines[1 + lost].split() == ["back_left", "fin", "failed"]
+    assert lines[1 + lost].split() == ["back_left", "fin", "lost"]
     assert any(line.startswith("err_norm ") for line in lines)
 
 
@@ -131,22 +131,22 @@ def bad(robot: DeployedRobot) -> list[str]:
 
 
 def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
-    answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=["front_right"])
+    answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], lost=["front_right"])
     assert answer.names == finlab.load_layout("A").names
     assert np.isnan(answer.command[0]).all() and not np.isnan(answer.command[1:]).any()
     np.testing.assert_allclose(answer.wrench + answer.unallocated, [1, 0, 0.5, 0, 0, 0.1], atol=1e-12)
     far = robot.allocate([90, 0, 0, 0, 0, 0], policy="direction")
     assert far.err_norm > 1 and abs(far.wrench[1]) < 0.1
     with pytest.raises(FinlabError, match="no fin 'nobody'"):
-        robot.allocate([0] * 6, failed=["nobody"])
+        robot.allocate([0] * 6, lost=["nobody"])
 
 
-def test_failed_fins_of_the_bundle_stay_failed(shipped_allocator: AnyRobot) -> None:
+def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AnyRobot) -> None:
     layout = finlab.load_layout("A")
     robot = parse_robot(make_bundle(shipped_allocator.on(layout), ("back_left",)).files)
     lost = layout.index("back_left")
     assert np.isnan(robot.allocate([0.5, 0, 0, 0, 0, 0]).command[lost]).all()
-    assert np.isnan(robot.allocate([0.5, 0, 0, 0, 0, 0], failed=["front_left"]).command[lost]).all()
+    assert np.isnan(robot.allocate([0.5, 0, 0, 0, 0, 0], lost=["front_left"]).command[lost]).all()
     assert np.isnan(robot.neutral()[lost]).all()
     assert all(finding.good for finding in self_check(robot))
 
@@ -193,17 +193,17 @@ def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None
 def test_extremes_name_the_one_that_has_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     layout, asked = finlab.load_layout("bluerov2"), []
     robot = DeployedRobot(finlab.Allocator(layout))
-    healthy, lost = type(robot.allocator).allocate, layout.names[1]
+    healthy, second = type(robot.allocator).allocate, layout.names[1]
 
-    def broken(self: Any, wrench: Any, *, failed: Any, policy: str) -> Any:
-        asked.append((tuple(np.sign(wrench)), policy, tuple(failed)))
-        if policy == "priority" and wrench[5] < 0.0 and tuple(failed) == (lost,):
+    def broken(self: Any, wrench: Any, *, lost: Any, policy: str) -> Any:
+        asked.append((tuple(np.sign(wrench)), policy, tuple(lost)))
+        if policy == "priority" and wrench[5] < 0.0 and tuple(lost) == (second,):
             raise IndexError("of a group")
-        return healthy(self, wrench, failed=failed, policy=policy)
+        return healthy(self, wrench, lost=lost, policy=policy)
 
     assert extremes(robot).good
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
     found = extremes(robot)
     assert found.value == 1.0 and not found.good
-    assert found.question.endswith(f"first priority -Tz, {lost} lost: IndexError: of a group")
+    assert found.question.endswith(f"first priority -Tz, {second} lost: IndexError: of a group")
     assert len(set(asked)) == len(asked) == 2 * layout.commanded.sum() * 3 * (1 + layout.n)

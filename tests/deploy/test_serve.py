@@ -73,8 +73,8 @@ def served(robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0) -
 
 
 def test_answers_like_the_library(robot: DeployedRobot) -> None:
-    first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]})
-    truth = robot.allocate(GOOD["wrench"], failed=["back_left"])
+    first, end = served(robot, {**GOOD, "id": 7, "lost": ["back_left"]})
+    truth = robot.allocate(GOOD["wrench"], lost=["back_left"])
     assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.names)
     assert first["command"][2] is None
     np.testing.assert_array_equal(first["command"][0], truth.command[0])
@@ -104,8 +104,8 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
         ({**GOOD, "reference": [["1", 0, 0, 0, 0, 0]]}, "reference: expected an array"),
         ({"force": [1, 2]}, "force: unknown key, expected one of wrench, id"),
         ({**GOOD, "speed": 3}, "request: speed: unknown key"),
-        ({**GOOD, "failed": "back_left"}, "failed: expected a list, got 'back_left'"),
-        ({**GOOD, "failed": ["nobody"]}, "no fin 'nobody'"),
+        ({**GOOD, "lost": "back_left"}, "lost: expected a list, got 'back_left'"),
+        ({**GOOD, "lost": ["nobody"]}, "no fin 'nobody'"),
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
         ({**GOOD, "policy": 3}, "policy: expected text, got 3"),
         ({**GOOD, "flow": [1, 0, 0]}, "flow: expected six numbers"),
@@ -207,7 +207,7 @@ def test_after_a_fault_in_a_solve_the_robot_rests_and_the_next_request_is_answer
         return healthy(self, wrench, **options)
 
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
-    lost = {"failed": ["back_left"]}
+    lost = {"lost": ["back_left"]}
     sent = served(robot, GOOD | lost, {"wrench": [9, 0, 0, 0, 0, 0], "id": 3}, GOOD | lost)
     assert [reply["status"] for reply in sent] == ["ok", "neutral", "error", "ok", "neutral"]
     assert sent[2]["id"] == 3 and type(fault).__name__ in sent[2]["error"]
@@ -220,7 +220,7 @@ def test_after_a_fault_in_a_solve_the_robot_rests_and_the_next_request_is_answer
 def test_a_refused_request_does_not_decide_which_fins_beat(
     refused: dict[str, Any], robot: DeployedRobot
 ) -> None:
-    lost = {"failed": ["back_left"]}
+    lost = {"lost": ["back_left"]}
     for first, second in ((GOOD | lost, GOOD | refused), (GOOD, GOOD | lost | refused)):
         good, error, end = served(robot, first, second)
         assert error["status"] == "error" and end["status"] == "neutral"

@@ -90,13 +90,13 @@ def test_hostile_names_are_read_as_written(name: str) -> None:
 
 
 def test_figures_are_those_of_the_object() -> None:
-    answer, card, log = result(failed=["back_left"]), score_card(robot()), swim()
+    answer, card, log = result(lost=["back_left"]), score_card(robot()), swim()
     rows = {row[0]: row[1:] for row in Page(answer._repr_html_()).rows}
     np.testing.assert_allclose(np.array(rows["delivered"], float), answer.wrench, atol=6e-4)
     for part, force in zip(answer.names[1:], answer.forces[1:], strict=True):
         words = rows[part][1:]
         assert (
-            words[0] == "failed"
+            words[0] == "lost"
             if part == "back_left"
             else float(words[1]) == pytest.approx(np.linalg.norm(force), abs=6e-4)
         )

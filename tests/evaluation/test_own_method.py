@@ -129,7 +129,7 @@ def test_targets_are_seeded_and_within_reach() -> None:
 
 def test_failed_fins_of_a_bundle_stay_out(tmp_path: Path) -> None:
     file, bundle = tmp_path / "rows.json", tmp_path / "A"
-    assert main(["export", "A", "--failed", "front_left", "-o", str(bundle)]) == 0
+    assert main(["export", "A", "--lost", "front_left", "-o", str(bundle)]) == 0
     arguments = ["--targets", "3", "--methods", "dual", "--json", str(file)]
     assert main(["eval", "wrench", str(bundle), *arguments]) == 0
     row = json.loads(file.read_text())["rows"][0]

@@ -39,7 +39,7 @@ def _outside(case: Case) -> bool:
 @pytest.mark.parametrize("split", SPLITS)
 def test_same_numbers_same_cases(split: str) -> None:
     for first, second in zip(make_split(split, 3, 4, 5), make_split(split, 3, 4, 5), strict=True):
-        assert first.layout == second.layout and first.failed == second.failed
+        assert first.layout == second.layout and first.lost == second.lost
         np.testing.assert_array_equal(first.targets, second.targets)
 
 
@@ -97,9 +97,9 @@ def test_limits() -> None:
 
 def test_failures() -> None:
     cases = _cases("failure")
-    assert {len(case.failed) for case in cases} == {1, 2}
-    assert all(set(case.failed) < set(case.layout.names) for case in cases)
-    assert not any(case.failed for split in QUICK if split != "failure" for case in _cases(split))
+    assert {len(case.lost) for case in cases} == {1, 2}
+    assert all(set(case.lost) < set(case.layout.names) for case in cases)
+    assert not any(case.lost for split in QUICK if split != "failure" for case in _cases(split))
 
 
 def test_near_singular_layouts_are() -> None:
@@ -169,7 +169,7 @@ def test_targets_are_reachable(split: str) -> None:
     sigma = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
     rng = np.random.default_rng(0)
     for case in make_split(split, 4, 3, 77):
-        plant = plant_of(case.layout.without(case.failed) if case.failed else case.layout)
+        plant = plant_of(case.layout.without(case.lost) if case.lost else case.layout)
         start = plant.sample(rng, (30 * len(case.targets),))
         unit = sigma if case.sigma is None else case.sigma
         wanted = np.repeat(case.targets / unit, 30, axis=0)

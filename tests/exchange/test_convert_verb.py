@@ -24,10 +24,10 @@ def test_from_a_description_to_the_robot(
     assert main(["layout", "show", "rov.yaml"]) == 0
     assert "axis (-0.707, -0.707, 0)" in capsys.readouterr().out
     asked = ["--wrench", *map(str, WRENCH), "--json"]
-    assert main(["allocate", "rov.yaml", *asked, "--failed", "thruster4"]) == 0
+    assert main(["allocate", "rov.yaml", *asked, "--lost", "thruster4"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["err_norm"] < 1e-6 and told["failed"] == ["thruster4"]
-    assert main(["export", "rov.yaml", "-o", "rov", "--failed", "thruster4"]) == 0
+    assert told["err_norm"] < 1e-6 and told["lost"] == ["thruster4"]
+    assert main(["export", "rov.yaml", "-o", "rov", "--lost", "thruster4"]) == 0
     assert runtime(["check", "rov"]) == 0
     assert "8 thrusters" in capsys.readouterr().out
     assert runtime(["allocate", "rov", *asked]) == 0

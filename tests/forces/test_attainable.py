@@ -73,10 +73,10 @@ def test_no_yaw_gives_no_yaw(shipped: Layouts) -> None:
 
 def test_one_fin_alone_gives_nothing_without_torque(shipped: Layouts) -> None:
     layout = shipped("A")
-    one = attainable_set(layout, "force", failed=layout.names[1:])
+    one = attainable_set(layout, "force", lost=layout.names[1:])
     assert one.dimension == 0
     assert np.abs(one.vertices).max() < 1e-4
-    assert attainable_set(layout, "force", failed=layout.names).dimension == 0
+    assert attainable_set(layout, "force", lost=layout.names).dimension == 0
 
 
 def test_layout_a_looks_the_same_in_the_mirror(shipped: Layouts) -> None:
@@ -90,7 +90,7 @@ def test_layout_a_looks_the_same_in_the_mirror(shipped: Layouts) -> None:
 def test_losing_a_fin_never_enlarges_a_set(shipped: Layouts, name: str, kind: str) -> None:
     layout = shipped(name)
     whole = attainable_set(layout, kind, tolerance=0.05)
-    left = attainable_set(layout, kind, failed=layout.names[:1], tolerance=0.05)
+    left = attainable_set(layout, kind, lost=layout.names[:1], tolerance=0.05)
     assert outside(whole, left.vertices) <= whole.gap + 1e-4
 
 
@@ -102,7 +102,7 @@ def test_faces_are_seen_from_outside(shipped: Layouts) -> None:
 
 def test_an_unknown_failed_fin_is_an_error(shipped: Layouts) -> None:
     with pytest.raises(LayoutError, match="has no fin 'nobody'"):
-        attainable_set(shipped("A"), "force", failed=("nobody",))
+        attainable_set(shipped("A"), "force", lost=("nobody",))
 
 
 AXES = np.concatenate([np.eye(6), -np.eye(6)])
@@ -173,7 +173,7 @@ def test_a_thruster_that_pulls_only_and_an_azimuth_that_cannot_stop() -> None:
     layout = Layout("two", (pull, tilt))
     low, high = axis_ranges(layout, np.zeros(6))
     assert (low[0], high[0]) == pytest.approx((5.0 * np.cos(0.5) - 30.0, 20.0), abs=1e-3)
-    assert axis_ranges(layout, np.zeros(6), failed=("pull",)).high[0] == pytest.approx(20.0, abs=1e-3)
+    assert axis_ranges(layout, np.zeros(6), lost=("pull",)).high[0] == pytest.approx(20.0, abs=1e-3)
     body = attainable_set(layout, "force")
     assert body.dimension == 2
     assert body.vertices[:, 0].max() == pytest.approx(20.0, abs=1e-3)

@@ -148,9 +148,9 @@ def test_robots_without_anything_to_push_with() -> None:
 CORNERS = 96
 
 
-def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, ...]) -> np.ndarray:
+def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...]) -> np.ndarray:
     """Ranges (6, 2) [N, N m] with each fin's disc as a polygon within it; NaN where there are none."""
-    sets = force_sets(layout, failed)
+    sets = force_sets(layout, lost)
     n = sets.radius.shape[1]
     turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
@@ -173,7 +173,7 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, .
 
 
 @pytest.mark.parametrize(
-    ("name", "wrench", "failed"),
+    ("name", "wrench", "lost"),
     [
         ("ucat", [1.2, 0, 0, 0, 0, 0.25], ()),
         ("ucat", [1.2, 0, 0, 0, 0, 0.25], ("front_left",)),
@@ -185,10 +185,10 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, .
     ],
 )
 def test_ranges_are_those_of_linear_programmes(
-    shipped: Layouts, name: str, wrench: list[float], failed: tuple[str, ...]
+    shipped: Layouts, name: str, wrench: list[float], lost: tuple[str, ...]
 ) -> None:
     layout = shipped(name)
-    low, high = axis_ranges(layout, wrench, failed)
-    expected = ranges_by_polygons(layout, wrench, failed)
+    low, high = axis_ranges(layout, wrench, lost)
+    expected = ranges_by_polygons(layout, wrench, lost)
     assert low == pytest.approx(expected[:, 0], rel=2e-3, abs=2e-3, nan_ok=True)
     assert high == pytest.approx(expected[:, 1], rel=2e-3, abs=2e-3, nan_ok=True)

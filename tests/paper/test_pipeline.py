@@ -121,7 +121,7 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
 def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> None:
     method = AnyRobot("paper", checkpoint, n_steps=5)
     lost = robot.names[2]
-    result = method.allocate(robot, TARGET, failed=[lost])
+    result = method.allocate(robot, TARGET, lost=[lost])
     assert np.isnan(result.command[2]).all()
     expected = method.allocate(robot.without([lost]), TARGET).command
     np.testing.assert_array_equal(np.delete(result.command, 2, axis=0), expected)

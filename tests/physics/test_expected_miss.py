@@ -84,7 +84,7 @@ def test_answers_tell_it_for_one_and_for_many_and_what_to_measure_next() -> None
     many = allocator.allocate_batch([[20.0, 0, 0, 0, 0, 0], [0.0, 0, 0, 0, 0, 0]])
     np.testing.assert_allclose(many.expected_miss[0], one.expected_miss, rtol=1e-6)
     assert many.expected_error.shape == (2,) and many.expected_error[1] == 0.0
-    lost = allocator.allocate([20.0, 0, 0, 0, 0, 0], failed=["rear_left"])
+    lost = allocator.allocate([20.0, 0, 0, 0, 0, 0], lost=["rear_left"])
     assert lost.expected_error < 0.1 * one.expected_error
 
 
@@ -145,5 +145,5 @@ def test_a_lost_actuator_is_not_to_be_measured() -> None:
     layout = load_layout("A")
     for name in layout.names:
         layout = layout.replace_actuator(name, uncertainty=Uncertainty(0.1, common="tank"))
-    (note,) = Allocator(layout).allocate([1.0, 0, 0.5, 0, 0, 0], failed=["front_left"]).notes[:1]
+    (note,) = Allocator(layout).allocate([1.0, 0, 0.5, 0, 0, 0], lost=["front_left"]).notes[:1]
     assert "measure front_right, back_left and back_right (which err together) next" in note

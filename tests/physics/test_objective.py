@@ -51,6 +51,6 @@ def test_a_robots_energy_is_the_sum_over_fins() -> None:
     fins = np.stack([fin_effort(command[:, i], UPPER[i]) for i in range(3)], axis=1)
     np.testing.assert_allclose(EffortMeter(UPPER)(command), fins.sum(1))
     np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))
-    command[2, 1] = np.nan  # a failed fin costs nothing
+    command[2, 1] = np.nan  # a lost fin costs nothing
     fins[2, 1] = 0.0
     np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))

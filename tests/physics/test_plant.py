@@ -111,7 +111,7 @@ def test_derivatives_agree_with_differences(name, of_four_kinds):
         (np.zeros(12), "expected commands"),
         ([[1, 2, 3], [4]], "expected commands as three numbers"),
         (np.full((4, 3), np.inf), "NaN or infinite"),
-        ([[0.1, np.nan, 0.0]] * 4, "a failed actuator has NaN in all three"),
+        ([[0.1, np.nan, 0.0]] * 4, "a lost actuator has NaN in all three"),
     ],
 )
 def test_a_command_that_does_not_fit_is_refused(command, why):

@@ -246,7 +246,7 @@ def spec(path: Path) -> FinModelSpec:
 
 def test_tables_are_read_out_of_an_archive(soft_table: Path, tmp_path: Path) -> None:
     content = soft_table.read_bytes()
-    needed = {"robot.json": b"", "bundle.json": b'{"version": 8}'}
+    needed = {"robot.json": b"", "bundle.json": b'{"version": 9}'}
     files = {**needed, table_name(content): content}
     with zipfile.ZipFile(tmp_path / "x.zip", "w") as archive:
         for name, part in {**files, CHECKSUMS: checksums(files)}.items():

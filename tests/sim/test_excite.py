@@ -56,5 +56,5 @@ def test_what_cannot_be_shaken_is_refused() -> None:
         excitation(load_layout("torpedo"), 60.0)
     with pytest.raises(DataError, match="30 to 300 s, got 301"):
         excitation(layout, 301.0)
-    error = refused(["simulate", "A", "--excite", "--fail", "front_left@3"])
-    assert "leave --controller, --fail, --monitor and --learn out" in error
+    error = refused(["simulate", "A", "--excite", "--lost", "front_left@3"])
+    assert "leave --controller, --lost, --torn, --stuck, --whole, --monitor and --learn out" in error

@@ -19,7 +19,7 @@ from webapp.session.state import State
 
 def _answer(state: State) -> Allocation:
     allocator = Allocator(state.layout, state.method)
-    return allocator.allocate(state.target, failed=state.failed, policy=state.policy)
+    return allocator.allocate(state.target, lost=state.failed, policy=state.policy)
 
 
 def _turn_a_shaft(session: Session) -> None:

@@ -79,7 +79,7 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     first = layout.names[0]
     tab.on_loop(lambda: tab.view.do(lambda: session.toggle_failure(first)))
     tab.settle()
-    assert "failed" in " ".join(tab.figures()) and tab.client.notes == []
+    assert "lost" in " ".join(tab.figures()) and tab.client.notes == []
     for act in (partial(session.add, "tilt"), partial(session.drag, first, (0.1, 0.0, 0.0)), session.undo):
         tab.on_loop(partial(tab.view.do, act))
     tab.settle()
@@ -100,7 +100,7 @@ def test_a_method_for_fins_says_so_and_watts_go_on(tab: Tab, capsys: pytest.Capt
 def test_a_bundle_opens_with_what_was_lost() -> None:
     content = make_bundle(Allocator(BLUEROV), BLUEROV.names[:1]).zip_bytes()
     opened = files.read_layout("bundle.zip", content)
-    assert opened.layout == BLUEROV and opened.failed == BLUEROV.names[:1]
+    assert opened.layout == BLUEROV and opened.lost == BLUEROV.names[:1]
 
 
 @pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)

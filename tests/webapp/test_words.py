@@ -131,7 +131,7 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
         assert css(UNLEARNED) in shown and css(DELIVERED) not in shown and "reach" not in shown
         run = Run(State(strange), (("mdn", answer),))
         assert "Not learned: fin 3" in comparison_table(run, False)
-    without = allocator.allocate(PRESETS["Turn"], failed=[other.name])
+    without = allocator.allocate(PRESETS["Turn"], lost=[other.name])
     assert verdict_of(without, True) is Verdict.EXACT
 
 

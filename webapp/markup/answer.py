@@ -109,7 +109,7 @@ def fin_table(
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
         elif failed:
-            cells = Markup("<td colspan='5'>failed</td>")
+            cells = Markup("<td colspan='5'>lost</td>")
         else:
             force = float(np.linalg.norm(allocation.forces[i]))
             cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)

@@ -66,7 +66,7 @@ class Designs:
         self._context.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
-        self._session.open_layout(opened.layout, failed=opened.failed)
+        self._session.open_layout(opened.layout, failed=opened.lost)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
             self._context.notify("Opened from a link", text, calm=True)

@@ -11,7 +11,7 @@ Factors are those of the frame of ArduSub that the thrusters make; of any other 
 geometry suggests: shares of the strongest.
 
 Both are posed at full strength: thrusters give the newton that are asked of them, each within its own limits
-(PX4's thrust coefficient of each is its largest force), and failed thrusters are taken out, as are those that
+(PX4's thrust coefficient of each is its largest force), and lost thrusters are taken out, as are those that
 hang at a force, which the others make up for.
 """
 

@@ -56,12 +56,12 @@ def run(
         options = {"n_candidates": candidates, **VARIANTS[variant]}
         method = MethodSpec("paper", choose_method("paper", checkpoint, **options))
         times = [
-            method.on(case.layout).allocate(case.targets[0], failed=case.failed, seed=seed).solve_ms
+            method.on(case.layout).allocate(case.targets[0], lost=case.lost, seed=seed).solve_ms
             for case in islice(cycle(cases), TIMED_CALLS + 1)
         ]
         parts, sigma = [], paper_sigma()
         for k, case in enumerate(progress(cases, "layout", variant)):
-            answer = method.on(case.layout).allocate_batch(case.targets, failed=case.failed, seed=seed)
+            answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)
             part = score(case, case.targets, answer.command, answer.solve_ms, number=k)
             assert answer.wrench_expected is not None
             missing = answer.wrench_expected - case.targets
@@ -91,7 +91,7 @@ def candidate_points(method: MethodSpec, case: Case, seed: int) -> dict[str, lis
     """Normalized error by the surrogate and effort of the candidates for the first target of a case, `raw` as
     they were drawn and `refined`."""
     target = case.targets[0]
-    answer = method.on(case.layout).allocate(target, failed=case.failed, seed=seed)
+    answer = method.on(case.layout).allocate(target, lost=case.lost, seed=seed)
     points = {}
     for name, some in (("raw", answer.samples), ("refined", answer.candidates)):
         assert some is not None

@@ -15,7 +15,7 @@ from finlab.evaluation.splits import SPLITS, Case, make_case, make_split, own_si
 from finlab.executor import map_parts
 from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
-from finlab.layout.load import layout_and_failed
+from finlab.layout.load import layout_and_lost
 from finlab.physics import plant_of
 
 SUCCESS_LEVELS = (0.01, 0.5, 1.0)  # levels t of `success_t`, the share of targets with `err_norm <= t`
@@ -115,17 +115,17 @@ def _cases(
         raise DataError(
             f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
         )
-    robot, failed = in_worker(layout_and_failed, layout)
-    return {f"layout {robot.name}": [partial(own_case, robot, failed, targets, seed)]}
+    robot, lost = in_worker(layout_and_lost, layout)
+    return {f"layout {robot.name}": [partial(own_case, robot, lost, targets, seed)]}
 
 
-def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int) -> Case:
+def own_case(layout: Layout, lost: tuple[str, ...], n_targets: int, seed: int) -> Case:
     """A user's own layout as a case: wrenches of uniform commands of the actuators that work, and errors over
     the robot's own wrenches. A smaller number of targets gives the first of a larger one."""
-    plant = plant_of(layout.without(failed))
+    plant = plant_of(layout.without(lost))
     target_seed, sigma_seed = np.random.SeedSequence((OWN_DOMAIN, seed)).spawn(2)
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
-    return Case(layout, targets, failed, own_sigma(plant, np.random.default_rng(sigma_seed)))
+    return Case(layout, targets, lost, own_sigma(plant, np.random.default_rng(sigma_seed)))
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

@@ -127,7 +127,7 @@ def test_they_keep_to_limits_and_know_lost_thrusters(method: str) -> None:
     for case in make_split("thrusters", 6, 8, 5):
         lost = case.layout.names[0]
         for targets in (case.targets, 10.0 * case.targets, 0.0 * case.targets):
-            command = Allocator(case.layout, method).allocate_batch(targets, failed=[lost]).command[:, 1:]
+            command = Allocator(case.layout, method).allocate_batch(targets, lost=[lost]).command[:, 1:]
             assert np.isfinite(command).all()
             assert (command >= case.layout.lower[1:]).all() and (command <= case.layout.upper[1:]).all()
         assert not command.any()

@@ -106,12 +106,12 @@ def test_same_seed_same_answer(method: str) -> None:
 def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     layout = random_layout(np.random.default_rng(9), n_fins=3)
     target = [0.5, 0.2, -0.5, 0.0, 0.0, 0.05]
-    failed = make(method).allocate(layout, target, failed=["fin_2"]).command
+    lost = make(method).allocate(layout, target, lost=["fin_2"]).command
     choice, rest = make(method).choice, layout.without(["fin_2"])
     alone = choice.kind(rest, choice.settings, yardstick(layout))  # errors are those of the whole robot
     removed = alone.solve(np.array([target]), policy=Policy()).command[0]
-    assert np.isnan(failed[1]).all()
-    np.testing.assert_array_equal(failed[[0, 2]], removed)
+    assert np.isnan(lost[1]).all()
+    np.testing.assert_array_equal(lost[[0, 2]], removed)
 
 
 @pytest.mark.parametrize("method", ALL)
@@ -144,9 +144,9 @@ def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
 @pytest.mark.parametrize("method", ALL)
 def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
     with pytest.raises(LayoutError):
-        make(method).allocate(one_fin(), np.zeros(6), failed=["fin"])
+        make(method).allocate(one_fin(), np.zeros(6), lost=["fin"])
     with pytest.raises(LayoutError, match="nobody"):
-        make(method).allocate(one_fin(), np.zeros(6), failed=["nobody"])
+        make(method).allocate(one_fin(), np.zeros(6), lost=["nobody"])
 
 
 def test_sqp_needs_hardly_more_than_the_default() -> None:

@@ -124,11 +124,11 @@ def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(polic
     layout = load_layout("torpedo")
     allocator, rng = Allocator(layout), np.random.default_rng(3)
     names = [part.name for part in layout.actuators]
-    for failed in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
+    for lost in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
         for flow in (None, AHEAD):
             asked = rng.normal(size=6) * [60.0, 20.0, 20.0, 5.0, 20.0, 20.0]
             previous = Plant(layout).sample(rng, ()) if rng.random() < 0.5 else None
-            answer = allocator.allocate(asked, policy=policy, failed=failed, flow=flow, previous=previous)
+            answer = allocator.allocate(asked, policy=policy, lost=lost, flow=flow, previous=previous)
             assert np.isfinite(answer.power)
             assert answer.bound is None or answer.bound <= answer.power + 1e-9
 

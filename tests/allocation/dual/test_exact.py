@@ -66,7 +66,7 @@ def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()[name])
     for fin in layout.names:
         for target in reachable(layout.without([fin]), 2):
-            result = search.allocate(layout, target, failed=[fin])
+            result = search.allocate(layout, target, lost=[fin])
             assert result.err_norm < GOOD
             assert np.isnan(result.command[layout.index(fin)]).all()
 

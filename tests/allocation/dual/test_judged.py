@@ -219,7 +219,7 @@ def test_no_question_of_a_shipped_layout_ends_in_a_foreign_exception(name: str) 
     for lost, policy in itertools.product(losses, ("closest", "direction", "priority")):
         target = rng.normal(size=6) * allocator.scale * 10.0 ** rng.uniform(-1, 2)
         try:
-            answer = allocator.allocate(target, failed=lost, policy=policy)
+            answer = allocator.allocate(target, lost=lost, policy=policy)
         except FinlabError:
             continue
         assert np.isfinite(answer.err_norm)

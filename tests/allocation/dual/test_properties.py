@@ -123,20 +123,20 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(search: AnyRobot, seed: int, 
 
 
 @few(15)
-@given(seed=SEEDS, limits=LIMITS, lost=st.integers(0, 4))
-def test_failed_is_removed(search: AnyRobot, seed: int, limits: str, lost: int) -> None:
+@given(seed=SEEDS, limits=LIMITS, place=st.integers(0, 4))
+def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: int) -> None:
     layout, target = drawn(seed, limits)
-    name = layout.names[lost % layout.n_fins]
+    name = layout.names[place % layout.n_fins]
     # What is nearest depends on the yardstick, which is that of the whole robot.
-    failed = search.allocate(layout, target, failed=[name], policy="direction")
+    without = search.allocate(layout, target, lost=[name], policy="direction")
     removed = search.allocate(layout.without([name]), target, policy="direction")
     alive = [i for i, fin in enumerate(layout.names) if fin != name]
     if removed.reachable:
-        np.testing.assert_allclose(failed.command[alive], removed.command, atol=1e-6)
-    assert np.isnan(failed.command[layout.index(name)]).all()
-    np.testing.assert_allclose(failed.wrench, removed.wrench, atol=1e-3)
+        np.testing.assert_allclose(without.command[alive], removed.command, atol=1e-6)
+    assert np.isnan(without.command[layout.index(name)]).all()
+    np.testing.assert_allclose(without.wrench, removed.wrench, atol=1e-3)
     # Where next to nothing of a target can be had, so is the power.
-    assert failed.power == pytest.approx(removed.power, rel=1e-4, abs=1e-5)
+    assert without.power == pytest.approx(removed.power, rel=1e-4, abs=1e-5)
 
 
 @few(10)

@@ -150,8 +150,8 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
 
 
 def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
-    lost = search.allocate(penta, TARGET, failed=["port_back"])
-    still = search.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
+    lost = search.allocate(penta, TARGET, lost=["port_back"])
+    still = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
     assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
     back = search.allocate(penta, TARGET, previous=lost.command)
     assert np.isfinite(back.command).all() and back.err_norm < 1e-5

@@ -52,7 +52,7 @@ def test_the_plant_scores(first: int | None) -> None:
     expected = []
     for case in cases:
         command = case.layout.lower.copy()
-        command[[name in case.failed for name in case.layout.names]] = np.nan
+        command[[name in case.lost for name in case.layout.names]] = np.nan
         wrench = Plant(case.layout).wrench(command)
         expected.append(np.linalg.norm((wrench - case.targets[:first]) / paper_sigma(), axis=-1))
     np.testing.assert_allclose(found["err_norm"], np.concatenate(expected))
