@@ -46,26 +46,20 @@ _FORMS: tuple[tuple[Any, Any], ...] = (
 """Types of fields that are parts of their own in a file, and the forms of these."""
 
 
-def _form(cls: type[Checked], **others: Any) -> Any:
-    """The form of a class whose angles are in degrees, with other types of some fields."""
+def _form(cls: type[Checked]) -> Any:
+    """The form of a class whose angles are in degrees."""
     keys = {name: key for name, (key, _) in cls.DEGREES.items()}
     kinds = {name: kind for name, (_, kind) in cls.DEGREES.items()}
     hints = get_type_hints(cls)
     for name in (field.name for field in fields(cls)):
         kinds |= {name: own for kind, own in _FORMS if hints[name] in (kind, kind | None)}  # noqa: B035
     kinds |= dict.fromkeys(cls.UNSAID)
-    return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
-
-
-HORIZONTAL_FIN: Any = _form(
-    Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None
-)
-"""A fin of version 1."""
+    return form(cls, {**cls.KEYS, **keys}, **kinds)
 
 
 @cache
 def actuator_form(kinds: tuple[type[Actuator], ...]) -> Any:
-    """Returns the form of an actuator of version 2, one of several kinds."""
+    """Returns the form of an actuator, one of several kinds."""
     return Union[tuple(map(_form, kinds))]  # noqa: UP007
 
 

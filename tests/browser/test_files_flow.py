@@ -29,7 +29,7 @@ def measured_robot(folder: Path) -> tuple[dict[str, Any], bytes]:
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
     write_table(folder / "soft.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
     values = layout_to_dict(load_layout("ucat")) | {"name": "measured"}
-    values["fins"][0]["model"] = {"type": "table", "path": "tables/soft.csv"}
+    values["actuators"][0]["model"] = {"type": "table", "path": "tables/soft.csv"}
     return values, (folder / "soft.csv").read_bytes()
 
 
@@ -71,7 +71,7 @@ def test_files_are_saved_and_opened_or_refused(page: Any, tmp_path: Path) -> Non
     (tmp_path / "changed.yaml").write_text(text.replace("front_right", "bow"))
     page.upload("Open", tmp_path / "changed.yaml")
     page.until(lambda: page.session.state.layout.names[0] == "bow")
-    (tmp_path / "broken.yaml").write_text(text.replace("version: 1", "version: 99"))
+    (tmp_path / "broken.yaml").write_text(text.replace("version: 2", "version: 99"))
     page.upload("Open", tmp_path / "broken.yaml")
     page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
     assert page.session.state.layout.names[0] == "bow", "nothing is lost"
@@ -88,12 +88,12 @@ def test_files_are_saved_and_opened_or_refused(page: Any, tmp_path: Path) -> Non
 def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: Path) -> None:
     before = page.session.state
     values = layout_to_dict(load_layout("ucat")) | {"name": EVIL, "description": EVIL}
-    values["fins"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
+    values["actuators"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.upload("Open", tmp_path / "robot.yaml")
     page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
     assert page.session.state == before and "root:" not in "".join(page.notes())
-    values["fins"][0]["model"] = {"type": "drag"}
+    values["actuators"][0]["model"] = {"type": "drag"}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.upload("Open", tmp_path / "robot.yaml")
     page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)

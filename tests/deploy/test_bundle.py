@@ -200,7 +200,7 @@ def test_a_force_table_outside_the_bundle_is_refused(
 ) -> None:
     (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
     table = {"type": "table", "path": path}
-    forged = Bundle(edited(measured_bundle, ROBOT, lambda d: d["layout"]["fins"][2].update(model=table)))
+    forged = Bundle(edited(measured_bundle, ROBOT, lambda d: d["layout"]["actuators"][2].update(model=table)))
     place = tmp_path / ("x.zip" if archive else "x")
     (forged.write_zip if archive else forged.write)(place)
     for read in (finlab.load_layout, load_robot):

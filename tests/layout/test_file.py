@@ -14,13 +14,14 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_
 
 GOOD = {
     "format": "finlab-layout",
-    "version": 1,
+    "version": 2,
     "name": "good",
     "description": "two fins",
     "frame": {"convention": "FLU", "origin": "center_of_gravity"},
-    "fins": [
+    "actuators": [
         {
             "name": "left",
+            "type": "fin",
             "position_m": [0.0, 0.2, 0.0],
             "mounting_angle_deg": 90,
             "limits": {
@@ -30,7 +31,7 @@ GOOD = {
             },
             "model": {"type": "drag", "area": 0.03},
         },
-        {"name": "right", "position_m": [0, -0.2, 0], "mounting_angle_deg": -90.0},
+        {"name": "right", "type": "fin", "position_m": [0, -0.2, 0], "mounting_angle_deg": -90.0},
     ],
     "body": {"hull": {"shape": "box", "size_m": [0.4, 0.2, 0.2]}, "mass_kg": 4.5},
 }
@@ -55,12 +56,12 @@ def changed(key, value):
 
 
 BAD = [
-    ("fins", [], "expected a list of 1 to 64 values, got 0"),
-    ("fins", "left", "expected a list, got 'left'"),
-    ("fins", ..., "required key is missing"),
-    ("version", 99, "this finlab reads version 1 and 2, got 99"),
-    ("version", "1", "this finlab reads version 1 and 2"),
-    ("version", True, "this finlab reads version 1 and 2"),
+    ("actuators", [], "expected a list of 1 to 64 values, got 0"),
+    ("actuators", "left", "expected a list, got 'left'"),
+    ("actuators", ..., "required key is missing"),
+    ("version", 99, "this finlab reads version 2, got 99"),
+    ("version", "1", "this finlab reads version 2"),
+    ("version", True, "this finlab reads version 2"),
     ("format", "urdf", "expected finlab-layout, got 'urdf'"),
     ("name", ..., "required key is missing"),
     ("name", 7, "expected text, got 7"),
@@ -70,35 +71,35 @@ BAD = [
     ("surprise", 1, "unknown key"),
     ("frame.convention", "NED", "expected FLU, got 'NED'"),
     ("frame.up", "z", "unknown key"),
-    ("fins[1]", 3, "expected keys and values"),
-    ("fins[1].name", "left", "already the name of actuator 1"),
-    ("fins[1].name", "x" * 65, "1 to 64 characters, got 65"),
-    ("fins[1].nmae", "x", "unknown key"),
-    ("fins[1].position_m", [0.1, 0.2], "a list of 3 values, got 2"),
-    ("fins[1].position_m", ..., "required key is missing"),
-    ("fins[1].position_m[0]", math.nan, "expected a number, got '.nan'"),
-    ("fins[1].position_m[2]", 1e308, "must lie within -10 .. 10"),
-    ("fins[1].position_m[1]", True, "expected a number, got True"),
-    ("fins[1].position_m[1]", 10**90, "must lie within"),
-    ("fins[1].mounting_angle_deg", "north", "got 'north'"),
-    ("fins[1].mounting_angle_deg", math.inf, "got '.inf'"),
-    ("fins[1].mounting_angle_deg", 720, "-360 .. 360, got 720"),
-    ("fins[0].limits", [1, 2], "expected keys and values"),
-    ("fins[0].limits.amplitude", [0, 1], "unknown key"),
-    ("fins[0].servo", [1, 2], "expected keys and values"),
-    ("fins[0].servo.speed", 3, "unknown key"),
-    ("fins[0].servo.speed_limit_rad_s", 0, "must lie within"),
-    ("fins[0].limits.amplitude_rad", [0.6, 0.05], "minimum 0.6 is above maximum 0.05; swap them"),
-    ("fins[0].limits.amplitude_rad", [], "2 values, got 0"),
-    ("fins[0].limits.amplitude_rad[1]", 2, "must lie within"),
-    ("fins[0].limits.amplitude_rad", [0, 0], "the maximum must be at least 0.0001"),
-    ("fins[0].limits.frequency_hz[0]", -1, "must lie within"),
-    ("fins[0].limits.zero_direction_rad", [-4, 4], "one turn"),
-    ("fins[0].model", "drag", "expected keys and values, got 'drag'"),
-    ("fins[0].model.type", "jet", "expected one of drag, lighthill, soft, table"),
-    ("fins[0].model.type", ..., "required key is missing"),
-    ("fins[0].model.area", -1, "must lie within 1e-05 .. 10, got -1"),
-    ("fins[0].model.width", 1, "expected one of density, drag_coefficient"),
+    ("actuators[1]", 3, "expected keys and values"),
+    ("actuators[1].name", "left", "already the name of actuator 1"),
+    ("actuators[1].name", "x" * 65, "1 to 64 characters, got 65"),
+    ("actuators[1].nmae", "x", "unknown key"),
+    ("actuators[1].position_m", [0.1, 0.2], "a list of 3 values, got 2"),
+    ("actuators[1].position_m", ..., "required key is missing"),
+    ("actuators[1].position_m[0]", math.nan, "expected a number, got '.nan'"),
+    ("actuators[1].position_m[2]", 1e308, "must lie within -10 .. 10"),
+    ("actuators[1].position_m[1]", True, "expected a number, got True"),
+    ("actuators[1].position_m[1]", 10**90, "must lie within"),
+    ("actuators[1].mounting_angle_deg", "north", "got 'north'"),
+    ("actuators[1].mounting_angle_deg", math.inf, "got '.inf'"),
+    ("actuators[1].mounting_angle_deg", 720, "-360 .. 360, got 720"),
+    ("actuators[0].limits", [1, 2], "expected keys and values"),
+    ("actuators[0].limits.amplitude", [0, 1], "unknown key"),
+    ("actuators[0].servo", [1, 2], "expected keys and values"),
+    ("actuators[0].servo.speed", 3, "unknown key"),
+    ("actuators[0].servo.speed_limit_rad_s", 0, "must lie within"),
+    ("actuators[0].limits.amplitude_rad", [0.6, 0.05], "minimum 0.6 is above maximum 0.05; swap them"),
+    ("actuators[0].limits.amplitude_rad", [], "2 values, got 0"),
+    ("actuators[0].limits.amplitude_rad[1]", 2, "must lie within"),
+    ("actuators[0].limits.amplitude_rad", [0, 0], "the maximum must be at least 0.0001"),
+    ("actuators[0].limits.frequency_hz[0]", -1, "must lie within"),
+    ("actuators[0].limits.zero_direction_rad", [-4, 4], "one turn"),
+    ("actuators[0].model", "drag", "expected keys and values, got 'drag'"),
+    ("actuators[0].model.type", "jet", "expected one of drag, lighthill, soft, table"),
+    ("actuators[0].model.type", ..., "required key is missing"),
+    ("actuators[0].model.area", -1, "must lie within 1e-05 .. 10, got -1"),
+    ("actuators[0].model.width", 1, "expected one of density, drag_coefficient"),
     ("body.mass_kg", 0, "must lie within"),
     ("body.weight", 1, "unknown key"),
     ("body.added_mass", [1, 2, 3], "6 values, got 3"),
@@ -111,7 +112,11 @@ BAD = [
 
 CHANGED = [(key, changed(key, value), why) for key, value, why in BAD]
 CHANGED += [
-    ("fins[0].model.path", edited("fins", 0, "model", value={"type": "table"}), "required key is missing"),
+    (
+        "actuators[0].model.path",
+        edited("actuators", 0, "model", value={"type": "table"}),
+        "required key is missing",
+    ),
     ("body.added_mass[5]", edited("body", "added_mass", value=[1, 2, 3, 4, 5, -6]), "must lie within"),
     ("body.inertia_kgm2[0]", edited("body", "inertia_kgm2", value=[0, 1, 1]), "must lie within"),
     ("body.hull.mesh", edited("body", "hull", value={"mesh": "hull.exe"}), "expected a .stl"),
@@ -144,7 +149,7 @@ HOSTILE = {
     "deep": ("[" * 400_000, "nested deeper"),
     "wide": ("[" + "1," * 400_000 + "1]", "too many to be read"),
     "many": (
-        yaml.safe_dump(edited("fins", value=[{"name": f"f{i}"} for i in range(5000)])),
+        yaml.safe_dump(edited("actuators", value=[{"name": f"f{i}"} for i in range(5000)])),
         "1 to 64 values, got 5000",
     ),
     "twice": ("name: a\nversion: 1\nname: b\n", "line 3: key 'name' is given twice"),
@@ -183,7 +188,7 @@ def test_json_is_accepted_and_its_errors_are_as_plain(tmp_path):
         ('{"name": ', "is not valid JSON: line 1"),
         ("[" * 200_000, "nested too deeply"),
         (
-            json.dumps(edited("fins", 0, "position_m", value=[math.nan, 0, 0])),
+            json.dumps(edited("actuators", 0, "position_m", value=[math.nan, 0, 0])),
             "holds NaN, expected a finite number",
         ),
         ('{"version": ' + "9" * 5000 + "}", ""),
@@ -224,12 +229,12 @@ def test_numbers_written_in_any_usual_way_are_numbers(tmp_path):
 
 
 def test_limits_of_zero_width_are_allowed():
-    data = edited("fins", 0, "limits", value={"frequency_hz": [2, 2], "zero_direction_rad": [0, 0]})
+    data = edited("actuators", 0, "limits", value={"frequency_hz": [2, 2], "zero_direction_rad": [0, 0]})
     assert parse_layout(data).fins[0].limits.frequency == (2.0, 2.0)
 
 
 def test_relative_paths_start_at_the_layout_file(tmp_path):
-    data = edited("fins", 0, "model", value={"type": "table", "path": "tables/fin.csv"})
+    data = edited("actuators", 0, "model", value={"type": "table", "path": "tables/fin.csv"})
     data["body"]["hull"] = {"mesh": "hull.stl", "scale": 0.001}
     (tmp_path / "x.json").write_text(json.dumps(data))
     layout = load_layout(tmp_path / "x.json")

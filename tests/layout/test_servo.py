@@ -33,7 +33,7 @@ def test_files_hold_what_is_not_usual(slow: Layout, tmp_path: Path, suffix: str)
     path = tmp_path / f"robot.{suffix}"
     save_layout(slow, path)
     assert load_layout(path) == slow
-    own = {fin["name"]: fin.get("servo") for fin in layout_to_dict(slow)["fins"]}
+    own = {fin["name"]: fin.get("servo") for fin in layout_to_dict(slow)["actuators"]}
     assert own.pop("back_left") == {"amplitude_pole_rad_s": 3.0, "speed_limit_rad_s": 6.0}
     assert set(own.values()) == {None}
 
@@ -42,7 +42,7 @@ def test_bundles_take_it_along(slow: Layout, tmp_path: Path) -> None:
     make_bundle(Allocator(slow)).write(tmp_path / "bundle")
     assert load_layout(tmp_path / "bundle") == slow
     robot = json.loads((tmp_path / "bundle" / "robot.json").read_text())
-    assert [fin["name"] for fin in robot["layout"]["fins"] if "servo" in fin] == ["back_left"]
+    assert [fin["name"] for fin in robot["layout"]["actuators"] if "servo" in fin] == ["back_left"]
 
 
 @pytest.mark.parametrize("field", ["amplitude_pole", "frequency_pole", "direction_pole", "speed_limit"])
@@ -55,6 +55,6 @@ def test_a_servo_has_positive_numbers(field: str) -> None:
 def test_layouts_with_other_servos_are_two(slow: Layout) -> None:
     assert slow != load_layout("A") and hash(slow) != hash(load_layout("A"))
     data = layout_to_dict(slow)
-    for fin in data["fins"]:
+    for fin in data["actuators"]:
         fin["servo"] = None
     assert parse_layout(data) == load_layout("A")

@@ -1,4 +1,4 @@
-"""Layout files of version 2: actuators of any type, fins with shafts in any direction."""
+"""Layout files: actuators of any type, fins with shafts in any direction."""
 
 import copy
 import json
@@ -78,11 +78,18 @@ def test_all_types_are_read_and_written(tmp_path):
     assert layout.replace_actuator("lift", force=(0.0, 9.0)).upper[2, 0] == 9.0
 
 
-def test_robots_of_horizontal_fins_are_written_as_version_1():
-    layout = parse_layout({**GOOD, "actuators": GOOD["actuators"][:1]})
-    written = layout_to_dict(layout)
-    assert written["version"] == 1 and [fin["name"] for fin in written["fins"]] == ["side"]
-    assert parse_layout(written) == layout
+@pytest.mark.parametrize("version", [{"version": 1}, {}], ids=["said", "left out"])
+def test_a_file_of_version_1_is_refused_with_how_to_convert_it(version):
+    """What the sentence says to do is done here, and the file is read."""
+    fin = {"name": "side", "position_m": [0.2, -0.1, 0], "mounting_angle_deg": -60.0}
+    old = {"format": "finlab-layout", **version, "name": "old", "fins": [fin]}
+    said = "version: version 1, .* write version: 2, actuators: in place of fins:, and type: fin in each"
+    with pytest.raises(LayoutError, match=said):
+        parse_layout(old)
+    new = {"format": "finlab-layout", "version": 2, "name": "old", "actuators": [{**fin, "type": "fin"}]}
+    layout = parse_layout(new)
+    assert layout.names == ("side",) and layout_to_dict(layout)["version"] == 2
+    assert parse_layout(layout_to_dict(layout)) == layout
 
 
 def test_a_horizontal_shaft_has_one_description():
@@ -140,8 +147,8 @@ BAD = [
     ("actuators", {**GOOD, "actuators": []}, "a list of 1 to 64 values, got 0"),
     ("actuators", {**GOOD, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]}, "values, got 65"),
     ("fins", {**GOOD, "fins": []}, "unknown key"),
-    ("actuators", {**GOOD, "version": 1}, "unknown key"),
-    ("version", {**GOOD, "version": 3}, "reads version 1 and 2, got 3"),
+    ("version", {**GOOD, "version": 1}, "version 1, with fins:, is no longer read; write version: 2"),
+    ("version", {**GOOD, "version": 3}, "reads version 2, got 3"),
     ("version", {key: value for key, value in GOOD.items() if key != "version"}, "required key is missing"),
     ("actuators[0].type", edited(0, type="paddle"), "expected one of fin, thruster, azimuth, tilt, rudder"),
     ("actuators[0].type", edited(0, type=...), "required key is missing"),
@@ -255,7 +262,6 @@ def test_uncertainty_that_cannot_be_is_refused_with_its_key(key: str, value: obj
         parse_layout(data)
 
 
-def test_fins_of_version_1_may_be_uncertain() -> None:
+def test_fins_with_a_mounting_angle_may_be_uncertain() -> None:
     layout = load_layout("A").replace_actuator("front_right", uncertainty=Uncertainty(0.02))
-    assert layout_to_dict(layout)["version"] == 1
     assert parse_layout(layout_to_dict(layout)) == layout

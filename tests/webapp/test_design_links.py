@@ -84,7 +84,7 @@ def test_a_bomb_is_not_unpacked() -> None:
 @pytest.mark.parametrize("path", ["/etc/passwd", "../../etc/passwd", "/dev/zero", "forces.csv"])
 def test_a_link_opens_no_file_of_the_server(path: str) -> None:
     values = layout_to_dict(load_layout("ucat"))
-    values["fins"][0]["model"] = {"type": "table", "path": path}
+    values["actuators"][0]["model"] = {"type": "table", "path": path}
     with pytest.raises(FinlabError, match="did not come along"):
         files.unpacked(link_of(yaml_text(values)))
 

@@ -53,7 +53,7 @@ def table(tmp_path: Path) -> bytes:
 def document(table: str = "", mesh: str = "") -> bytes:
     values = layout_to_dict(load_layout("ucat")) | {"name": "robot"}
     if table:
-        values["fins"][0]["model"] = {"type": "table", "path": table}
+        values["actuators"][0]["model"] = {"type": "table", "path": table}
     values["body"] = {"hull": {"mesh": mesh}} if mesh else {}
     return yaml_text(values).encode()
 
@@ -178,7 +178,7 @@ def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None
         parts = {name: archive.read(name) for name in archive.namelist()}
     for path in secrets_of(tmp_path, table)[:9]:
         robot = json.loads(parts[ROBOT])
-        robot["layout"]["fins"][0]["model"] = {"type": "table", "path": path}
+        robot["layout"]["actuators"][0]["model"] = {"type": "table", "path": path}
         forged = {**parts, ROBOT: json.dumps(robot).encode()}
         del forged[CHECKSUMS]
         forged[CHECKSUMS] = checksums(forged)
