@@ -22,32 +22,61 @@ from finlab.cli.shared_options import with_json_file
 from finlab.command_end import FAILED, exit_code
 from finlab.errors import FinlabError
 
-EXAMPLES = {
-    "": "finlab allocate A --wrench 1 0 0.5 0 0 0.1",
-    "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --lost front_right --json",
-    "layout": "finlab layout show A",
-    "layout check": "finlab layout check my_robot.yaml",
-    "layout show": "finlab layout show A --lost front_right",
-    "layout optimize": "finlab layout optimize A --fins front_right front_left -o better.yaml",
-    "layout convert": "finlab layout convert robot.urdf my_robot.yaml",
-    "data": "finlab data generate -o runs/data --layouts 200 --commands 500",
-    "train": "finlab train mdn -o runs/mine --preset smoke",
-    "train mdn": "finlab train mdn -o runs/mine --preset smoke",
-    "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
-    "train allocator": "finlab train allocator -o runs/paper --surrogate runs/surrogate --preset smoke",
-    "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods dual,sqp",
-    "eval report": "finlab eval report -o runs/report --quick",
-    "bench": "finlab bench dual analytic --quick --json bench.json",
-    "fit": "finlab fit fin cell.csv -o fin.csv",
-    "fit actuator": "finlab fit actuator bench.csv -o thruster.csv",
-    "fit fin": "finlab fit fin cell.csv -o fin.csv",
-    "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
-    "log": "finlab log dive.ulg --robot bluerov2_heavy --plot dive.png",
-    "simulate": "finlab simulate A --duration 30 -o swim",
-    "export": "finlab export A -o my_robot",
-    "app": "finlab app --layout A --port 8080",
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "": ("finlab allocate A --wrench 1 0 0.5 0 0 0.1", "finlab app"),
+    "allocate": (
+        "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --lost front_right --json",
+        "finlab allocate ucat --wrench 9 0 2 0 0 0 --policy direction --weak back_left=0.5",
+    ),
+    "layout": ("finlab layout show A",),
+    "layout check": ("finlab layout check my_robot.yaml", "finlab layout check A B my_robot.yaml"),
+    "layout show": ("finlab layout show A --lost front_right", "finlab layout show A --json card.json"),
+    "layout optimize": (
+        "finlab layout optimize A --actuators front_right front_left -o better.yaml",
+        "finlab layout optimize bluerov2 --actuators front_left --goal worst_single_failure -o better.yaml",
+    ),
+    "layout convert": (
+        "finlab layout convert robot.urdf my_robot.yaml",
+        "finlab layout convert my_robot.yaml robot.params --to px4",
+    ),
+    "data": ("finlab data generate -o runs/data --layouts 200 --commands 500",),
+    "data generate": ("finlab data generate -o runs/data --layouts 200 --commands 500",),
+    "data interaction": ("finlab data interaction -o jets.npz --layouts 200",),
+    "train": ("finlab train mdn -o runs/mine --preset smoke",),
+    "train mdn": (
+        "finlab train mdn -o runs/mine --preset smoke",
+        "finlab train mdn -o runs/mine --minutes 60 --resume",
+    ),
+    "train surrogate": ("finlab train surrogate -o runs/surrogate --preset smoke",),
+    "train allocator": (
+        "finlab train allocator -o runs/paper --surrogate runs/surrogate --preset smoke",
+        "finlab train allocator -o runs/paper --surrogate runs/surrogate --resume --device cuda:0",
+    ),
+    "train interaction": ("finlab train interaction jets.npz -o runs/jets --minutes 20",),
+    "eval": ("finlab eval wrench --split id --layouts 10 --targets 10 --methods dual,sqp",),
+    "eval report": ("finlab eval report -o runs/report --quick",),
+    "bench": ("finlab bench dual analytic --quick --json bench.json",),
+    "fit": ("finlab fit fin cell.csv -o fin.csv", "finlab fit thruster bench.csv -o thruster.csv"),
+    "fit actuator": ("finlab fit actuator bench.csv -o thruster.csv",),
+    "fit thruster": (
+        "finlab fit thruster bench.csv -o thruster.csv",
+        "finlab fit thruster maker.xlsx -o thruster.csv --voltage 14.8",
+    ),
+    "fit fin": ("finlab fit fin cell.csv -o fin.csv",),
+    "fit interaction": ("finlab fit interaction my_robot.yaml tank.csv -o with_jets.yaml",),
+    "fit robot": ("finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",),
+    "log": (
+        "finlab log dive.ulg --plot dive.png",
+        "finlab log dive.bin --robot bluerov2_heavy -o better.yaml",
+    ),
+    "simulate": (
+        "finlab simulate A --duration 30 -o swim",
+        "finlab simulate A --lost front_left@45 --plot path.svg",
+    ),
+    "export": ("finlab export A -o my_robot", "finlab export bluerov2_heavy --c firmware"),
+    "app": ("finlab app --layout A --port 8080",),
 }
-"""An example for each verb, and for each group of them."""
+"""Examples of each verb, and of each group of them; those of an experiment are made of its options."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -64,7 +93,10 @@ def _run(argv: list[str]) -> int:
         caught = io.StringIO()
         with redirect_stdout(caught):  # what is no terminal gets no boxes
             code = _parsed(argv)
-        print(f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}")
+        print(caught.getvalue().rstrip().replace("•", "-"))
+        print()
+        for line in examples(argv):
+            print(f"example: {line}")
         return code
     try:
         return _parsed(with_json_file(argv))
@@ -125,10 +157,22 @@ def _verb(name: str, argv: Sequence[str]) -> Any:
     return verb(argv) if name == "eval" else verb
 
 
-def example(argv: Sequence[str]) -> str:
-    """The example of the verb that arguments begin with."""
+def examples(argv: Sequence[str]) -> tuple[str, ...]:
+    """Examples of the verb that arguments begin with.
+
+    Args:
+        argv: the arguments after the program's name.
+
+    Returns:
+        Lines for a shell, at least one; of a group's verb that has none of its own, those of the group.
+    """
     words = [word for word in argv if not word.startswith("-")]
     if words[:1] == ["eval"] and len(words) > 1 and " ".join(words[:2]) not in EXAMPLES:
-        return f"finlab eval {words[1]} --json rows.json"
-    names = (" ".join(words[:count]) for count in range(len(words), -1, -1))
-    return next(EXAMPLES[name] for name in names if name in EXAMPLES)
+        from finlab.cli.eval_verbs import examples_of
+
+        return examples_of(words[1])
+    for count in range(len(words), -1, -1):
+        verb = " ".join(words[:count])
+        if verb in EXAMPLES:
+            return EXAMPLES[verb]
+    return EXAMPLES[""]

@@ -78,6 +78,18 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     return verb
 
 
+def examples_of(name: str) -> tuple[str, ...]:
+    """Two lines for a shell: an experiment as the quick report runs it, and with its rows in a file.
+
+    Args:
+        name: the experiment, one of `EXPERIMENTS`; for another name those of `wrench`.
+    """
+    from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+
+    experiment = load_experiment(name if name in EXPERIMENTS else "wrench")
+    return experiment.command(experiment.quick), f"finlab eval {experiment.name} --json rows.json"
+
+
 def _shown(option: inspect.Parameter) -> inspect.Parameter:
     """An option as the parser takes it: lists are texts with commas between."""
     from finlab.evaluation.experiment import item_type
@@ -109,7 +121,7 @@ def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
 
 
 def report(
-    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    output: Annotated[Path, arg(metavar="DIR", aliases=["-o"])],
     quick: bool = False,
     sections: Annotated[str, arg(metavar="A,B,...")] = "all",
     seed: Count = 6143,
@@ -119,17 +131,17 @@ def report(
     What is done is in DIR if it is stopped.
 
     Args:
-        out: folder for the report.
+        output: folder for the report.
         quick: a look on few cases, in minutes; the whole takes a quarter of an hour.
         sections: run only these experiments.
         seed: of all draws.
     """
-    if out.exists() and not out.is_dir():
-        raise DataError(f"out: expected a folder, got the file {out}")
+    if output.exists() and not output.is_dir():
+        raise DataError(f"output: expected a folder, got the file {output}")
     from finlab.evaluation.report_page import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
-    print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
+    print(make_report(output, size="quick" if quick else "full", seed=seed, names=names))
 
 
 QUICK = ("id", "ood", "limits", "failure")  # splits of a quick run

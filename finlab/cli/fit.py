@@ -1,4 +1,4 @@
-"""`finlab fit actuator|fin|interaction|robot`: from measurements and swims to what layouts say."""
+"""`finlab fit thruster|fin|interaction|robot`: from measurements and swims to what layouts say."""
 
 import sys
 from pathlib import Path
@@ -41,7 +41,7 @@ def fin(
 
 
 @verbs.command
-def actuator(
+def thruster(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="TABLE.csv", aliases=["-o"])],
     voltage: float | None = None,
@@ -70,6 +70,9 @@ def actuator(
     write_whole(output, thruster_csv(fit, output), DataError)
     print("\n".join(summary(fit)))
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
+
+
+verbs.command(name="actuator", help="The same as `fit thruster`, by its earlier name.")(thruster)
 
 
 @verbs.command

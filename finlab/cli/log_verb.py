@@ -19,8 +19,8 @@ def log(
     outputs: Annotated[str | None, arg(metavar="TOPIC")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
     improve: bool = True,
-    save: Annotated[Path | None, arg(metavar="FILE.yaml")] = None,
-    plot: Annotated[Path | None, arg(metavar="FILE", aliases=["-o"])] = None,
+    output: Annotated[Path | None, arg(metavar="FILE.yaml", aliases=["-o"])] = None,
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None,
     json: shared_options.JsonFile = None,
 ) -> None:
     """Say from a log of PX4 (.ulg), ArduSub (.bin) or ROS (a bag) why a thruster saturated, which axis was
@@ -35,7 +35,7 @@ def log(
         priority: for policy priority: a group of axes with commas between, most important first; the axis
             that lost most by default.
         improve: search for a better layout and replay on it.
-        save: layout file to write that layout to.
+        output: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
     """
     from finlab.evaluation.plots import check_picture, write_picture
@@ -45,7 +45,7 @@ def log(
     from finlab.log.words import judgement_text, picture
 
     shared_options.check_json_file(json)
-    shared_options.check_json_file(save, "save")
+    shared_options.check_json_file(output, "output")
     check_picture(plot)
     known = None if robot is None else shared_options.open_robot(robot)[0]
     read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
@@ -53,6 +53,6 @@ def log(
     judged = judge(in_worker(read, file, known), priority=groups, improve=improve)
     if plot is not None:
         write_picture(lambda _: picture(judged), [], plot)
-    if save is not None and judged.improved is not None:
-        save_layout(judged.improved, save)
+    if output is not None and judged.improved is not None:
+        save_layout(judged.improved, output)
     shared_options.put_json(judged.to_dict() if json else None, json, judgement_text(judged))

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Union, get_type_hints
 from msgspec import Meta, Struct, structs
 
 from finlab.actuators.actuator import Actuator, Uncertainty
-from finlab.actuators.fin.fin import Fin, Servo
+from finlab.actuators.fin.fin import Servo
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits, Model
 from finlab.actuators.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row, ThrustModel
 from finlab.errors import LayoutError

@@ -1,11 +1,14 @@
 """The command as a whole: help, exit codes, and never a traceback for what a user did."""
 
+import copy
+import functools
 import json
 import os
+import shlex
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,8 @@ import pytest
 from tyro.extras import SubcommandApp
 
 import finlab
-from finlab.cli import EXAMPLES, _command_line, main
+from finlab import cli
+from finlab.cli import EXAMPLES, _command_line, _verb, examples, main
 from finlab.cli.shared_options import with_json_file
 from finlab.files.guarded import read_file
 from tests.fit.cell import columns_of, commands, measured, soft, write
@@ -26,9 +30,9 @@ WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
 def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
     """Every verb and every group of verbs."""
     yield " ".join(words)
-    for name, inside in app._subcommands.items():
-        if isinstance(inside[0] if isinstance(inside, tuple) else inside, SubcommandApp):
-            yield from verbs(inside[0] if isinstance(inside, tuple) else inside, *words, name)
+    for name, command in app._subcommands.items():
+        if isinstance(command.target, SubcommandApp):
+            yield from verbs(command.target, *words, name)
         else:
             yield " ".join([*words, name])
 
@@ -39,9 +43,54 @@ def test_every_verb_has_a_page_of_help_with_an_example(verb: str, capsys: pytest
     page = capsys.readouterr().out
     assert page.startswith(f"usage: finlab {verb}".strip())
     assert page.isascii(), "a page of help goes through any pipe"
-    last = page.splitlines()[-1]
     assert verb in EXAMPLES or verb.startswith("eval "), "give a new verb its example"
-    assert last.startswith(f"example: finlab {verb}")
+    lines = page.splitlines()
+    shown = [line.removeprefix("example: ") for line in lines if line.startswith("example: ")]
+    assert lines[-len(shown) :] == [f"example: {line}" for line in shown], "they end the page"
+    assert 1 <= len(shown) <= 2 and all(line.startswith(f"finlab {verb}".strip()) for line in shown)
+
+
+def without_work(run: Callable[..., Any], seen: list[str]) -> Callable[..., None]:
+    """A function with the options of a verb's, which does nothing but note that its options were read."""
+
+    @functools.wraps(run)
+    def noted(*args: Any, **options: Any) -> None:
+        seen.append(run.__name__)
+
+    return noted
+
+
+def still(app: SubcommandApp, seen: list[str]) -> None:
+    """Puts functions without work in the place of those of all verbs of a group."""
+    for command in app._subcommands.values():
+        if isinstance(command.target, SubcommandApp):
+            still(command.target, seen)
+        else:
+            command.target = without_work(command.target, seen)
+
+
+ALL_EXAMPLES = [line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())]
+
+
+@pytest.mark.parametrize("line", list(dict.fromkeys(ALL_EXAMPLES)))
+def test_the_options_of_every_example_are_understood(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    program, *argv = shlex.split(line)
+    seen: list[str] = []
+    verb = copy.deepcopy(_verb(argv[0], argv))
+    if isinstance(verb, SubcommandApp):
+        still(verb, seen)
+    else:
+        verb = without_work(verb, seen)
+    monkeypatch.setattr(cli, "_verb", lambda name, argv: verb)
+    assert program == "finlab" and main(argv) == 0 and len(seen) == 1
+
+
+@pytest.mark.parametrize(
+    "line", [line for verb in ("allocate", "layout show", "export") for line in EXAMPLES[verb]]
+)
+def test_quick_examples_run(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(line)[1:]) == 0
 
 
 def test_versions_are_told(capsys: pytest.CaptureFixture[str]) -> None:

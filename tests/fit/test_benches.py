@@ -131,7 +131,7 @@ def test_forces_that_contradict_each_other_are_named_and_one_way_is_no_missing_s
 
 def test_the_command_line_takes_a_voltage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = workbook(tmp_path / "maker.xlsx", (12.0, 16.0), True)
-    command = ["fit", "actuator", str(path), "-o", str(tmp_path / "table.csv")]
+    command = ["fit", "thruster", str(path), "-o", str(tmp_path / "table.csv")]
     assert main(command) == 2 and "--voltage 16" in capsys.readouterr().err
     assert main([*command, "--voltage", "14"]) == 0
     assert "interpolated between the rows at 12 V and at 16 V" in capsys.readouterr().out

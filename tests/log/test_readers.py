@@ -145,14 +145,15 @@ def test_the_command_tells_draws_and_writes(
     px4: Dive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = {
-        key: tmp_path / name for key, name in (("plot", "a.svg"), ("json", "a.json"), ("save", "better.yaml"))
+        key: tmp_path / name
+        for key, name in (("plot", "a.svg"), ("json", "a.json"), ("output", "better.yaml"))
     }
     options = [word for key, path in files.items() for word in (f"--{key}", str(path))]
     assert main(["log", str(px4.path), "--priority", "Tz", *options]) == 0
     said = capsys.readouterr().out
     assert said.startswith("Yaw (Tz) was lost for 10") and "without rotor8" in said
     assert json.loads(files["json"].read_text())["sentence"][:40] == said[:40]
-    assert "<svg" in files["plot"].read_text() and finlab.load_layout(files["save"]).n == 8
+    assert "<svg" in files["plot"].read_text() and finlab.load_layout(files["output"]).n == 8
 
 
 def test_a_missing_reader_is_named(px4: Dive, monkeypatch: pytest.MonkeyPatch) -> None:
