@@ -7,8 +7,9 @@
 import matplotlib.pyplot as plt
 
 import finlab
+from finlab.allocation import MethodName
 
-METHODS = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
+METHODS: tuple[MethodName, ...] = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 layout = finlab.load_layout("A")
 results = {}
 print(f"{'method':<10}  err_norm  power [W]   effort        ms")

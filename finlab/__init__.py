@@ -30,12 +30,28 @@ if TYPE_CHECKING:
     from finlab.layout import Tilt as Tilt
     from finlab.layout import load_layout as load_layout
     from finlab.layout import save_layout as save_layout
-    from finlab.log import Judgement as Judgement
-    from finlab.log import Log as Log
-    from finlab.log import judge as judge
-    from finlab.log import read_log as read_log
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Allocation",
+    "Allocator",
+    "Azimuth",
+    "Body",
+    "Damage",
+    "Fin",
+    "FinlabError",
+    "Layout",
+    "Limits",
+    "Policy",
+    "PowerLaw",
+    "PowerTable",
+    "Rudder",
+    "Thruster",
+    "Tilt",
+    "load_layout",
+    "save_layout",
+]
 
 _KINDS = ("Fin", "Thruster", "Azimuth", "Tilt", "Rudder")
 _OF_LAYOUTS = (*_KINDS, "Body", "Damage", "Layout", "Limits", "load_layout", "save_layout")
@@ -46,7 +62,6 @@ _HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
     "Allocator": "finlab.allocation.allocator",
     "Policy": "finlab.allocation.policy",
     "FinlabError": "finlab.errors",
-    **dict.fromkeys(("Judgement", "Log", "judge", "read_log"), "finlab.log"),
 }
 
 

@@ -11,12 +11,27 @@ if TYPE_CHECKING:
     from finlab.allocation.allocation import BatchAllocation as BatchAllocation
     from finlab.allocation.allocator import Allocator as Allocator
     from finlab.allocation.methods import METHODS as METHODS
+    from finlab.allocation.methods import MethodName as MethodName
     from finlab.allocation.policy import Policy as Policy
+    from finlab.allocation.policy import PolicyName as PolicyName
     from finlab.allocation.solution import Candidates as Candidates
     from finlab.allocation.solution import Solution as Solution
 
 _HOME = {"Allocation": "allocation", "BatchAllocation": "allocation", "Allocator": "allocator"}
-_HOME |= {"METHODS": "methods", "Policy": "policy", "Candidates": "solution", "Solution": "solution"}
+_HOME |= {"METHODS": "methods", "MethodName": "methods", "Policy": "policy", "PolicyName": "policy"}
+_HOME |= {"Candidates": "solution", "Solution": "solution"}
+
+__all__ = [
+    "METHODS",
+    "Allocation",
+    "Allocator",
+    "BatchAllocation",
+    "Candidates",
+    "MethodName",
+    "Policy",
+    "PolicyName",
+    "Solution",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -15,7 +15,7 @@ from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
 from finlab.allocation.method import Method
 from finlab.allocation.notes import answer_notes
-from finlab.allocation.policy import CLOSEST, Policy, as_policy
+from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
     Usable,
     check_flow,
@@ -32,7 +32,7 @@ from finlab.allocation.question import (
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
-from finlab.axes import axes_in
+from finlab.axes import Axis, axes_in
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
 from finlab.layout import Layout
@@ -144,19 +144,30 @@ class Allocator:
     def __init__(
         self,
         layout: Layout,
-        method: str | type[Method] = "dual",
+        method: methods.MethodName | type[Method] = "dual",
         *,
         checkpoint: methods.Checkpoint = None,
+        robust: float | None = None,
+        period_s: float | None = None,
+        calm: float | None = None,
         **settings: Any,
     ) -> None:
         """Prepare a method for a robot.
+
+        The settings of method `dual` are arguments of their own; None is the method's own value.
 
         Args:
             layout: the robot.
             method: one of `finlab.allocation.METHODS`, or a class of your own.
             checkpoint: for methods with networks: a checkpoint folder, the name of a shipped checkpoint,
                 or what `read_checkpoint` gives; by default the shipped one.
-            settings: of the method, by name.
+            robust: what an expected miss of 1 % of the yardstick is worth [W], growing with its square; from
+                0 to 1e9, 0 by default: how far actuators may be from their laws then costs nothing.
+            period_s: time between ticks [s], above 0 and up to 1000, 0.1 by default: with the rates of the
+                drives it says how far a command may change from `previous`. Method `mdn` has it, too.
+            calm: what turning costs in a tick, from 0 to 10, 2 by default: 0 is nothing, 2 spends some power
+                for half the turning of azimuths and tilts.
+            settings: of other methods, by name.
 
         Raises:
             AllocationError: unknown method or setting, or a value out of its range.
@@ -164,6 +175,8 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         check_layout(layout)
+        named = {"robust": robust, "period_s": period_s, "calm": calm}
+        settings |= {name: value for name, value in named.items() if value is not None}
         if isinstance(method, str):
             self._made(layout, methods.choose_method(method, checkpoint, **settings))
         elif isinstance(method, type) and issubclass(method, Method):
@@ -241,7 +254,7 @@ class Allocator:
         return None if self.weights is None else self.weights.name
 
     @property
-    def policy_under_way(self) -> str:
+    def policy_under_way(self) -> PolicyName:
         """What a control loop asks for by default where a wrench is out of reach."""
         return self._choice.kind.policy_under_way
 
@@ -262,8 +275,8 @@ class Allocator:
         damage: Damage | None = None,
         previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
-        free: Sequence[str] = (),
-        policy: Policy | str = CLOSEST,
+        free: Sequence[Axis] = (),
+        policy: Policy | PolicyName = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> Allocation:
@@ -341,8 +354,8 @@ class Allocator:
         *,
         lost: Sequence[str] = (),
         damage: Damage | None = None,
-        free: Sequence[str] = (),
-        policy: Policy | str = CLOSEST,
+        free: Sequence[Axis] = (),
+        policy: Policy | PolicyName = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
@@ -375,7 +388,7 @@ class Allocator:
     def _question(
         self,
         damage: Damage,
-        policy: Policy | str,
+        policy: Policy | PolicyName,
         flow: ArrayLike | None,
         seed: int,
         free: Sequence[str] = (),

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from finlab.allocation.policy import Policy
+from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.rates import USUAL_PERIOD_S, Rates
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
@@ -30,7 +30,7 @@ class Method(ABC):
     """What the method is called."""
     settings_class: ClassVar[type[Settings]] = Settings
     """What can be set."""
-    policy_under_way: ClassVar[str] = "closest"
+    policy_under_way: ClassVar[PolicyName] = "closest"
     """What a control loop asks for by default where a wrench is out of reach."""
     every_policy: ClassVar[bool] = True
     """Whether more than the least plain error may be asked for."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
@@ -17,6 +17,10 @@ from finlab.files.plain_values import parse_json
 from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
 
+MethodName = Literal[
+    "dual", "mdn", "paper", "qp", "sqp", "paper_sqp", "px4", "ardusub", "analytic", "fixed_frequency", "ipopt"
+]
+"""Names of the methods that come with finlab; `METHODS` has the classes."""
 METHODS: dict[str, tuple[str, str]] = {
     "dual": ("finlab.allocation.dual.method", "Dual"),
     "mdn": ("finlab.mdn.method", "Mdn"),

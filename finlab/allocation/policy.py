@@ -2,29 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.axes import AXES as AXES
-from finlab.axes import mask_of
+from finlab.axes import Axis, mask_of
 from finlab.errors import CommandError
 
-KINDS = ("closest", "direction", "priority")
+PolicyName = Literal["closest", "direction", "priority"]
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
 each served as far as those before it allow."""
+KINDS: tuple[PolicyName, ...] = get_args(PolicyName)
+"""All of them."""
 
 
 @dataclass(frozen=True)
 class Policy:
     """One way to answer an unreachable wrench; reachable ones are delivered whole by all of them."""
 
-    kind: str = "closest"
+    kind: PolicyName = "closest"
     """One of `KINDS`."""
     axis_weights: tuple[float, ...] = (1.0,) * 6
     """For `closest`: weight of each axis of the normalized error."""
-    order: tuple[tuple[str, ...], ...] = (("Fz",), ("Tx", "Ty", "Tz"), ("Fx", "Fy"))
+    order: tuple[tuple[Axis, ...], ...] = (("Fz",), ("Tx", "Ty", "Tz"), ("Fx", "Fy"))
     """For `priority`: groups of axes, most important first; axes that are not named come last."""
 
     def __post_init__(self) -> None:
@@ -68,16 +70,25 @@ CLOSEST = Policy()
 """The default."""
 
 
-def as_policy(policy: Policy | str) -> Policy:
+def as_policy(policy: Policy | PolicyName) -> Policy:
     """A policy from its name."""
     return policy if isinstance(policy, Policy) else Policy(policy)
 
 
 def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None) -> Policy:
-    """A policy as the command line names it: groups of `priority` are axes joined by commas."""
+    """A policy as the command line names it.
+
+    Args:
+        kind: one of `KINDS`.
+        axis_weights: for `closest`: six weights; all 1 when None.
+        priority: for `priority`: groups of axes joined by commas, such as `["Fz", "Tx,Ty"]`.
+
+    Raises:
+        CommandError: one of them is none.
+    """
     options: dict[str, Any] = {}
     if axis_weights is not None:
         options["axis_weights"] = tuple(float(w) for w in axis_weights)
     if priority:
         options["order"] = tuple(tuple(group.split(",")) for group in priority)
-    return Policy(kind, **options)
+    return Policy(cast("PolicyName", kind), **options)  # which checks it

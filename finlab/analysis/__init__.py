@@ -19,3 +19,22 @@ from finlab.analysis.score_card import least_power as least_power
 from finlab.analysis.score_card import score_card as score_card
 from finlab.forces.attainable import AttainableSet as AttainableSet
 from finlab.forces.attainable import attainable_set as attainable_set
+
+__all__ = [
+    "AXES",
+    "GOALS",
+    "AttainableSet",
+    "Authority",
+    "Bounds",
+    "Improvement",
+    "Loss",
+    "Progress",
+    "ScoreCard",
+    "attainable_set",
+    "authority",
+    "least_power",
+    "losses",
+    "mirror_pairs",
+    "optimize_layout",
+    "score_card",
+]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli import shared_options
+
+if TYPE_CHECKING:
+    from finlab.axes import Axis
 
 
 def log(
@@ -49,7 +52,7 @@ def log(
     check_picture(plot)
     known = None if robot is None else shared_options.open_robot(robot)[0]
     read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
-    groups = [group.split(",") for group in priority]
+    groups = cast("list[list[Axis]]", [group.split(",") for group in priority])  # `judge` checks them
     judged = judge(in_worker(read, file, known), priority=groups, improve=improve)
     if plot is not None:
         write_picture(lambda _: picture(judged), [], plot)

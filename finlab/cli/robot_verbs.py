@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from tyro.conf import UseAppendAction, arg
 
 from finlab.cli import shared_options
 from finlab.errors import FinlabError
+
+if TYPE_CHECKING:
+    from finlab.allocation import MethodName
+    from finlab.axes import Axis
 
 
 def allocate(
@@ -61,10 +65,12 @@ def allocate(
     shared_options.check_json_file(json)
     robot, gone = shared_options.open_robot(layout, lost)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
-    allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
+    # Names that are none are refused there, in sentences.
+    name, axes = cast("MethodName", method), cast("tuple[Axis, ...]", free)
+    allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
-    result = allocator.allocate(wrench, damage=damage, free=free, policy=answer, flow=flow, seed=seed)
+    result = allocator.allocate(wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed)
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")

@@ -21,3 +21,24 @@ from finlab.control.hypotheses import MonitorSettings as MonitorSettings
 from finlab.control.observer import MotionObserver as MotionObserver
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import gains_for as gains_for
+
+__all__ = [
+    "CONTROLLERS",
+    "Completion",
+    "Controller",
+    "Diagnosis",
+    "FaultMonitor",
+    "Foresighted",
+    "Learner",
+    "Measurement",
+    "MonitorSettings",
+    "MotionObserver",
+    "Setpoint",
+    "TrackingController",
+    "VelocityController",
+    "WaypointController",
+    "gains_for",
+    "make_controller",
+    "steerable_loss",
+    "steers",
+]

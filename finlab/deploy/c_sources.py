@@ -16,7 +16,7 @@ import finlab
 from finlab import core
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.method import Dual, DualSettings
-from finlab.allocation.policy import Policy
+from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -32,7 +32,13 @@ ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
 NOT_ABOARD = "jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c"
 """Files of the core for robots with `interaction`, and for what a layout can do and prices prove."""
-QUESTIONS = ("closest", 0.9), ("closest", 3.0), ("direction", 3.0), ("priority", 3.0), ("closest", 0.6)
+QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
+    ("closest", 0.9),
+    ("closest", 3.0),
+    ("direction", 3.0),
+    ("priority", 3.0),
+    ("closest", 0.6),
+)
 """Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick before."""
 TEMPLATES = Path(__file__).with_name("c_files")
 

@@ -6,3 +6,5 @@ from finlab.exchange.convert import read_any as read_any
 from finlab.exchange.convert import read_robot as read_robot
 from finlab.exchange.exchange import Exchange as Exchange
 from finlab.exchange.matrix_table import is_robot_table as is_robot_table
+
+__all__ = ["FOREIGN", "Exchange", "convert", "is_robot_table", "read_any", "read_robot"]

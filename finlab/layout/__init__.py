@@ -22,3 +22,28 @@ from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
 from finlab.layout.layout import Layout as Layout
 from finlab.layout.load import load_layout as load_layout
 from finlab.layout.random_layouts import random_layout as random_layout
+
+__all__ = [
+    "MAX_ACTUATORS",
+    "Actuator",
+    "Azimuth",
+    "Body",
+    "Damage",
+    "Fin",
+    "FinModelSpec",
+    "Hull",
+    "Layout",
+    "Limits",
+    "Rudder",
+    "Servo",
+    "Thruster",
+    "Tilt",
+    "Uncertainty",
+    "layout_effectiveness",
+    "layout_to_dict",
+    "load_layout",
+    "own_effectiveness",
+    "parse_layout",
+    "random_layout",
+    "save_layout",
+]

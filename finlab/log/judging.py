@@ -10,7 +10,7 @@ from finlab.allocation.binding import at_limits, limit_words
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
-from finlab.axes import AXES, axes_in
+from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.log.answers import answers_to
@@ -38,7 +38,7 @@ USUAL = Policy("priority").order
 Flags = NDArray[np.bool_]
 
 
-def judge(log: Log, *, priority: Sequence[Sequence[str]] = (), improve: bool = True) -> Judgement:
+def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = True) -> Judgement:
     """Returns what the log's robot could not, and replays its demands by other methods and policies, with
     each actuator lost, and on an improved layout.
 
@@ -207,10 +207,10 @@ class Account:
         )
 
 
-def _priority(groups: Sequence[Sequence[str]], axis: str | None) -> Policy:
+def _priority(groups: Sequence[Sequence[Axis]], axis: Axis | None) -> Policy:
     """Policy `priority`: the groups named, or the axis that lost most and then the usual ones."""
     if groups:
-        return Policy("priority", order=tuple(map(tuple, groups)))
+        return Policy("priority", order=tuple(tuple(group) for group in groups))
     rest = (tuple(each for each in group if each != axis) for group in USUAL)
     return Policy("priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group)))
 

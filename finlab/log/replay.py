@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation import Allocator
-from finlab.allocation.methods import method_class
+from finlab.allocation.methods import MethodName, method_class
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -85,8 +85,9 @@ def replay(
     scale = yardstick(robot)
     intact = demands_of(wrench, span, scale, MOST)
     rough = demands_of(intact.wrench, intact.span, scale, MOST_LOST)
-    questions = [("dual", policy) for policy in policies]
-    questions += [(name, CLOSEST) for name in ("px4", "ardusub") if method_class(name).fits(robot)]
+    autopilots: tuple[MethodName, ...] = ("px4", "ardusub")
+    questions: list[tuple[MethodName, Policy]] = [("dual", policy) for policy in policies]
+    questions += [(name, CLOSEST) for name in autopilots if method_class(name).fits(robot)]
     made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in questions)}
     gone = [] if improved or robot.n == 1 else robot.names
     for lost in (None, *gone):

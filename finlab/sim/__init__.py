@@ -19,3 +19,19 @@ from finlab.sim.task import make_trajectory as make_trajectory
 from finlab.sim.task import straight as straight
 from finlab.sim.truth import Fault as Fault
 from finlab.sim.truth import perturbed as perturbed
+
+__all__ = [
+    "NOISE_ALONE",
+    "NO_NOISE",
+    "SHIPPED",
+    "ClosedLoop",
+    "Fault",
+    "RunLog",
+    "SensorSettings",
+    "Tick",
+    "Trajectory",
+    "load_log",
+    "make_trajectory",
+    "perturbed",
+    "straight",
+]

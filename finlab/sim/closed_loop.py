@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.policy import Policy, as_policy
+from finlab.allocation.policy import Policy, PolicyName, as_policy
 from finlab.arrays import Array
 from finlab.control import (
     Completion,
@@ -80,7 +80,7 @@ class ClosedLoop:
         task: Trajectory,
         controller: Controller | None = None,
         *,
-        policy: Policy | str | None = None,
+        policy: Policy | PolicyName | None = None,
         sensors: SensorSettings | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
         failures: Sequence[Fault | tuple[str, float]] = (),

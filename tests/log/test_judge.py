@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.log import Judgement, judge, read_log
 from finlab.log.replay import demands_of, replay
 from finlab.physics.objective import yardstick
 from tests.log.conftest import SUB_UNIT, Dive, columns, px4_dive, sub_dive
@@ -23,7 +24,7 @@ def dive(request: pytest.FixtureRequest) -> Dive:
     return made
 
 
-def check(dive: Dive, judged: finlab.Judgement) -> None:
+def check(dive: Dive, judged: Judgement) -> None:
     """Yaw was lost as put in, over the hard sixth, and priority of yaw would have held it."""
     hard = slice(len(dive.time) // 2, len(dive.time) // 2 + len(dive.time) // 6)
     begin, end = dive.time[hard][[0, -1]]
@@ -45,9 +46,9 @@ def check(dive: Dive, judged: finlab.Judgement) -> None:
 
 
 def test_a_lost_yaw_is_measured_and_the_policy_named_that_holds_it(dive: Dive) -> None:
-    log = finlab.read_log(dive.path, dive.robot)
+    log = read_log(dive.path, dive.robot)
     np.testing.assert_allclose(log.demand, dive.demand, atol=1e-3)
-    judged = finlab.judge(log, improve=False)
+    judged = judge(log, improve=False)
     check(dive, judged)
     lost = {(each.lost, each.name) for each in judged.replays}
     assert {(name, "px4") for name in (None, *dive.robot.names)} <= lost and len(lost) == 5 * 9
@@ -55,21 +56,21 @@ def test_a_lost_yaw_is_measured_and_the_policy_named_that_holds_it(dive: Dive) -
 
 
 def test_the_replay_of_px4_is_what_its_log_shows(px4: Dive) -> None:
-    judged = finlab.judge(finlab.read_log(px4.path, px4.robot), improve=False)
+    judged = judge(read_log(px4.path, px4.robot), improve=False)
     own = next(each for each in judged.replays if each.method == "px4" and each.lost is None)
     np.testing.assert_allclose(own.missing, px4.missing, rtol=1e-3, atol=1e-3)
     assert judged.watts == pytest.approx(own.watts, rel=1e-3)
 
 
 def test_the_geometry_comes_from_the_log(px4: Dive, sub: Dive) -> None:
-    log = finlab.read_log(px4.path)
-    check(replace(px4, robot=log.robot), replace_names(finlab.judge(log, improve=False)))
+    log = read_log(px4.path)
+    check(replace(px4, robot=log.robot), replace_names(judge(log, improve=False)))
     assert not log.asks
-    assert any("--robot" in each for each in finlab.read_log(sub.path).asks)
-    assert "Leak Detected" in [event.words for event in finlab.read_log(sub.path).events]
+    assert any("--robot" in each for each in read_log(sub.path).asks)
+    assert "Leak Detected" in [event.words for event in read_log(sub.path).events]
 
 
-def replace_names(judged: finlab.Judgement) -> finlab.Judgement:
+def replace_names(judged: Judgement) -> Judgement:
     """Parameters have no names of thrusters."""
     parts = (replace(part, name=f"front_{i}") for i, part in enumerate(judged.robot.actuators))
     spells = (replace(each, limits=("front_0 at full thrust",) * len(each.limits)) for each in judged.spells)
@@ -79,21 +80,21 @@ def replace_names(judged: finlab.Judgement) -> finlab.Judgement:
 
 def test_without_outputs_the_autopilots_own_word_counts(tmp_path: Path) -> None:
     dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs="")
-    log = finlab.read_log(dive.path, dive.robot)
-    judged = finlab.judge(log, improve=False)
+    log = read_log(dive.path, dive.robot)
+    judged = judge(log, improve=False)
     np.testing.assert_allclose(judged.missing, dive.missing, rtol=0.01, atol=0.01)
     assert judged.watts is None and any("no outputs" in each for each in judged.asks)
 
 
 def test_widths_of_pulses_stand_for_outputs(tmp_path: Path) -> None:
     dive = px4_dive(tmp_path / "dive.ulg", n=600, outputs="pulses")
-    judged = finlab.judge(finlab.read_log(dive.path, dive.robot), improve=False)
+    judged = judge(read_log(dive.path, dive.robot), improve=False)
     np.testing.assert_allclose(judged.missing, dive.missing, rtol=0.01, atol=0.01)
     assert judged.watts is not None
 
 
 def test_the_robots_health_is_told(px4: Dive) -> None:
-    judged = finlab.judge(finlab.read_log(px4.path, px4.robot), improve=False)
+    judged = judge(read_log(px4.path, px4.robot), improve=False)
     words = ["rear_right failed, says PX4", "lift_rear_left has an ESC offline"]
     assert sorted(said for _, said in judged.events) == sorted(words)
     assert judged.events[0][0] == pytest.approx(px4.time[len(px4.time) // 3], abs=0.1)
@@ -101,13 +102,13 @@ def test_the_robots_health_is_told(px4: Dive) -> None:
 
 @pytest.mark.parametrize("rest", [0.0, np.nan])
 def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: float, px4: Dive) -> None:
-    log, name = finlab.read_log(px4.path, px4.robot), px4.robot.names[1]
+    log, name = read_log(px4.path, px4.robot), px4.robot.names[1]
     easy = slice(0, len(log) // 2 - 10)
     some = {key: getattr(log, key)[easy] for key in ("time", "span", "demand", "command")}
-    assert finlab.judge(replace(log, **some), improve=False).stopped == ()
+    assert judge(replace(log, **some), improve=False).stopped == ()
     force = some["command"][:, 1, 0].copy()
     some["command"][:, 1] = rest
-    judged = finlab.judge(replace(log, **some), improve=False)
+    judged = judge(replace(log, **some), improve=False)
     assert judged.stopped == (name,) and f"with {name} at rest all along" in judged.sentence
     np.testing.assert_allclose(
         judged.missing, some["span"] @ np.abs(force) * np.abs(columns(px4.robot)[1]), 1e-3
@@ -122,33 +123,33 @@ def test_a_thruster_that_ceases_to_turn_is_named_and_its_force_is_missing(
     speed = np.full((600, 8), 900.0)
     speed[200:, 2] = 0.0
     dive = write(tmp_path / "dive", n=600, speed=speed)
-    log, name = finlab.read_log(dive.path, dive.robot), dive.robot.names[2]
+    log, name = read_log(dive.path, dive.robot), dive.robot.names[2]
     (event,) = (each for each in log.events if "stood still" in each.words)
     assert event.actuator == 2 and 0.0 <= event.time - dive.time[200] < 0.5
-    whole = finlab.read_log(write(tmp_path / "whole", n=600).path, dive.robot)
-    judged, late = finlab.judge(log, improve=False), log.time >= event.time
+    whole = read_log(write(tmp_path / "whole", n=600).path, dive.robot)
+    judged, late = judge(log, improve=False), log.time >= event.time
     force = np.outer(whole.command[:, 2, 0], columns(dive.robot)[2])
     missing = whole.span[late] @ np.abs(dive.demand - dive.given + force)[late]
     np.testing.assert_allclose(judged.missing, missing, rtol=0.01, atol=0.01)
     assert judged.stopped == (name,) and f"{name} stopped" in judged.sentence
     assert f"without {name}" in judged.sentence
-    assert finlab.judge(whole, improve=False).stopped == ()
+    assert judge(whole, improve=False).stopped == ()
 
 
 def test_the_scale_is_the_users_where_it_is_given(sub: Dive) -> None:
-    log = finlab.read_log(sub.path, sub.robot, scale=2.0 * SUB_UNIT)
+    log = read_log(sub.path, sub.robot, scale=2.0 * SUB_UNIT)
     np.testing.assert_allclose(log.demand, 2.0 * sub.demand, atol=1e-3)
-    assert any("--scale" in note for note in finlab.judge(log, improve=False).notes)
+    assert any("--scale" in note for note in judge(log, improve=False).notes)
 
 
 def test_a_robot_turned_round_is_the_same_robot(px4: Dive) -> None:
     turned = tuple(replace(p, axis=tuple(-x for x in p.axis)) for p in px4.robot.actuators)
-    log = finlab.read_log(px4.path, replace(px4.robot, actuators=turned))
-    check(px4, finlab.judge(log, improve=False))
+    log = read_log(px4.path, replace(px4.robot, actuators=turned))
+    check(px4, judge(log, improve=False))
 
 
 def test_a_better_layout_is_proposed_and_replayed(px4: Dive) -> None:
-    judged = finlab.judge(finlab.read_log(px4.path, px4.robot))
+    judged = judge(read_log(px4.path, px4.robot))
     assert judged.improved is not None and judged.improved.names == px4.robot.names
     size = {where: [] for where in ("as it is", "improved")}
     for each in judged.replays:
@@ -181,6 +182,6 @@ def test_twenty_minutes_at_fifty_hertz_are_judged_in_ten_seconds(
 ) -> None:
     dive = write(tmp_path / "dive", n=60_000)
     begin = time.process_time()
-    judged = finlab.judge(finlab.read_log(dive.path, dive.robot))
+    judged = judge(read_log(dive.path, dive.robot))
     assert time.process_time() - begin < 10.0
     check(dive, judged)

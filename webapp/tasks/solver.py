@@ -119,7 +119,7 @@ KEPT = 24
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
-POLICIES = {kind: Policy(kind) for kind in KINDS}
+POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in KINDS}
 RUNS = "runs"
 """Folder in the one where the app was started, whose folders are looked at."""
 

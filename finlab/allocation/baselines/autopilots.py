@@ -26,6 +26,7 @@ from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.axes import Axis
 from finlab.exchange.motor_factors import AXES, FRAMES
 from finlab.exchange.motor_factors import SIGNS as SUB_SIGNS
 
@@ -42,7 +43,7 @@ LEAST = 0.2
 """Entries of a column from which on a thruster takes part in desaturation."""
 YAW_MARGIN = 0.15
 """Share of a thruster's range by which yaw may exceed it."""
-PX4_ORDER = (("Tx", "Ty"), ("Fz",), ("Tz",), ("Fx", "Fy"))
+PX4_ORDER: tuple[tuple[Axis, ...], ...] = (("Tx", "Ty"), ("Fz",), ("Tz",), ("Fx", "Fy"))
 """Groups of axes in the order in which PX4 means to keep them where not all can be had; surge and sway are
 never reduced by plan, but cut off with the thrusters' limits."""
 
@@ -132,7 +133,7 @@ COLUMNS = np.array([WRENCH_AXES.index(axis) for axis in AXES])
 """Axis of the wrench for each column of factors."""
 GROUPS = ((0, 1, 3), (2, 4, 5))
 """Columns that are scaled together: roll, pitch and throttle; yaw, forward and lateral."""
-ARDUSUB_ORDER = (("Tx", "Ty", "Fz"), ("Tz", "Fx", "Fy"))
+ARDUSUB_ORDER: tuple[tuple[Axis, ...], ...] = (("Tx", "Ty", "Fz"), ("Tz", "Fx", "Fy"))
 """The same as groups of axes; neither is meant to give way to the other."""
 SMALL = 0.15
 """Share of the strongest thruster on an axis below which geometry suggests no factor, and of the strongest

@@ -3,13 +3,16 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import ARDUSUB_ORDER, PX4_ORDER
+from finlab.allocation.methods import MethodName
 from finlab.arrays import Array
+from finlab.axes import Axis
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.splits import make_case
@@ -17,8 +20,8 @@ from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
 
-Order = tuple[tuple[str, ...], ...]
-METHODS: dict[str, tuple[str, dict[str, str], Order | None]] = {
+Order = tuple[tuple[Axis, ...], ...]
+METHODS: dict[str, tuple[MethodName, dict[str, Any], Order | None]] = {
     "dual": ("dual", {}, None),
     "pseudo-inverse": ("px4", {"desaturation": "none"}, PX4_ORDER),
     "px4": ("px4", {}, PX4_ORDER),
@@ -115,9 +118,9 @@ def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
     return scored
 
 
-def missing_by_group(missing: Array, order: Sequence[Sequence[str]]) -> Array:
+def missing_by_group(missing: Array, order: Order) -> Array:
     """Sizes (N, G) of what is missing (N, 6), over the yardstick, in each group of axes."""
-    groups = Policy("priority", order=tuple(map(tuple, order))).groups
+    groups = Policy("priority", order=order).groups
     return np.stack([np.linalg.norm(missing[:, axes], axis=1) for axes in groups], axis=1)
 
 
