@@ -3,7 +3,7 @@
 A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free` (names of
 axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at the next ticks, and
 `flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted. Each answer says in `status`
-what it is:
+what it is, and has the `id` of its request, a refused one's too:
 
 =========  ============================================================================================
 status     meaning
@@ -48,7 +48,7 @@ _REFUSED = (CommandError, LayoutError, AllocationError)
 
 
 class Request(Struct, forbid_unknown_fields=True):
-    """What a request may hold; the allocator checks its arrays."""
+    """What a request may hold. The allocator checks its arrays."""
 
     wrench: Any
     id: Any = None
@@ -59,16 +59,20 @@ class Request(Struct, forbid_unknown_fields=True):
     flow: Any = None
 
 
-def parse_request(line: bytes) -> Request:
-    """A request, checked as far as the allocator does not check it itself. Raises CommandError: it is no JSON
-    object of known keys, or its `id` is too long to be sent back."""
+def parse_values(line: bytes) -> Any:
+    """Returns the plain values of a line. Raises CommandError: it is no JSON, or too long."""
     if len(line) > MAX_LINE:
         raise CommandError(f"request: longer than {MAX_LINE} bytes")
-    values = parse_json(decoded(line, "request", "JSON", CommandError), "request", CommandError)
-    request = checked(values, Request, CommandError, "request")
-    if len(json.dumps(request.id)) > MAX_ID:
+    return parse_json(decoded(line, "request", "JSON", CommandError), "request", CommandError)
+
+
+def id_of(values: Any) -> Any:
+    """Returns the `id` in the values of a request, which may be refused; None where it has none. Raises
+    CommandError: it is too long to be sent back."""
+    name = values.get("id") if isinstance(values, dict) else None
+    if len(json.dumps(name)) > MAX_ID:
         raise CommandError(f"id: longer than {MAX_ID} characters")
-    return request
+    return name
 
 
 class Server:
@@ -124,8 +128,9 @@ class Server:
         name: Any = None
         fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
-            request = parse_request(line)
-            name = request.id
+            values = parse_values(line)
+            name = id_of(values)
+            request = checked(values, Request, CommandError, "request")
             answer = self._robot.allocate(
                 request.wrench,
                 lost=request.lost,

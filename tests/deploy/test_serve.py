@@ -127,6 +127,25 @@ def test_bad_requests_get_one_sentence_and_no_commands(
         raise FinlabError(reply["error"])
 
 
+@pytest.mark.parametrize(
+    ("request_", "name"),
+    [
+        ({"wrench": [1, 2], "id": 7}, 7),
+        ({"wrench": [1, 0, 0, 0, 0, 0], "id": "a", "speed": 3}, "a"),
+        ({"id": [1, {"k": None}]}, [1, {"k": None}]),
+        ({**GOOD, "id": 8, "lost": "back_left"}, 8),
+        ({**GOOD, "id": 9, "policy": 3}, 9),
+        ({**GOOD, "id": "x" * 1000}, None),
+        (b'{"id": 7, "wrench": ', None),
+        (b"[7]", None),
+    ],
+)
+def test_a_refused_request_gets_its_id_back(request_: Any, name: Any, robot: DeployedRobot) -> None:
+    """Where it can be read, and is short enough to be sent."""
+    reply = served(robot, request_)[0]
+    assert reply["status"] == "error" and reply["id"] == name
+
+
 def test_only_good_targets_and_rest_wind_up_the_watchdog(
     robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

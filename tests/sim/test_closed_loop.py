@@ -145,9 +145,9 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
 
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])
 def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share: float) -> None:
-    with pytest.raises(FinlabError, match="failure of front_left: expected"):
+    with pytest.raises(FinlabError, match="fault of front_left: expected"):
         sim.Fault("front_left", 1.0, kind, share).checked()
-    with pytest.raises(FinlabError, match="failure of front_left: expected"):
+    with pytest.raises(FinlabError, match="fault of front_left: expected"):
         sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle")).fail(
             "front_left", kind, share
         )
