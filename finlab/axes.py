@@ -62,7 +62,7 @@ def unit_vector(key: str, vector: Vector | None) -> Vector:
     """Returns a direction with length 1 exactly. Raises LayoutError: it is missing, or its length is not 1
     within `ROUNDED`; the message names the key."""
     if vector is None:
-        raise LayoutError("required key is missing", key)
+        raise LayoutError("is missing, expected a unit vector", key)
     length = math.hypot(*vector)
     if abs(length - 1.0) > ROUNDED:
         raise LayoutError(f"expected a unit vector, got one of length {length:.6g}; divide it by that", key)

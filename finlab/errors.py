@@ -29,14 +29,26 @@ class FinlabError(Exception):
 class LayoutError(FinlabError):
     """A layout, or the file that describes it, is not acceptable.
 
-    The parts are kept apart so that a check deep inside (which knows the problem and the key) and the reader
-    of the file (which knows where that key lies) can each add what they know.
+    The parts are kept apart so that a check deep inside (which knows the problem and the argument), the
+    actuator (which knows its name) and the reader of a file (which knows the key of that argument and where
+    it lies) can each add what they know.
     """
 
-    def __init__(self, problem: str, key: str = "", source: str = "") -> None:
-        """Joins the parts to `source: key: problem`, leaving out empty ones."""
-        super().__init__(": ".join(part for part in (source, key, problem) if part))
-        self.problem, self.key, self.source = problem, key, source
+    def __init__(self, problem: str, key: str = "", source: str = "", actuator: str = "") -> None:
+        """Joins the parts to `source: key of actuator: problem`, leaving out empty ones.
+
+        Args:
+            problem: what was got and what was expected.
+            key: the argument in Python, the path of the key in a file.
+            source: the file.
+            actuator: whose argument or key it is, such as `thruster 'lift'`.
+        """
+        place = " of ".join(part for part in (key, actuator) if part)
+        super().__init__(": ".join(part for part in (source, place, problem) if part))
+        self.problem = problem
+        self.key = key
+        self.source = source
+        self.actuator = actuator
 
     @classmethod
     def at(cls, source: str, problem: str, key: str = "") -> "LayoutError":
@@ -47,7 +59,11 @@ class LayoutError(FinlabError):
         """Returns the same error seen from further out: `prefix` goes before the key."""
         if prefix and self.key and not self.key.startswith("["):
             prefix += "."
-        return LayoutError(self.problem, prefix + self.key, source or self.source)
+        return LayoutError(self.problem, prefix + self.key, source or self.source, self.actuator)
+
+    def about(self, actuator: str) -> "LayoutError":
+        """Returns the same error with the actuator that it is about, unless that is known already."""
+        return LayoutError(self.problem, self.key, self.source, self.actuator or actuator)
 
 
 class CommandError(FinlabError):

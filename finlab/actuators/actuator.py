@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab import axes
 from finlab.actuators.law import ActuatorLaw
 from finlab.arrays import Array
-from finlab.errors import FinlabError
+from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import Checked, Name
 
 Places = NDArray[np.intp]
@@ -152,7 +152,17 @@ class Actuator(Checked, ABC):
     uncertainty: Uncertainty | None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        """Raises LayoutError: an argument, or what several say together, is refused; the message names it and
+        the actuator."""
+        try:
+            super().__post_init__()
+            self.check_together()
+        except LayoutError as error:
+            raise error.about(f"{self.type} {self.name!r:.66}") from None
+
+    def check_together(self) -> None:
+        """Checks what arguments say together, each being right by itself, and makes axes exact. Raises
+        LayoutError: the message names the argument."""
         if len(self.AXES) == 2:
             first, second = ((name, getattr(self, name)) for name in self.AXES)
             for (name, _), axis in zip((first, second), axes.axes_across(first, second), strict=True):

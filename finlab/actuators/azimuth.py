@@ -171,24 +171,25 @@ class Azimuth(Propeller):
     hangs: bool = False
     """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check_together(self) -> None:
+        """See `Actuator`."""
+        super().check_together()
         least, most = self.force
         hangs = self.hangs and least == most
         if not hangs and not (least < most and most > 0.0):
             raise LayoutError(
                 f"expected a most force above 0 and above the least, got {least:g} and {most:g}; turn `zero` "
                 "round where it only pulls",
-                "force_n",
+                "force",
             )
         if not hangs and self.dead_band > self.force[1]:
             raise LayoutError(
-                f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band_n"
+                f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band"
             )
         width = self.arc[1] - self.arc[0]
         if not 0.0 <= width <= TURN + FILE_TURN_TOLERANCE:
             low, high = map(math.degrees, self.arc)
-            raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g}", "arc_deg")
+            raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g} deg", "arc")
         check_force(self.model, self.force)
 
     @classmethod
@@ -227,9 +228,8 @@ class Tilt(Azimuth):
     type: ClassVar[str] = "tilt"
     SAMPLE_ARC = (-math.pi / 3, math.pi / 3)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check_together(self) -> None:
+        """See `Actuator`."""
+        super().check_together()
         if is_full_turn(self.arc[1] - self.arc[0]):
-            raise LayoutError(
-                "required key is missing: the arc of a tilt is less than a full turn", "arc_deg"
-            )
+            raise LayoutError("is missing: the arc of a tilt is less than a full turn", "arc")

@@ -384,12 +384,13 @@ class Rudder(actuator.Actuator):
     uncertainty: actuator.Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check_together(self) -> None:
+        """See `Actuator`."""
+        super().check_together()
         if not self.deflection[0] < self.deflection[1]:
             low, high = map(math.degrees, self.deflection)
             raise LayoutError(
-                f"expected a least below the greatest angle, got {low:g} and {high:g}", "deflection_deg"
+                f"expected a least below the greatest angle, got {low:g} and {high:g} deg", "deflection"
             )
 
     @property

@@ -117,7 +117,7 @@ def check_force(model: ThrustModel, force: tuple[float, float]) -> None:
         least, most = model.rows[0][1], model.rows[-1][1]
         if not least <= force[0] <= force[1] <= most:
             raise LayoutError(
-                f"the table ends at {least:g} and {most:g} N, got {force[0]:g} .. {force[1]:g}", "force_n"
+                f"the table ends at {least:g} and {most:g} N, got {force[0]:g} .. {force[1]:g}", "force"
             )
 
 

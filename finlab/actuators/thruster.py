@@ -138,18 +138,19 @@ class Thruster(Propeller):
     hangs: bool = False
     """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check_together(self) -> None:
+        """See `Actuator`."""
+        super().check_together()
         object.__setattr__(self, "axis", unit_vector("axis", self.axis))
         check_force(self.model, self.force)
         least, most = self.force
         if self.hangs and least == most:
             return
         if not least <= 0.0 <= most or least == most:
-            raise LayoutError(f"must include 0, and more than that, got {least:g} and {most:g}", "force_n")
+            raise LayoutError(f"must include 0, and more than that, got {least:g} and {most:g}", "force")
         if self.dead_band > max(-least, most):
             raise LayoutError(
-                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
+                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band"
             )
 
     @classmethod

@@ -18,6 +18,28 @@ KINDS: tuple[PolicyName, ...] = get_args(PolicyName)
 """All of them."""
 
 
+def check_order(groups: Any, argument: str) -> None:
+    """Refuses what is no groups of axes.
+
+    Args:
+        groups: such as `(("Fz",), ("Tx", "Ty"))`.
+        argument: what the groups were given as, with which the sentence begins.
+
+    Raises:
+        CommandError: they are no groups, or name what is no axis, or one twice.
+    """
+    if not isinstance(groups, Sequence) or any(isinstance(group, str) for group in groups):
+        raise CommandError(
+            f"{argument}: expected groups of axes such as (('Fz',), ('Tx', 'Ty')), got {groups!r:.100}"
+        )
+    named = [axis for group in groups for axis in group]
+    unknown = [axis for axis in named if axis not in AXES]
+    if unknown:
+        raise CommandError(f"{argument}: expected axes among {', '.join(AXES)}, got {unknown[0]!r:.60}")
+    if len(set(named)) < len(named):
+        raise CommandError(f"{argument}: every axis may be named once, got {', '.join(named)}")
+
+
 @dataclass(frozen=True)
 class Policy:
     """One way to answer an unreachable wrench; reachable ones are delivered whole by all of them."""
@@ -40,17 +62,9 @@ class Policy:
             np.isfinite(weights).all() and (weights >= 0).all() and weights.any()
         ):
             raise CommandError(
-                f"axis weights: expected six numbers from 0, not all 0, got {self.axis_weights}"
+                f"axis_weights: expected six numbers from 0, not all 0, got {self.axis_weights}"
             )
-        if not isinstance(self.order, Sequence) or any(isinstance(g, str) for g in self.order):
-            raise CommandError(
-                f"priority: expected groups of axes such as (('Fz',), ('Tx', 'Ty')), got {self.order}"
-            )
-        named = [axis for group in self.order for axis in group]
-        if unknown := [axis for axis in named if axis not in AXES]:
-            raise CommandError(f"priority: expected axes among {', '.join(AXES)}, got {unknown[0]!r}")
-        if len(set(named)) < len(named):
-            raise CommandError(f"priority: every axis may be named once, got {', '.join(named)}")
+        check_order(self.order, "order")
 
     @property
     def is_plain(self) -> bool:
@@ -91,4 +105,5 @@ def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | N
         options["axis_weights"] = tuple(float(w) for w in axis_weights)
     if priority:
         options["order"] = tuple(tuple(group.split(",")) for group in priority)
+        check_order(options["order"], "priority")
     return Policy(cast("PolicyName", kind), **options)  # which checks it

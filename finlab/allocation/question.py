@@ -75,7 +75,7 @@ def usable(layout: Layout, damage: Damage) -> Usable:
     lost = set(damage.lost)
     alive = np.array([name not in lost for name in left.names])
     if lost and (not alive.any() or len(lost) > left.n - int(alive.sum())):
-        left.without(damage.lost)  # says what is wrong
+        left.without(damage.lost, "lost")  # says what is wrong
     return Usable(left, damage, alive)
 
 

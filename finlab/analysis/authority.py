@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,8 @@ from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
 from finlab.layout import Layout
 
-AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+MotionAxis = Literal["surge", "sway", "heave", "roll", "pitch", "yaw"]
+AXES: tuple[MotionAxis, ...] = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4
 """Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about
 1e-5."""
@@ -27,12 +29,12 @@ class HeldAxes:
     rank: int
     condition: float | None
     """Largest over smallest singular value; None below the rank of all axes that count."""
-    free: tuple[str, ...]  # axes that the robot does not command, which do not count
-    without_authority: tuple[str, ...]  # axes that are commanded and that no actuator pushes at all
-    coupled: tuple[str, ...]  # axes that are pushed, but never without pushing others too
+    free: tuple[MotionAxis, ...]  # axes that the robot does not command, which do not count
+    without_authority: tuple[MotionAxis, ...]  # axes that are commanded and that no actuator pushes at all
+    coupled: tuple[MotionAxis, ...]  # axes that are pushed, but never without pushing others too
 
     @property
-    def alone(self) -> tuple[str, ...]:
+    def alone(self) -> tuple[MotionAxis, ...]:
         """Axes that can be pushed alone."""
         return tuple(axis for axis in AXES if axis not in self.free + self.without_authority + self.coupled)
 
@@ -58,7 +60,7 @@ class Authority(HeldAxes):
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
 
     @property
-    def reachable(self) -> tuple[str, ...]:
+    def reachable(self) -> tuple[MotionAxis, ...]:
         """Axes along which something can be had both ways with the other five at zero."""
         both = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
         return tuple(name for name, a, b, unit in both if min(a, b) > NOTHING * unit)
@@ -70,8 +72,8 @@ class Loss:
 
     actuator: str
     rank: int
-    reachable: tuple[str, ...]  # axes still reachable alone
-    lost: tuple[str, ...]  # axes that were and no longer are
+    reachable: tuple[MotionAxis, ...]  # axes still reachable alone
+    lost: tuple[MotionAxis, ...]  # axes that were and no longer are
     share_left: tuple[float | None, ...]
     """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where
     there was nothing."""
@@ -103,7 +105,7 @@ def _authorities(
     """What is held after each of several failures; one call for all is quicker than many."""
     sets = force_sets(layout, flow=flow).tile(len(failures))
     for row, lost in enumerate(failures):
-        sets.lose(row, list(layout.indices(tuple(lost))))
+        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
     counting = sets.along(counted := np.flatnonzero(layout.commanded))
     values, vectors = singular_values(counting)
     held = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
@@ -130,12 +132,12 @@ def _authorities(
     ]
 
 
-def commanded_axes(layout: Layout) -> tuple[str, ...]:
+def commanded_axes(layout: Layout) -> tuple[MotionAxis, ...]:
     """Returns those of `AXES` that a robot commands."""
     return tuple(axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts)
 
 
-def named_axes(names: Sequence[str]) -> tuple[Axis, ...]:
+def named_axes(names: Sequence[MotionAxis]) -> tuple[Axis, ...]:
     """Returns the axes of a wrench, each once, in order, of some of `AXES`. Raises LayoutError: there is
     none, or one of another name."""
     wrong = [name for name in names if name not in AXES]
@@ -151,7 +153,7 @@ def held_axes(layout: Layout, sets: ForceSets) -> list[HeldAxes]:
     return [_held(axes, *pair) for pair in zip(values, vectors, strict=True)]
 
 
-def _held(axes: tuple[str, ...], values: Array, vectors: Array) -> HeldAxes:
+def _held(axes: tuple[MotionAxis, ...], values: Array, vectors: Array) -> HeldAxes:
     """What singular values (m,), falling, and left vectors (m, m) hold of m axes."""
     kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
     # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
+from finlab.analysis.authority import AXES, MotionAxis, authority, commanded_axes, named_axes
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import LayoutError
@@ -43,7 +43,7 @@ def make_goal(
     mission: ArrayLike = MISSION,
     *,
     fine: bool = True,
-    axes: Sequence[str] | None = None,
+    axes: Sequence[MotionAxis] | None = None,
     flow: Array | None = None,
 ) -> Goal:
     """Returns the measure called `name` for variants of a layout. Raises LayoutError: unknown goal or axis,
@@ -98,7 +98,7 @@ def make_goal(
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
-def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
+def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[MotionAxis, ...]:
     """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
     alone now where it has too few actuators to push both ways along all, wherever they go. Raises
     LayoutError: there are none."""

@@ -111,8 +111,8 @@ class Moves:
         not mirrored or shares one with another pair, or nothing is free to move."""
         kind = "fin" if layout.is_of_fins else "actuator"
         if not names:
-            raise LayoutError(f"expected at least one {kind} to move, got none")
-        layout.indices(tuple(names))
+            raise LayoutError(f"names: expected at least one {kind} to move, got none")
+        layout.indices(tuple(names), "names")
         twins = _twins(layout, pairs)
         self.layout = layout
         leaders: list[str] = []
@@ -121,7 +121,7 @@ class Moves:
                 leaders.append(name)
         missing = [name for name in leaders if name not in bounds]
         if missing:
-            raise LayoutError(f"{kind} {missing[0]} is to be moved but has no bounds; give it some")
+            raise LayoutError(f"bounds: {kind} {missing[0]} is to be moved but has none; give it some")
         self.leaders = tuple(leaders)
         self._lead = list(layout.indices(leaders))
         self._twin = np.array([layout.index(twins[name]) if name in twins else -1 for name in leaders])
@@ -136,7 +136,7 @@ class Moves:
         self._held = np.clip(held, box[:, 0], box[:, 1])
         self._free = box[:, 1] - box[:, 0] > 0.0
         if not self._free.any():
-            raise LayoutError("the bounds leave nothing free to move; widen them")
+            raise LayoutError("bounds: nothing is left free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
         self.bends = flow is not None and any(law.feels_flow for _, law in laws_of(layout.actuators))

@@ -9,7 +9,7 @@ from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import commanded_axes, named_axes
+from finlab.analysis.authority import MotionAxis, commanded_axes, named_axes
 from finlab.analysis.climb import LEAST, PENALTY, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
@@ -70,7 +70,7 @@ def optimize_layout(
     seed: int = 0,
     rule: Rule | None = None,
     grid: tuple[float, float] = (0.0, 0.0),
-    axes: Sequence[str] | None = None,
+    axes: Sequence[MotionAxis] | None = None,
     flow: ArrayLike | None = None,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,

@@ -9,7 +9,16 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
+from finlab.analysis.authority import (
+    AXES,
+    Authority,
+    HeldAxes,
+    Loss,
+    MotionAxis,
+    authority,
+    held_axes,
+    losses,
+)
 from finlab.analysis.card_text import card_blocks
 from finlab.arrays import Array
 from finlab.display import blocks
@@ -25,7 +34,7 @@ def least_power(
     """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
     as for an allocator. Raises LayoutError: there is no actuator of a name in `lost`."""
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
-    if len(set(layout.indices(tuple(lost)))) == layout.n:
+    if len(set(layout.indices(tuple(lost), "lost"))) == layout.n:
         return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
     answer = Allocator(layout).allocate_batch(wanted, lost=tuple(lost), flow=flow)
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
@@ -128,7 +137,7 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
 class QuickCheck(HeldAxes):
     """Axes that the working actuators hold, and those that a loss costs."""
 
-    lost: tuple[tuple[str, tuple[str, ...]], ...]
+    lost: tuple[tuple[str, tuple[MotionAxis, ...]], ...]
     """Working actuators with the axes that the loss of each costs; those that cost none are left out."""
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import Allocator
-from finlab.analysis.authority import named_axes
+from finlab.analysis.authority import MotionAxis, named_axes
 from finlab.analysis.goals import UNREACHED
 from finlab.analysis.moves import Moves
 from finlab.arrays import Array
@@ -78,7 +78,7 @@ class _Faces(NamedTuple):
 class Directions:
     """The weakest direction, after the worst loss or with all working."""
 
-    def __init__(self, moves: Moves, axes: Sequence[str], after_loss: bool) -> None:
+    def __init__(self, moves: Moves, axes: Sequence[MotionAxis], after_loss: bool) -> None:
         self._moves, self._places = moves, [WRENCH.index(axis) for axis in named_axes(axes)]
         self._lost = np.arange(moves.layout.n) if after_loss else None
         self._drawn = np.random.default_rng(0)

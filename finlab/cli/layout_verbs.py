@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
@@ -15,6 +15,7 @@ from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
     from finlab.analysis import Improvement
+    from finlab.analysis.authority import MotionAxis
 
 verbs = SubcommandApp()
 
@@ -167,7 +168,7 @@ def optimize(
             mission=wrench or MISSION,
             rounds=rounds,
             seed=seed,
-            axes=axes or None,
+            axes=cast("tuple[MotionAxis, ...]", axes) or None,  # which checks them
             flow=flow,
             progress=report,
         )

@@ -166,8 +166,10 @@ def generate(
     from finlab.paper.training.samples import DataSettings, generate
 
     check_positive(layouts=layouts, commands=commands)
-    if seed < 0 or not 0.0 <= varied_limits <= 1.0:
-        raise CommandError(f"expected a seed from 0 and a share from 0 to 1, got {seed} and {varied_limits}")
+    if seed < 0:
+        raise CommandError(f"seed: expected a whole number from 0, got {seed}")
+    if not 0.0 <= varied_limits <= 1.0:
+        raise CommandError(f"varied-limits: expected a share from 0 to 1, got {varied_limits:g}")
     table = (("path", str(Path(fin_model).resolve())),)
     model = FinModelSpec("table", table) if fin_model.lower().endswith(".csv") else FinModelSpec(fin_model)
     with on_cluster(cluster):

@@ -141,7 +141,8 @@ Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
 
 class Checked:
     """Base of frozen dataclasses that are checked on construction, by their annotations. Raises LayoutError:
-    a value is none of its type, or out of bounds; the message names the key, as in a file."""
+    a value is none of its type, or out of bounds; the message names the argument. A reader of files puts the
+    key in its place: see `file_key`."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     KEYS: ClassVar[Mapping[str, str]] = {}
@@ -156,26 +157,32 @@ class Checked:
     """What a file calls it under the key `type`, where it may hold one of several."""
 
     def __post_init__(self) -> None:
-        keys, kind = _plain_fields(cast(Any, type(self)))
-        values = checked({key: getattr(self, name) for name, key in keys.items()}, kind)
-        for name, key in keys.items():
+        names, kind = _plain_fields(cast(Any, type(self)))
+        values = checked({name: getattr(self, name) for name in names}, kind)
+        for name in names:
             value = getattr(values, name)
             lines = _LINES if name == "description" else {}
             if isinstance(value, str) and not value.translate(lines).isprintable():
-                raise LayoutError(f"must hold printable characters only, got {shown(value)}", key)
+                raise LayoutError(f"must hold printable characters only, got {shown(value)}", name)
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def file_key(cls, argument: str) -> str:
+        """Returns what a file calls an argument, or a place in one: `force_n[1]` for `force[1]`."""
+        keys = {**cls.KEYS, **{name: key for name, (key, _) in cls.DEGREES.items()}}
+        name = argument.partition(".")[0].partition("[")[0]
+        return keys.get(name, name) + argument[len(name) :]
 
 
 _LINES = {ord("\n"): " ", ord("\t"): " "}
 
 
 @cache
-def _plain_fields(cls: Any) -> tuple[dict[str, str], Any]:
-    """Fields of a dataclass that hold plain values -> their keys, and the form of these."""
+def _plain_fields(cls: Any) -> tuple[list[str], Any]:
+    """Fields of a dataclass that hold plain values, and the form of these."""
     hints = get_type_hints(cls, include_extras=True)
     names = [field.name for field in fields(cls) if not _holds_checked(hints[field.name])]
-    keys = {name: cls.KEYS.get(name, name) for name in names}
-    return keys, msgspec.defstruct(cls.__name__, [(name, hints[name]) for name in names], rename=keys)
+    return names, msgspec.defstruct(cls.__name__, [(name, hints[name]) for name in names])
 
 
 def _holds_checked(kind: Any) -> bool:

@@ -164,7 +164,7 @@ def force_sets(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | Non
     """Returns what the actuators of one robot can push along the axes that it commands; nothing counts along
     the others. Those in `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s,
     rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
-    gone = layout.indices(tuple(lost))
+    gone = layout.indices(tuple(lost), "lost")
     sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
     sets.lose(0, list(gone))
     return sets

@@ -175,7 +175,7 @@ WHOLE = Damage()
 @lru_cache(maxsize=64)
 def _applied(damage: Damage, layout: Layout) -> Layout:
     for kind, known in damage.partly.items():
-        for part in map(layout.part, known):
+        for part in [layout.part(name, f"damage: {kind}") for name in known]:
             if kind not in part.FAULTS:
                 may = ", ".join((*part.FAULTS, "lost"))
                 raise AllocationError(f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}")

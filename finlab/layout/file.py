@@ -3,13 +3,15 @@
 There is one version, 2, which holds actuators of any type under `actuators`.
 
 Every error names the file and the key, such as
-`layouts/x.yaml: actuators[2].limits.amplitude_rad: minimum 0.6 is above maximum 0.05; swap them`.
+`x.yaml: actuators[2].limits.amplitude_rad of fin 'bow': minimum 0.6 is above maximum 0.05; swap them`.
 `layout.schema.json` beside this module is made of the same declarations.
 """
 
 import json
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -46,6 +48,7 @@ class Frame(Struct, forbid_unknown_fields=True):
 FRAME = to_builtins(Frame())
 """The frame, as a file says it."""
 
+_PLACE = re.compile(r"actuators\[(\d+)\]")
 _COUNT = Meta(min_length=1, max_length=MAX_ACTUATORS)
 
 
@@ -82,7 +85,7 @@ def parse_layout(
         folder: where relative paths start; the working directory when None.
         may_open: whether tables of thrust that it names may be opened; those of fins, and meshes, are not.
     """
-    with under(source=source):
+    with under(source=source), naming_actuators(data):
         _check_version(data)
         file = checked(data, layout_form())
         reader = Reader(folder, may_open)
@@ -98,6 +101,24 @@ def parse_layout(
             axes=tuple(file.axes or AXES),
             interaction=values["interaction"],
         )
+
+
+@contextmanager
+def naming_actuators(data: Any) -> Iterator[None]:
+    """Says in layout errors raised inside which actuator of a file's values they are about."""
+    try:
+        yield
+    except LayoutError as error:
+        place = _PLACE.match(error.key)
+        try:
+            part = data["actuators"][int(place[1])] if place else None
+        except (KeyError, IndexError, TypeError):
+            part = None
+        if not isinstance(part, Mapping) or not isinstance(part.get("name"), str):
+            raise
+        kind = part.get("type")
+        known = kind if isinstance(kind, str) and kind in KINDS else "actuator"
+        raise error.about(f"{known} {part['name']!r:.66}") from None
 
 
 def _check_version(data: Any) -> None:

@@ -114,7 +114,11 @@ class Reader:
             values[name] = (
                 tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
             )
-        return cls(**values)
+        try:
+            return cls(**values)
+        except LayoutError as error:
+            key = cls.file_key(error.key)
+            raise LayoutError(error.problem, key, error.source, error.actuator) from None
 
     def _table(self, values: dict[str, Any]) -> PowerTable:
         if ("rows" in values) == ("path" in values):

@@ -212,23 +212,23 @@ class Layout(Checked):
         counts = Counter(part.type for part in self.actuators)
         return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
 
-    def index(self, name: str) -> int:
+    def index(self, name: str, argument: str = "") -> int:
         """Returns the place of the actuator called `name`. Raises LayoutError: there is none; the message
-        lists those there are."""
+        lists those there are, and begins with the `argument` that the name stood in."""
         if name not in self.names:
             what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(
-                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}"
+                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}", argument
             )
         return self.names.index(name)
 
-    def indices(self, names: Sequence[str]) -> tuple[int, ...]:
-        """Returns the places of several actuators, in the order asked for; one unknown name is an error."""
-        return tuple(self.index(name) for name in names)
+    def indices(self, names: Sequence[str], argument: str = "") -> tuple[int, ...]:
+        """Returns the places of several actuators, in the order asked for; errors as for `index`."""
+        return tuple(self.index(name, argument) for name in names)
 
-    def part(self, name: str) -> Actuator:
+    def part(self, name: str, argument: str = "") -> Actuator:
         """Returns the actuator called `name`; errors as for `index`."""
-        return self.actuators[self.index(name)]
+        return self.actuators[self.index(name, argument)]
 
     def with_part(self, part: Actuator, name: str = "") -> "Layout":
         """Returns the layout with another actuator in the place of the one of that name, by default its own.
@@ -236,14 +236,15 @@ class Layout(Checked):
         i = self.index(name or part.name)
         return replace(self, actuators=(*self.actuators[:i], part, *self.actuators[i + 1 :]))
 
-    def without(self, names: Iterable[str]) -> "Layout":
+    def without(self, names: Iterable[str], argument: str = "") -> "Layout":
         """Returns the layout that is left when the actuators called `names` are lost. Raises LayoutError: a
-        name is unknown, or none is left."""
+        name is unknown, or none is left; the message begins with the `argument` that the names stood in."""
         names = [names] if isinstance(names, str) else list(names)
-        lost = set(self.indices(names))
+        lost = set(self.indices(names, argument))
         if len(lost) == self.n:
             what = "fin" if self.is_of_fins else "actuator"
-            raise LayoutError(f"layout {self.name} has no {what} left once all are lost; repair one")
+            problem = f"layout {self.name} has no {what} left once all are lost; repair one"
+            raise LayoutError(problem, argument)
         left = tuple(part for i, part in enumerate(self.actuators) if i not in lost)
         return replace(self, actuators=left)
 

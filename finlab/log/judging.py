@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation import Allocator
 from finlab.allocation.binding import at_limits, limit_words
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import CLOSEST, Policy, check_order
 from finlab.analysis.optimize import optimize_layout
 from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
@@ -210,6 +210,7 @@ class Account:
 def _priority(groups: Sequence[Sequence[Axis]], axis: Axis | None) -> Policy:
     """Policy `priority`: the groups named, or the axis that lost most and then the usual ones."""
     if groups:
+        check_order(groups, "priority")
         return Policy("priority", order=tuple(tuple(group) for group in groups))
     rest = (tuple(each for each in group if each != axis) for group in USUAL)
     return Policy("priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group)))

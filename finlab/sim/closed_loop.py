@@ -97,7 +97,7 @@ class ClosedLoop:
                 f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
             )
         events = [Fault(*failure).checked() for failure in failures]
-        layout.indices([event.name for event in events])
+        layout.indices([event.name for event in events], "failures")
         self.layout, self.allocator, self.task, self.seed = layout, allocator, task, seed
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None

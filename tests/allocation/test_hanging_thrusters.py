@@ -167,7 +167,7 @@ def test_no_file_says_that_a_thruster_hangs() -> None:
     layout = load_layout("bluerov2_heavy")
     data = layout_to_dict(Damage(stuck={layout.names[0]: 5.0}).applied_to(layout))
     assert data["actuators"][0]["force_n"] == [5.0, 5.0] and "hangs" not in data["actuators"][0]
-    with pytest.raises(LayoutError, match="force_n: must include 0"):
+    with pytest.raises(LayoutError, match="force_n of thruster .*: must include 0"):
         parse_layout(data)
     with pytest.raises(LayoutError, match="unknown key"):
         parse_layout({**layout_to_dict(layout), "actuators": [{**data["actuators"][0], "hangs": True}]})

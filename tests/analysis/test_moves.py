@@ -49,7 +49,7 @@ def test_free_actuators_can_keep_the_symmetry_there_is(shipped: Layouts, name: s
     [
         ([], (), "expected at least one fin to move"),
         (["nobody"], (), "has no fin 'nobody'"),
-        (["back_left"], (), "has no bounds"),
+        (["back_left"], (), "bounds: .* but has none"),
         (["front_left"], (("front_left", "back_left"),), "not each other's mirror image"),
         (["front_left"], (("front_left", "front_left"),), "not each other's mirror image"),
         (["front_left"], (("front_left", "front_right"), ("front_right", "front_left")), "one mirror pair"),

@@ -27,7 +27,7 @@ def test_check_names_file_and_key_of_each_bad_file(
     out, err = capsys.readouterr()
     assert out.splitlines() == ["A: ok, layout A with 4 fins"]
     first, second = err.splitlines()
-    assert first.startswith(f"finlab: error: {bad}: actuators[0].limits.amplitude_rad: ")
+    assert first.startswith(f"finlab: error: {bad}: actuators[0].limits.amplitude_rad of fin ")
     assert "'nowhere.yaml' is neither a file nor a shipped layout; shipped are A, B, C, D" in second
 
 

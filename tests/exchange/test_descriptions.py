@@ -243,7 +243,7 @@ PLUGIN = (
         (TURTLE.read_text(), ("mount",), "joint 'mount_joint' is fixed; a fin's joint is revolute or"),
         (TURTLE.read_text(), (), "has no thruster's plugin of gz-sim or uuv; name the links that are fins"),
         (TURTLE.read_text().replace('mass value="10"', 'mass value="0"'), FINS, "has no masses"),
-        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="20e3 '), FINS, r"position_m\[0\]: must lie"),
+        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="20e3 '), FINS, r"position\[0\] of fin .*: must lie"),
         (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="west '), FINS, "pose of joint .* is not 6 numbers"),
         (TURTLE.read_text().replace("</robot>", PLUGIN), (), "joint 'x', which moves no link in it"),
         (TURTLE.read_text().replace('"base_link"/><child', '"tail_fin"/><child'), FINS, "itself in a circle"),

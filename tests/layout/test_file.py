@@ -129,8 +129,14 @@ def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_pat
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(LayoutError) as caught:
         load_layout(path)
-    assert str(caught.value).startswith(f"{path}: {key}: "), caught.value
-    assert why in str(caught.value)
+    place, said = str(caught.value).removeprefix(f"{path}: ").split(": ", 1)
+    index = re.match(r"actuators\[(\d)\]", key)
+    part = data["actuators"][int(index[1])] if index else None
+    whose = ""
+    if isinstance(part, dict) and "name" in part and isinstance(part["name"], str):
+        whose = f" of fin {part['name']!r:.66}"
+    assert place == key + whose
+    assert why in said
     assert "\n" not in str(caught.value)
 
 

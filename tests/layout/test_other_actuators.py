@@ -1,5 +1,6 @@
 """Thrusters, azimuths and rudders in a file: what is read, what is refused and why, and what is written."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from finlab.actuators.kinds import KINDS
 from finlab.actuators.thrust_model import PowerTable
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
+from finlab.layout import Azimuth, Fin, Rudder, Thruster, Tilt, parse_layout
 from finlab.layout.file_form import Reader, actuator_form, plain
 
 THRUSTER = {
@@ -94,7 +96,7 @@ def test_degrees_become_radians() -> None:
         ({**THRUSTER, "model": TABLE, "force_n": [-45, 50]}, "force_n: the table ends at -40 and 52 N"),
         ({**AZIMUTH, "force_n": [-20, 0]}, "force_n: expected a most force above 0 and above the least"),
         ({**AZIMUTH, "arc_deg": [20, -20]}, "arc_deg: must rise, by at most one turn, got 20 and -20"),
-        ({**AZIMUTH, "type": "tilt"}, "arc_deg: required key is missing: the arc of a tilt"),
+        ({**AZIMUTH, "type": "tilt"}, "arc_deg: is missing: the arc of a tilt"),
         ({**AZIMUTH, "zero": [0, 0, 1]}, "zero: must stand across turn_axis, got 0 degrees"),
         ({**RUDDER, "deflection_deg": [5, 5]}, "deflection_deg: expected a least below"),
         ({**RUDDER, "aspect_ratio": None}, "aspect_ratio: expected a number, got None"),
@@ -102,8 +104,39 @@ def test_degrees_become_radians() -> None:
     ],
 )
 def test_what_is_wrong_is_one_sentence_with_the_key(data: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(LayoutError, match=f"^{sentence}"):
+    key, words = sentence.split(": ", 1)
+    with pytest.raises(LayoutError, match=f"^{key}( of {data['type']} '{data['name']}')?: {words}"):
         _read(data)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "sentence"),
+    [
+        (Thruster, {"force": (3.0, 2.0)}, "force of thruster 'own': must include 0, .* got 3 and 2"),
+        (Thruster, {"position": (0.0, 0.0)}, "position of thruster 'own': expected a list of 3 values"),
+        (Thruster, {"dead_band": 99.0}, "dead_band of thruster 'own': leaves no force"),
+        (Azimuth, {"arc": (1.0, -1.0)}, "arc of azimuth 'own': must rise, by at most one turn"),
+        (Tilt, {"arc": (-3.1415926, 3.1415926)}, "arc of tilt 'own': is missing"),
+        (Rudder, {"deflection": (0.1, 0.1)}, "deflection of rudder 'own': expected a least below"),
+        (Rudder, {"shaft": (0.0, 0.0, 0.5)}, "shaft of rudder 'own': expected a unit vector"),
+        (Fin, {"mounting_angle": None}, "mounting_angle of fin 'own': is missing; give it, or shaft"),
+        (Fin, {"mounting_angle": 9e9}, "mounting_angle of fin 'own': must lie within"),
+    ],
+)
+def test_in_python_a_refusal_names_the_argument_and_the_actuator(
+    kind: type[Any], arguments: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(LayoutError, match=f"^{sentence}"):
+        replace(kind.sample(), name="own", **arguments)
+
+
+def test_in_a_file_the_same_refusal_names_the_key_and_the_actuator() -> None:
+    parts = [RUDDER, {**THRUSTER, "force_n": [3, 2]}]
+    data = {"format": "finlab-layout", "version": 2, "name": "two", "actuators": parts}
+    with pytest.raises(LayoutError) as caught:
+        parse_layout(data, "two.yaml")
+    expected = f"two.yaml: actuators[1].force_n of thruster {THRUSTER['name']!r}: must include 0"
+    assert str(caught.value).startswith(expected)
 
 
 def test_a_table_comes_from_a_csv_file(tmp_path: Path) -> None:

@@ -155,8 +155,8 @@ BAD = [
     ("actuators[0].mounting_angle_deg", edited(0, mounting_angle_deg=...), "or shaft and zero"),
     ("actuators[0].shaft", edited(0, shaft=[1, 0, 0], zero=[0, 1, 0]), "not both"),
     ("actuators[0].axis", edited(0, axis=[1, 0, 0]), "unknown key"),
-    ("actuators[1].zero", edited(1, zero=...), "required key is missing"),
-    ("actuators[1].shaft", edited(1, shaft=...), "required key is missing"),
+    ("actuators[1].zero", edited(1, zero=...), "is missing, expected a unit vector"),
+    ("actuators[1].shaft", edited(1, shaft=...), "is missing, expected a unit vector"),
     ("actuators[1].shaft", edited(1, shaft=[0, 0, 0.9]), "a unit vector, got one of length 0.9"),
     ("actuators[1].shaft", edited(1, shaft=[0, 0, 0]), "a unit vector, got one of length 0"),
     ("actuators[1].shaft[2]", edited(1, shaft=[0, 0, math.nan]), ""),
@@ -258,7 +258,7 @@ def test_any_actuator_may_be_uncertain(i: int) -> None:
 def test_uncertainty_that_cannot_be_is_refused_with_its_key(key: str, value: object) -> None:
     data = copy.deepcopy(GOOD)
     data["actuators"][2]["uncertainty"] = {**UNCERTAIN, key: value}
-    with pytest.raises(LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key}: "):
+    with pytest.raises(LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key} of thruster 'lift': "):
         parse_layout(data)
 
 

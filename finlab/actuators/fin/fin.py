@@ -167,14 +167,14 @@ class Fin(Actuator):
     diameter: Diameter | None = None
     """Of a disc as large as the area that it sweeps [m], for its jet; None where its blade is as large."""
 
-    def __post_init__(self) -> None:
-        Checked.__post_init__(self)
+    def check_together(self) -> None:
+        """See `Actuator`."""
         if self.shaft is None and self.zero is None:
             if self.mounting_angle is None:
-                raise LayoutError("required key is missing; give it, or shaft and zero", "mounting_angle_deg")
+                raise LayoutError("is missing; give it, or shaft and zero", "mounting_angle")
             return
         if self.mounting_angle is not None:
-            raise LayoutError("give either mounting_angle_deg, or shaft and zero, not both", "shaft")
+            raise LayoutError("give either a mounting angle, or shaft and zero, not both", "shaft")
         shaft, zero = axes.axes_across(("shaft", self.shaft), ("zero", self.zero))
         object.__setattr__(self, "shaft", shaft)
         object.__setattr__(self, "zero", zero)

@@ -46,23 +46,24 @@ class Limits(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, key in self.KEYS.items():
+        for name in self.KEYS:
             low, high = getattr(self, name)
             if low > high:
-                raise LayoutError(f"minimum {low:g} is above maximum {high:g}; swap them", key)
+                raise LayoutError(f"minimum {low:g} is above maximum {high:g}; swap them", name)
             if name != "zero_direction" and (high < LEAST[name] or 0.0 < low < LEAST[name]):
                 raise LayoutError(
                     f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got {low:g} "
                     f"and {high:g}; leave the fin out if it never moves",
-                    key,
+                    name,
                 )
             if 0.0 < high - low < LEAST_WIDTH:
                 raise LayoutError(
-                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one value twice", key
+                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one value twice",
+                    name,
                 )
         width = self.zero_direction[1] - self.zero_direction[0]
         if width > TURN + FULL_TURN_TOLERANCE:
-            raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")
+            raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction")
 
     @property
     def lower(self) -> tuple[float, float, float]:
