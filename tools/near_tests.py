@@ -2,45 +2,100 @@
 """Run the tests near a change: `make test-near`, or `tools/near_tests.py [PATH...] [-- PYTEST OPTIONS]`.
 
 The change is what differs from the branch `main` (from the last commit while on it) and what git does not
-track yet, or the paths that are given. Near are the tests in the folder that mirrors a changed module's
-package, and each test file elsewhere that imports a changed module by its full name, where few do. Slow files
-and folders are left to `make test`, unless they were changed themselves.
+track yet, or the paths that are given.
+
+Near is a test whose file imports a changed file, and nearer the fewer imports lie between the two
+(`tools/import_graph.py`). Of a changed file that no import names, such as a table or a style sheet, the files
+in its folder count as changed. Tests that are called after a changed file, and those in the folder of tests
+that mirrors its package, are nearer than their imports say.
+
+Of near tests so many are run as fit into a minute on two cores, by what each took when `make test-durations`
+was last run: the quicker and the nearer one first. A test file that was changed itself runs whole.
 """
 
+import argparse
 import ast
+import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tools.import_graph import ImportGraph
+
 ROOT = Path(__file__).resolve().parents[1]
-SLOW = (
-    "tests/browser",
-    "tests/packaging",
-    "tests/webapp/test_faults_in_handlers.py",
-    "tests/webapp/test_hostile.py",
-    "tests/webapp/test_swimming.py",
-    "tests/webapp/test_visitors.py",
-)
-"""What takes most of a minute by itself."""
-FEW = 12
-"""Of a module that more test files import, only the tests of its own package are near."""
+DURATIONS = ROOT / "tests" / "durations.json"
+LEFT_OUT = ("tests/browser/", "tests/packaging/")
+"""Tests of the whole, which run where they were changed themselves."""
+SECONDS = 80.0
+"""Sum of the recorded seconds of what is run, by two processes; start and collection take the rest."""
+UNKNOWN = 0.5
+"""Seconds of a test that was never timed."""
+FARTHER = 3.0
+"""What a test one import farther off has to be faster to run first."""
+FOLDER = 2
+"""Imports that tests in the mirroring folder are off at most."""
 
 
-def main(argv: list[str]) -> int:
+@dataclass(frozen=True)
+class NearTest:
+    """A test function and what says how soon it runs."""
+
+    file: str
+    name: str
+    distance: int
+    """Imports between its file and the change."""
+    seconds: float
+    """What it took when it was timed."""
+
+    @property
+    def order(self) -> tuple[float, str, str]:
+        """What tests are sorted by."""
+        return max(self.seconds, 0.01) * FARTHER**self.distance, self.file, self.name
+
+
+def main() -> int:
     """Print which tests are near, and run them."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("paths", nargs="*", help="changed files; by default what differs from main")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of tests, by their recorded durations")
+    parser.add_argument("--list", action="store_true", help="print the tests and run none")
+    argv = sys.argv[1:]
     split = argv.index("--") if "--" in argv else len(argv)
-    changed = argv[:split] or changed_files()
-    tests = near(changed)
+    options = parser.parse_args(argv[:split])
+    changed = options.paths or changed_files()
+    tests = near_tests(ImportGraph(ROOT), changed, options.seconds)
     if not tests:
         print("no tests are near what was changed:", *(changed or ["nothing"]))
         return 0
-    print("near what was changed:", *tests)
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    skipped = [f"--ignore={path}" for path in SLOW if not any(name.startswith(path) for name in changed)]
-    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *skipped]
-    command += argv[split + 1 :]
-    return subprocess.run([*command, *tests], cwd=ROOT, env=os.environ | threads).returncode
+    if options.list:
+        for test in tests:
+            print(f"{test.distance} {test.seconds:6.2f} {test.file}::{test.name}")
+        return 0
+    total = sum(test.seconds for test in tests)
+    files = {test.file for test in tests}
+    print(f"{len(tests)} tests in {len(files)} files are near; they took {total:.0f} s when they were timed")
+    return subprocess.run(pytest_command(tests, argv[split + 1 :]), cwd=ROOT, env=one_thread()).returncode
+
+
+def one_thread() -> dict[str, str]:
+    """The environment, with one thread for each process."""
+    return os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+def pytest_command(tests: list[NearTest], options: list[str]) -> list[str]:
+    """The command that runs tests on two processes.
+
+    Each process begins with one half of what it is told, so every second file is put into the second half: the
+    nearest files come first in both.
+    """
+    files = list(dict.fromkeys(test.file for test in tests))
+    halves = files[::2] + files[1::2]
+    names = [f"{test.file}::{test.name}" for file in halves for test in tests if test.file == file]
+    return [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *options, *names]
 
 
 def changed_files() -> list[str]:
@@ -55,45 +110,64 @@ def git(*words: str) -> list[str]:
     return done.stdout.splitlines() if done.returncode == 0 else []
 
 
-def near(changed: list[str]) -> list[str]:
-    """Test files and folders near changed paths, none inside another."""
-    found = set[str]()
-    imports = {file: imported(ROOT / file) for file in test_files()}
-    for path in map(Path, changed):
-        if path.parts[0] == "tests":
-            found.add(str(path if path.name.startswith("test_") else path.parent))
-        elif path.parts[0] in ("finlab", "webapp"):
-            module = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
-            importers = [file for file, names in imports.items() if module in names]
-            found |= {str(mirror(path)), *(importers if len(importers) <= FEW else ())}
-    present = {name for name in found if (ROOT / name).exists()} - {"tests"}
-    return sorted(name for name in present if not any(str(p) in present for p in Path(name).parents))
+def near_tests(graph: ImportGraph, changed: list[str], seconds: float = SECONDS) -> list[NearTest]:
+    """The tests near changed files that fit into a time, the first to run first.
+
+    Args:
+        graph: the imports of the tree.
+        changed: paths from its top.
+        seconds: sum of their recorded durations. Tests of changed test files run in any case.
+    """
+    known: dict[str, float] = json.loads(DURATIONS.read_text("utf-8")) if DURATIONS.exists() else {}
+    sources = [source for path in changed for source in sources_of(graph, path)]
+    distances = graph.distances(sources)
+    found = list[NearTest]()
+    for file, tree in graph.trees.items():
+        if not is_test_file(file) or (file.startswith(LEFT_OUT) and file not in changed):
+            continue
+        distance = min([distances.get(file, 99), *(kinship(file, source) for source in sources)])
+        if distance == 99:
+            continue
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test"):
+                took = known.get(f"{file}::{node.name}", UNKNOWN)
+                found.append(NearTest(file, node.name, distance, took))
+    chosen = list[NearTest]()
+    left = seconds
+    for test in sorted(found, key=lambda test: test.order):
+        if test.file in changed or test.seconds <= left:
+            chosen.append(test)
+            left -= test.seconds
+    return chosen
 
 
-def mirror(path: Path) -> Path:
-    """The folder of tests for a module: as deep as the tests mirror the packages."""
-    parts = path.parts[1:-1] if path.parts[0] == "finlab" else path.parts[:-1]
-    while parts and not (ROOT / "tests" / Path(*parts)).is_dir():
-        parts = parts[:-1]
-    return Path("tests", *parts)
+def sources_of(graph: ImportGraph, path: str) -> list[str]:
+    """The files of the graph that a changed path stands for: itself, or those in its folder or above it."""
+    if path in graph.trees or path in graph.c_files:
+        return [path]
+    for folder in Path(path).parents:
+        beside = [file for file in graph.trees if Path(file).parent == folder]
+        if beside:
+            return beside
+    return []
 
 
-def test_files() -> list[str]:
-    """All test files but those of the slow folders."""
-    files = (path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "tests").rglob("test_*.py")))
-    return [file for file in files if not file.startswith(SLOW)]
+def is_test_file(file: str) -> bool:
+    """Whether a path is that of tests."""
+    return file.startswith("tests/") and Path(file).name.startswith("test_")
 
 
-def imported(path: Path) -> set[str]:
-    """Full names of the modules that a file imports."""
-    names = set[str]()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            names |= {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return names
+def kinship(test: str, source: str) -> int:
+    """The distance of a test file that its name and its folder say: where its folder mirrors that of the
+    changed file 0 if it is called after it and FOLDER if not, elsewhere 99."""
+    parts = Path(source).parent.parts
+    mirror = Path("tests", *(parts[1:] if parts[:1] == ("finlab",) else parts))
+    while mirror.parts != ("tests",) and not (ROOT / mirror).is_dir():
+        mirror = mirror.parent
+    if mirror.parts == ("tests",) or not Path(test).is_relative_to(mirror):
+        return 99
+    return 0 if Path(test).stem == f"test_{Path(source).stem}" else FOLDER
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""Which file of the tree imports which, read from the sources: what `tools/near_tests.py` measures nearness by.
+
+A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go from a file to
+what it imports. What is not said by an import statement is found, too:
+
+- a name that a package only passes on leads to the file that defines it: `from finlab import Allocator` to
+  `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
+- a module that is loaded by name, where its full name stands as a string;
+- a fixture, by the name of an argument, leads to its `conftest.py`;
+- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares its name with
+  a C file does the same work or calls it.
+"""
+
+import ast
+from collections import defaultdict, deque
+from collections.abc import Iterable
+from functools import cache, cached_property
+from pathlib import Path
+
+ROOMS = ("finlab", "webapp", "tests")
+"""Folders whose Python files are in the graph."""
+CORE = "finlab/core/"
+LOADER = "finlab/core/library.py"
+PASSING_ON = {"__getattr__", "__dir__"}
+"""Functions of a package's `__init__.py` that only passes names on."""
+
+
+class ImportGraph:
+    """The imports of a tree."""
+
+    def __init__(self, root: Path) -> None:
+        """Reads the Python files of a tree.
+
+        Args:
+            root: the top of the tree.
+
+        Raises:
+            SyntaxError: a file is no Python.
+        """
+        self.root = root
+        paths = [path for room in ROOMS for path in sorted((root / room).rglob("*.py"))]
+        self.trees: dict[str, ast.Module] = {}
+        self.file_of: dict[str, str] = {}
+        for path in paths:
+            relative = path.relative_to(root)
+            module = ".".join(relative.with_suffix("").parts).removesuffix(".__init__")
+            self.file_of[module] = relative.as_posix()
+            self.trees[relative.as_posix()] = ast.parse(path.read_text(encoding="utf-8"))
+        core = sorted((root / CORE).rglob("*"))
+        self.c_files = [path.relative_to(root).as_posix() for path in core if path.suffix in (".c", ".h")]
+
+    @cached_property
+    def importers(self) -> dict[str, set[str]]:
+        """Files that import a file, by the file."""
+        importers = defaultdict[str, set[str]](set)
+        for file in self.trees:
+            for other in self.imports(file):
+                importers[other].add(file)
+        for c_file in self.c_files:
+            importers[c_file].add(LOADER)
+            stem = Path(c_file).stem
+            importers[c_file] |= {file for file in self.trees if Path(file).stem in (stem, f"test_{stem}")}
+        return importers
+
+    def distances(self, changed: Iterable[str]) -> dict[str, int]:
+        """How many imports lie between each file and the nearest of some that were changed.
+
+        What tests share counts as a part of the test: an import of a helper in `tests` adds nothing.
+        """
+        found = dict.fromkeys(changed, 0)
+        waiting = deque(found)
+        while waiting:
+            file = waiting.popleft()
+            step = 0 if file.startswith("tests/") else 1
+            for importer in self.importers.get(file, ()):
+                distance = found[file] + step
+                if distance < found.get(importer, distance + 1):
+                    found[importer] = distance
+                    (waiting.append if step else waiting.appendleft)(importer)
+        return found
+
+    def imports(self, file: str) -> set[str]:
+        """Files that a file imports, itself left out."""
+        tree = self.trees[file]
+        if file.endswith("__init__.py") and self._only_passes_on(tree):
+            return set()
+        found = set[str]()
+        arguments = set[str]()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    found |= self._module(alias.name)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                for alias in node.names:
+                    found |= self._named(node.module, alias.name)
+            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                if node.value.id in self.file_of:  # `finlab.Allocator` after `import finlab`
+                    found |= self._named(node.value.id, node.attr)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found |= self._loaded(node.value)
+            elif isinstance(node, ast.arg):
+                arguments.add(node.arg)
+        if file.startswith("tests/"):
+            found |= self._conftests(file, arguments)
+        return found - {file}
+
+    def _module(self, module: str) -> set[str]:
+        return {self.file_of[module]} if module in self.file_of else set()
+
+    def _named(self, module: str, name: str) -> set[str]:
+        """Files that `from module import name` needs: the module, and where it only passes the name on, the
+        file that defines it."""
+        if module not in self.file_of:
+            return set()
+        found = {self.file_of[module]}
+        if f"{module}.{name}" in self.file_of:
+            return found | {self.file_of[f"{module}.{name}"]}
+        source = self._passed_on(self.file_of[module]).get(name)
+        return found | self._named(source, name) if source else found
+
+    @cache  # noqa: B019 - one graph, one process
+    def _passed_on(self, file: str) -> dict[str, str]:
+        """The names that a package's file imports, and from which module."""
+        if not file.endswith("__init__.py"):
+            return {}
+        nodes = [node for node in ast.walk(self.trees[file]) if isinstance(node, ast.ImportFrom)]
+        found = dict[str, str]()
+        for node in nodes:
+            found |= {alias.name: str(node.module) for alias in node.names}
+        return found
+
+    def _loaded(self, text: str) -> set[str]:
+        """Files of a string that is a module's full name; of one that ends in a dot, such as the beginning of
+        `f"finlab.cli.{verb}"`, all modules in that package."""
+        if not text.startswith(("finlab.", "webapp.")):
+            return set()
+        if text.endswith("."):
+            return {path for name, path in self.file_of.items() if name.rpartition(".")[0] == text[:-1]}
+        return self._module(text)
+
+    @staticmethod
+    def _only_passes_on(tree: ast.Module) -> bool:
+        functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        return functions <= PASSING_ON
+
+    def _conftests(self, file: str, arguments: set[str]) -> set[str]:
+        """The files of fixtures that a test file's arguments name."""
+        found = set[str]()
+        for folder in Path(file).parents:
+            conftest = f"{folder.as_posix()}/conftest.py"
+            body = self.trees[conftest].body if conftest in self.trees else []
+            if any(isinstance(node, ast.FunctionDef) and node.name in arguments for node in body):
+                found.add(conftest)
+        return found
