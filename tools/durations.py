@@ -1,7 +1,8 @@
 """Record how long tests take: a plugin of pytest that `make test-durations` loads.
 
-It writes `tests/durations.json`: processor seconds of each test function, its set-up, all of its cases and the
-processes that it starts together, by the function's node id. Processor time says the same on a busy machine.
+It writes `tests/durations.json`: processor seconds of each test, its set-up and the processes that it starts
+included, by its node id; of a function whose cases take less than a second together one number, by the
+function's. Processor time says the same on a busy machine.
 `tools/near_tests.py` chooses by it what fits into a minute.
 """
 
@@ -14,6 +15,9 @@ from pathlib import Path
 import pytest
 
 FILE = Path(__file__).resolve().parents[1] / "tests" / "durations.json"
+
+TOGETHER = 1.0
+"""Seconds of a function below which its cases are not told apart."""
 
 _seconds: defaultdict[str, float] = defaultdict(float)
 
@@ -36,14 +40,26 @@ def pytest_runtest_makereport(
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Add the seconds of a report to those of its function."""
-    _seconds[report.nodeid.split("[")[0]] += getattr(report, "processor_seconds", 0.0)
+    """Add the seconds of a report to those of its test."""
+    _seconds[report.nodeid] += getattr(report, "processor_seconds", 0.0)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Write the file, where this is the process that started the others; functions that did not run stay."""
     if hasattr(session.config, "workerinput"):
         return
+    sums = defaultdict[str, float](float)
+    for name, seconds in _seconds.items():
+        sums[function_of(name)] += seconds
     known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    known |= {name: round(seconds, 2) for name, seconds in _seconds.items()}
+    known = {name: seconds for name, seconds in known.items() if function_of(name) not in sums}
+    for name, seconds in _seconds.items():
+        function = function_of(name)
+        many = sums[function] >= TOGETHER
+        known[name if many else function] = round(seconds if many else sums[function], 2)
     FILE.write_text(json.dumps(known, indent=0, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def function_of(name: str) -> str:
+    """The node id of a test's function."""
+    return name.split("[")[0]

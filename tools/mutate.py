@@ -3,261 +3,183 @@
 
     python tools/mutate.py --seed 1 --count 60
 
-Faults are drawn by the seed from all places of `finlab/core/*.c` and `finlab/allocation` where one of these can
-be made, half of them in C and half in Python:
+Faults are drawn by the seed from all places of `finlab/core/*.c` and `finlab/allocation` where one of these can be
+made (`tools/faults.py`), half of them in C and half in Python:
 
 - sign: plus for minus, minus for plus, or a minus left out;
 - comparison: its opposite, such as `>=` for `<`;
 - bound: the least for the greatest of two, or a loop that ends one step early;
 - index: another element, such as `[1]` for `[0]`.
 
-Each fault is made in a copy of the tree, whose core is compiled again where the fault is in C, and the tests
-that `tools/near_tests.py` chooses for the file run until one fails. A test that hangs or a process that dies
-has found the fault, too. What is printed as missed is to be read: some faults change no behaviour, such as a
-bound that is never reached.
+Each is made in a copy of the tree, whose core is compiled again where the fault is in C, and the tests that
+`tools/near_tests.py` chooses for the file run until one fails. A test that hangs and a process that dies have found
+the fault, too. What is printed as missed is to be read: some faults change no behaviour, such as that of a bound
+that is never met.
 """
 
 import argparse
-import ast
 import json
 import os
-import random
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
+from queue import SimpleQueue
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from tools.faults import Fault, drawn_faults
 from tools.import_graph import ImportGraph
-from tools.near_tests import ROOT, SECONDS, near_tests, one_thread, pytest_command
+from tools.near_tests import ROOT, SECONDS, SLOW, NearTest, near_tests, one_thread, pytest_words
 
-HANG = 60
+FIRST = 100
+"""How many quick near tests run before the rest of them: most faults are found by them."""
+HANG = 100
 """Seconds after which one test counts as hung."""
-OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
-SIGNS = {"+": "-", "-": "+", "+=": "-=", "-=": "+="}
-EXTREMES = {"MIN": "MAX", "MAX": "MIN", "min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum"}
+LOADED = (
+    "numpy",
+    "scipy.optimize",
+    "scipy.linalg",
+    "scipy.interpolate",
+    "yaml",
+    "msgspec",
+    "hypothesis",
+    "pytest",
+)
+"""What tests import that no fault changes: a process loads it once, and each fault begins from there."""
 
 
-@dataclass(frozen=True, order=True)
-class Fault:
-    """A change of a file's text."""
+class Worker:
+    """A process that makes faults in a copy of the tree, and is told them one by one."""
 
-    file: str
-    start: int
-    """Where the text that is replaced begins [characters]."""
-    end: int
-    kind: str
-    text: str
-    """What stands there instead."""
-
-    def applied(self, source: str) -> str:
-        """The file's text with the fault."""
-        return source[: self.start] + self.text + source[self.end :]
-
-    def shown(self, source: str) -> str:
-        """File, line, kind and both versions of the line."""
-        line = source.count("\n", 0, self.start) + 1
-        before = source.splitlines()[line - 1].strip()
-        after = self.applied(source).splitlines()[line - 1].strip()
-        return f"{self.file}:{line}: {self.kind}\n    - {before}\n    + {after}"
-
-
-def python_faults(file: str, source: str) -> Iterator[Fault]:
-    """Every fault that can be made in a Python file."""
-    begins = [0]
-    for line in source.splitlines(keepends=True):
-        begins.append(begins[-1] + len(line))
-
-    def start(node: ast.expr) -> int:
-        return begins[node.lineno - 1] + node.col_offset
-
-    def end(node: ast.expr) -> int:
-        assert node.end_lineno is not None and node.end_col_offset is not None
-        return begins[node.end_lineno - 1] + node.end_col_offset
-
-    def between(left: ast.expr, right: ast.expr, signs: dict[str, str], kind: str) -> Iterator[Fault]:
-        """The fault of an operator that stands between two operands."""
-        found = re.search(r"[-+<>=!]+", source[end(left) : start(right)])
-        if found and found[0] in signs:
-            first = end(left) + found.start()
-            yield Fault(file, first, first + len(found[0]), kind, signs[found[0]])
-
-    for node in _computing(ast.parse(source)):
-        if isinstance(node, ast.BinOp) and not _is_text(node.left) and not _is_text(node.right):
-            yield from between(node.left, node.right, SIGNS, "sign")
-        elif isinstance(node, ast.AugAssign):
-            yield from between(node.target, node.value, SIGNS, "sign")
-        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            yield Fault(file, start(node), start(node) + 1, "sign", "")
-        elif isinstance(node, ast.Compare):
-            operands = [node.left, *node.comparators]
-            for left, right in zip(operands, operands[1:], strict=False):
-                yield from between(left, right, OPPOSITE, "comparison")
-        elif isinstance(node, ast.Call):
-            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            if name in EXTREMES:
-                yield Fault(file, end(node.func) - len(name), end(node.func), "bound", EXTREMES[name])
-        elif isinstance(node, ast.Subscript):
-            for part in ast.walk(node.slice):
-                if isinstance(part, ast.Constant) and type(part.value) is int:
-                    yield Fault(file, start(part), end(part), "index", str(_other_index(part.value)))
-
-
-def _computing(tree: ast.Module) -> Iterator[ast.AST]:
-    """The nodes of a module but those of annotations and of `axis=`, where -1 is often another word for 1."""
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        for field, value in ast.iter_fields(node):
-            if field in ("annotation", "returns") or (isinstance(node, ast.keyword) and node.arg == "axis"):
-                continue
-            parts = value if isinstance(value, list) else [value]
-            waiting += [part for part in parts if isinstance(part, ast.AST)]
-
-
-def _is_text(node: ast.expr) -> bool:
-    return isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
-
-
-def _other_index(index: int) -> int:
-    """Another index, within an array that has the first."""
-    return index - 1 if index > 0 else 1
-
-
-C_TOKEN = re.compile(r"[A-Za-z_]\w*|\d[\w.]*(?:[eE][-+]?\d+)?|<<|>>|->|\+\+|--|&&|\|\||[-+*/<>=!&|^%]=|.", re.S)
-C_HIDDEN = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|^[ \t]*#(?:\\\n|[^\n])*', re.S | re.M)
-"""Comments, strings and lines of the preprocessor."""
-C_TYPE = re.compile(r"(?:const|static|unsigned|int|char|void|double|float|size_t|real|wide|fl_\w+|struct)\b")
-"""How a declaration begins."""
-OPERAND = re.compile(r"[\w\])]")
-"""What the last character before a binary operator is."""
-
-
-def c_faults(file: str, source: str) -> Iterator[Fault]:
-    """Every fault that can be made in a C file, outside of comments, strings, macros and declared sizes."""
-    code = C_HIDDEN.sub(lambda hidden: re.sub(r"[^\n]", " ", hidden[0]), source)
-    tokens = [(found[0], found.start()) for found in C_TOKEN.finditer(code) if not found[0].isspace()]
-    loops = [(found.start(), found.end()) for found in re.finditer(r"\bfor \(.*?;.*?;", code, re.S)]
-    for place, (token, start) in enumerate(tokens):
-        end = start + len(token)
-        before = tokens[place - 1][0] if place else ";"
-        after = tokens[place + 1][0] if place + 1 < len(tokens) else ";"
-        in_loop = next((last for first, last in loops if first <= start < last), None)
-        if token in SIGNS:
-            if OPERAND.match(before[-1]) and before != "return":
-                yield Fault(file, start, end, "sign", SIGNS[token])
-            elif token == "-":
-                yield Fault(file, start, end, "sign", "")
-        elif token == "<" and in_loop is not None:
-            limit = re.match(r" ([\w>.\-]+)(?=;)", code[end:in_loop])
-            if limit:
-                last = end + limit.end()
-                yield Fault(file, end, last, "bound", f" {limit[1]} - 1")
-        elif token in OPPOSITE:
-            yield Fault(file, start, end, "comparison", OPPOSITE[token])
-        elif token in EXTREMES and after == "(":
-            yield Fault(file, start, end, "bound", EXTREMES[token])
-        elif token.isdigit() and before == "[" and after == "]" and not _is_size(code, start):
-            yield Fault(file, start, end, "index", str(_other_index(int(token))))
-
-
-def _is_size(code: str, place: int) -> bool:
-    """Whether brackets in C hold a size or stand in `sizeof`: those of a name that is being declared."""
-    statement = re.split(r"[;(]|[{}]\s*\n", code[:place])[-1].strip()
-    if re.search(r"sizeof [^,]*$|\(\*\w*\)\[$", code[:place].rsplit("\n", 1)[-1]):
-        return True
-    if not C_TYPE.match(statement):
-        return False
-    depth = 0
-    begin = 0
-    for position, letter in enumerate(statement[:-1]):
-        depth += (letter in "[{") - (letter in "]}")
-        if letter == "," and depth == 0:
-            begin = position
-    return "=" not in statement[begin:]
-
-
-def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
-    """Faults drawn by a seed, half of them in C."""
-    faults: dict[bool, list[Fault]] = {True: [], False: []}
-    for path in sorted((root / "finlab/core").rglob("*.c")):
-        file = path.relative_to(root).as_posix()
-        faults[True] += c_faults(file, path.read_text(encoding="utf-8"))
-    for path in sorted((root / "finlab/allocation").rglob("*.py")):
-        file = path.relative_to(root).as_posix()
-        faults[False] += python_faults(file, path.read_text(encoding="utf-8"))
-    print(f"places: {len(faults[True])} in C, {len(faults[False])} in Python", flush=True)
-    source = random.Random(seed)
-    chosen = source.sample(sorted(faults[True]), count // 2)
-    chosen += source.sample(sorted(faults[False]), count - count // 2)
-    source.shuffle(chosen)
-    return chosen
-
-
-class Copy:
-    """A copy of the tree in which faults are made."""
-
-    def __init__(self, folder: str) -> None:
-        """Copies what tests need.
+    def __init__(self, folder: Path) -> None:
+        """Copies what tests need, and starts the process there.
 
         Args:
             folder: where to, a folder that is not there yet.
         """
-        self.root = Path(folder)
         skipped = shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "runs", "test-results")
-        shutil.copytree(ROOT, self.root, ignore=skipped)
-        self.graph = ImportGraph(self.root)
-        self.environment = one_thread() | {"PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"}
-
-    def compile(self) -> str:
-        """Compiles the core; returns what was wrong, or nothing."""
-        command = [sys.executable, "hatch_build.py"]
-        done = subprocess.run(command, cwd=self.root, env=self.environment, capture_output=True, text=True)
-        return done.stderr if done.returncode else ""
-
-    def found_by(self, fault: Fault, seconds: float) -> str:
-        """What finds a fault: the compiler or the first test that fails; nothing where all pass."""
-        path = self.root / fault.file
-        source = path.read_text(encoding="utf-8")
-        in_c = path.suffix == ".c"
-        path.write_text(fault.applied(source), encoding="utf-8")
-        try:
-            if in_c and self.compile():
-                return "the compiler"
-            tests = near_tests(self.graph, [fault.file], seconds)
-            options = ["-x", "-o", f"faulthandler_timeout={HANG}", "-p", "no:cacheprovider", "--tb=no"]
-            code, said = self._run(pytest_command(tests, options))
-        finally:
-            path.write_text(source, encoding="utf-8")
-        if code == 0:
-            return ""
-        failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", said, re.M)
-        return failed[0] if failed else said[-300:]
-
-    def _run(self, command: list[str]) -> tuple[int, str]:
-        """Exit status and output of a command, after which all that it started is ended."""
-        process = subprocess.Popen(
-            command,
-            cwd=self.root,
-            env=self.environment,
+        shutil.copytree(ROOT, folder, ignore=skipped)
+        environment = one_thread() | {"PYTHONPATH": str(folder)}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        self.process = subprocess.Popen(
+            [sys.executable, "tools/mutate.py", "--worker"],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
             text=True,
-            start_new_session=True,
         )
-        said, _ = process.communicate()
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        return process.returncode, said
+
+    def found_by(self, fault: Fault) -> str:
+        """What finds a fault: the compiler, or the first test that fails; nothing where all pass."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write(json.dumps(asdict(fault)) + "\n")
+        self.process.stdin.flush()
+        return str(json.loads(self.process.stdout.readline()))
+
+    def stop(self) -> None:
+        """Ends the process."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.process.wait()
+
+
+def work() -> None:
+    """What the process of a `Worker` does: a fault comes in a line, and what finds it goes out in one."""
+    for name in LOADED:
+        import_module(name)
+    graph = ImportGraph(ROOT)
+    compile_core()
+    for line in sys.stdin:
+        fault = Fault(**json.loads(line))
+        print(json.dumps(_found_by(fault, graph)), flush=True)
+
+
+def compile_core() -> bool:
+    """Compiles the core of this tree; returns whether the compiler took it."""
+    return subprocess.run([sys.executable, "hatch_build.py"], cwd=ROOT, capture_output=True).returncode == 0
+
+
+def _found_by(fault: Fault, graph: ImportGraph) -> str:
+    path = ROOT / fault.file
+    source = path.read_text(encoding="utf-8")
+    in_c = path.suffix == ".c"
+    path.write_text(fault.applied(source), encoding="utf-8")
+    try:
+        if in_c and not compile_core():
+            return "the compiler"
+        tests = near_tests(graph, [fault.file], SECONDS)
+        first = [test for test in tests if test.seconds <= SLOW][:FIRST]
+        rest = [test for test in tests if test not in first]
+        return _failure(first) or _failure(rest)
+    finally:
+        path.write_text(source, encoding="utf-8")
+        if in_c:
+            compile_core()
+
+
+def _failure(tests: list[NearTest]) -> str:
+    """The first of some tests that fails, or what is said where a process dies; nothing where all pass."""
+    if not tests:
+        return ""
+    options = ["-x", "-q", "--tb=no", "-o", f"faulthandler_timeout={HANG}", "-p", "no:cacheprovider"]
+    words = [*options, *pytest_words(sorted(tests, key=lambda test: test.file))]
+    with tempfile.TemporaryFile("w+") as output:
+        child = os.fork()
+        if child == 0:
+            _run_pytest(words, output.fileno())
+        _, status = os.waitpid(child, 0)
+        with suppress(ProcessLookupError):  # what a test has started and not ended
+            os.killpg(child, signal.SIGKILL)
+        output.seek(0)
+        said = output.read()
+    if status == 0:
+        return ""
+    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", said, re.M)
+    return failed[0] if failed else f"the end of its process: {said[-200:]}"
+
+
+def _run_pytest(words: list[str], output: int) -> None:
+    """Runs tests in a process of their own, which ends here."""
+    os.setsid()
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    code = 1
+    try:
+        code = int(import_module("pytest").main(words))
+    finally:
+        sys.stdout.flush()
+        os._exit(code)
+
+
+def judged(faults: list[Fault], jobs: int) -> Iterator[tuple[Fault, str]]:
+    """Faults and what finds each, tried by so many processes at once."""
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
+        workers = SimpleQueue[Worker]()
+        started = [Worker(Path(folder) / f"tree{job}") for job in range(jobs)]
+        for worker in started:
+            workers.put(worker)
+
+        def found_by(fault: Fault) -> str:
+            worker = workers.get()
+            try:
+                return worker.found_by(fault)
+            finally:
+                workers.put(worker)
+
+        yield from zip(faults, pool.map(found_by, faults), strict=True)
+        for worker in started:
+            worker.stop()
 
 
 def main() -> int:
@@ -265,35 +187,26 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=60)
-    parser.add_argument("--first", type=int, default=0, help="number of the fault to begin with")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of near tests")
+    parser.add_argument("--only", type=int, nargs="*", help="numbers of faults; by default all")
+    parser.add_argument("--jobs", type=int, default=2, help="faults that are tried at once")
     parser.add_argument("--list", action="store_true", help="print the faults and make none")
-    parser.add_argument("--json", type=Path, help="file for what was found")
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    faults = drawn_faults(ROOT, options.count, options.seed)
-    if options.list:
-        for number, fault in enumerate(faults):
-            print(number, fault.shown((ROOT / fault.file).read_text(encoding="utf-8")))
+    if options.worker:
+        work()
         return 0
-    rows = list[dict[str, object]]()
-    missed = list[str]()
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(os.path.join(folder, "tree"))
-        copy.compile()
-        for number, fault in enumerate(faults[options.first :], options.first):
-            began = time.monotonic()
-            found = copy.found_by(fault, options.seconds)
-            shown = fault.shown((ROOT / fault.file).read_text(encoding="utf-8"))
-            if not found:
-                missed.append(shown)
-            rows.append(asdict(fault) | {"found_by": found, "shown": shown})
-            print(f"{number} {time.monotonic() - began:.0f} s {shown}", flush=True)
-            print(f"    {'found by ' + found if found else 'MISSED'}", flush=True)
-            if fault.file.endswith(".c"):
-                copy.compile()
-    print(f"{len(rows) - len(missed)} of {len(rows)} faults were found; missed:", *missed, sep="\n")
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    numbered = dict(enumerate(drawn_faults(ROOT, options.count, options.seed)))
+    wanted = {number: numbered[number] for number in options.only or numbered}
+    shown = {number: fault.shown((ROOT / fault.file).read_text("utf-8")) for number, fault in wanted.items()}
+    if options.list:
+        print(*(f"{number} {text}" for number, text in shown.items()), sep="\n")
+        return 0
+    missed = list[int]()
+    for number, (_, found) in zip(wanted, judged(list(wanted.values()), options.jobs), strict=True):
+        print(f"{number} {shown[number]}\n    {'found by ' + found if found else 'MISSED'}", flush=True)
+        if not found:
+            missed.append(number)
+    print(f"{len(wanted) - len(missed)} of {len(wanted)} faults were found; missed:", *missed)
     return 0
 
 

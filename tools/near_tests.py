@@ -20,6 +20,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -34,6 +35,12 @@ SECONDS = 80.0
 """Sum of the recorded seconds of what is run, by two processes; start and collection take the rest."""
 UNKNOWN = 0.5
 """Seconds of a test that was never timed."""
+QUICK = 0.1
+"""Seconds below which a test is as good as one that takes less."""
+COLLECTED = 0.5
+"""Seconds that the import of one more test file takes, in both processes."""
+SLOW = 2.0
+"""Seconds above which a test runs after all others."""
 FARTHER = 3.0
 """What a test one import farther off has to be faster to run first."""
 FOLDER = 2
@@ -42,7 +49,7 @@ FOLDER = 2
 
 @dataclass(frozen=True)
 class NearTest:
-    """A test function and what says how soon it runs."""
+    """A test, or a function of tests that are quick, and what says how soon it runs."""
 
     file: str
     name: str
@@ -52,16 +59,23 @@ class NearTest:
     """What it took when it was timed."""
 
     @property
+    def node(self) -> str:
+        """What pytest calls it."""
+        return f"{self.file}::{self.name}"
+
+    @property
     def order(self) -> tuple[float, str, str]:
         """What tests are sorted by."""
-        return max(self.seconds, 0.01) * FARTHER**self.distance, self.file, self.name
+        return max(self.seconds, QUICK) * FARTHER**self.distance, self.file, self.name
 
 
 def main() -> int:
     """Print which tests are near, and run them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("paths", nargs="*", help="changed files; by default what differs from main")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of tests, by their recorded durations")
+    parser.add_argument(
+        "--seconds", type=float, default=SECONDS, help="of tests, by their recorded durations"
+    )
     parser.add_argument("--list", action="store_true", help="print the tests and run none")
     argv = sys.argv[1:]
     split = argv.index("--") if "--" in argv else len(argv)
@@ -78,7 +92,8 @@ def main() -> int:
     total = sum(test.seconds for test in tests)
     files = {test.file for test in tests}
     print(f"{len(tests)} tests in {len(files)} files are near; they took {total:.0f} s when they were timed")
-    return subprocess.run(pytest_command(tests, argv[split + 1 :]), cwd=ROOT, env=one_thread()).returncode
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *argv[split + 1 :]]
+    return subprocess.run([*command, *pytest_words(by_halves(tests))], cwd=ROOT, env=one_thread()).returncode
 
 
 def one_thread() -> dict[str, str]:
@@ -86,16 +101,27 @@ def one_thread() -> dict[str, str]:
     return os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
-def pytest_command(tests: list[NearTest], options: list[str]) -> list[str]:
-    """The command that runs tests on two processes.
+def pytest_words(tests: list[NearTest]) -> list[str]:
+    """What pytest is told to run tests: their functions in this order, and which of the timed cases to leave out."""
+    chosen = {test.node for test in tests}
+    functions = list(dict.fromkeys(node.split("[")[0] for node in (test.node for test in tests)))
+    left_out = [name for name in durations() if "[" in name and name not in chosen]
+    wanted = set(functions)
+    return [*functions, *(f"--deselect={name}" for name in left_out if name.split("[")[0] in wanted)]
 
-    Each process begins with one half of what it is told, so every second file is put into the second half: the
-    nearest files come first in both.
+
+def by_halves(tests: list[NearTest]) -> list[NearTest]:
+    """Tests in the order in which two processes take them.
+
+    Each begins with one half of what it is told, so every second test file is put into the second half: the nearest
+    come first in both. Slow tests come after all others.
     """
     files = list(dict.fromkeys(test.file for test in tests))
-    halves = files[::2] + files[1::2]
-    names = [f"{test.file}::{test.name}" for file in halves for test in tests if test.file == file]
-    return [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *options, *names]
+    ordered = list[NearTest]()
+    for half in (files[::2], files[1::2]):
+        own = [test for file in half for test in tests if test.file == file]
+        ordered += sorted(own, key=lambda test: test.seconds > SLOW)
+    return ordered
 
 
 def changed_files() -> list[str]:
@@ -118,7 +144,11 @@ def near_tests(graph: ImportGraph, changed: list[str], seconds: float = SECONDS)
         changed: paths from its top.
         seconds: sum of their recorded durations. Tests of changed test files run in any case.
     """
-    known: dict[str, float] = json.loads(DURATIONS.read_text("utf-8")) if DURATIONS.exists() else {}
+    known = durations()
+    cases: dict[str, list[str]] = {}
+    for node in known:
+        if "[" in node:
+            cases.setdefault(node.split("[")[0], []).append(node.split("::")[1])
     sources = [source for path in changed for source in sources_of(graph, path)]
     distances = graph.distances(sources)
     found = list[NearTest]()
@@ -130,15 +160,27 @@ def near_tests(graph: ImportGraph, changed: list[str], seconds: float = SECONDS)
             continue
         for node in tree.body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test"):
-                took = known.get(f"{file}::{node.name}", UNKNOWN)
-                found.append(NearTest(file, node.name, distance, took))
+                names = cases.get(f"{file}::{node.name}", [node.name])
+                took = [known.get(f"{file}::{name}", UNKNOWN) for name in names]
+                found += [
+                    NearTest(file, *each) for each in zip(names, [distance] * len(names), took, strict=True)
+                ]
     chosen = list[NearTest]()
+    files = set[str]()
     left = seconds
     for test in sorted(found, key=lambda test: test.order):
-        if test.file in changed or test.seconds <= left:
+        takes = test.seconds + (0.0 if test.file in files else COLLECTED)
+        if test.file in changed or takes <= left:
             chosen.append(test)
-            left -= test.seconds
+            files.add(test.file)
+            left -= takes
     return chosen
+
+
+@cache
+def durations() -> dict[str, float]:
+    """Seconds of tests by their node ids, as `tools/durations.py` writes them."""
+    return dict(json.loads(DURATIONS.read_text(encoding="utf-8"))) if DURATIONS.exists() else {}
 
 
 def sources_of(graph: ImportGraph, path: str) -> list[str]:

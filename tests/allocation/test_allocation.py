@@ -2,7 +2,7 @@
 
 import copy
 import pickle
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from finlab.allocation import Allocation, Allocator, Policy
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
-from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout, random_layout
+from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
@@ -27,24 +27,6 @@ pytestmark = pytest.mark.skipif(
 
 def round_trips(result: Allocation) -> list[Allocation]:
     return [pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)]
-
-
-@pytest.mark.parametrize("method", OF_FINS)
-@pytest.mark.parametrize("wrench", [SURGE, FAR])
-def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> None:
-    allocator = quick_allocator(method)
-    layout = load_layout("A")
-    previous = allocator.allocate(layout, SURGE).command
-    health = Damage(weak={"back_left": 0.5})
-    result = allocator.allocate(layout, wrench, lost=["front_left"], previous=previous, damage=health)
-    for twin in round_trips(result):
-        assert twin == result
-        for field in fields(result):
-            if field.compare:
-                assert equal(getattr(twin, field.name), getattr(result, field.name)), field.name
-        assert str(twin) == str(result) and repr(twin) == repr(result)
-    assert allocator.allocate(layout, wrench, lost=["front_left"], previous=previous, damage=health) == result
-    assert allocator.allocate(layout, wrench, lost=["front_left"], damage=health) != result
 
 
 def test_every_field_counts_but_the_time() -> None:
@@ -78,19 +60,6 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
         and not equal(np.ones(2), np.ones(3))
     )
     assert not equal(1.0, nan) and not equal(None, np.ones(2))
-
-
-@pytest.mark.parametrize("method", OF_FINS)
-def test_all_figures_are_those_of_the_plant(method: str) -> None:
-    layout = load_layout("ucat")
-    for wrench, lost in ((SURGE, []), (FAR, [layout.names[1]])):
-        result = quick_allocator(method).allocate(layout, wrench, lost=lost)
-        plant = Plant(layout)
-        np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
-        np.testing.assert_allclose(result.forces, plant.body_forces(result.command), atol=1e-12)
-        assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.scale), abs=1e-12)
-        assert isinstance(result.err_norm, float)
-        assert all(not np.any(result.forces[i]) for i in layout.indices(lost))
 
 
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
@@ -139,15 +108,6 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
         assert known.reachable and known.unknown_fins == ()
 
 
-@pytest.mark.parametrize("k", range(5))
-def test_random_robots_too(k: int, search: AnyRobot) -> None:
-    rng = np.random.default_rng(k)
-    layout = random_layout(rng, n_fins=2 + k)
-    result = search.allocate(layout, rng.normal(size=6), lost=[layout.names[0]], seed=k)
-    assert all(twin == result for twin in round_trips(result))
-    assert len(repr(result)) <= 400
-
-
 @pytest.mark.parametrize("method", OF_FINS)
 def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) -> None:
     allocator, layout = quick_allocator(method), load_layout("A")
@@ -178,27 +138,6 @@ def wrenches(n: int = 6) -> np.ndarray:
     return size * np.random.default_rng(0).normal(size=(n, 6)) * [1.0, 0.3, 1.0, 0.05, 0.05, 0.1]
 
 
-@pytest.mark.parametrize("policy", POLICIES, ids=str)
-@pytest.mark.parametrize("method", ["dual", "mdn"])
-def test_policies_answer_as_in_single_calls(method: str, policy: Policy | str) -> None:
-    allocator, layout, targets = quick_allocator(method), load_layout("octo"), wrenches()
-    health = Damage(weak={layout.names[1]: 0.7})
-    lost = [layout.names[0]]
-    batch = allocator.allocate_batch(layout, targets, lost=lost, policy=policy, damage=health, seed=1)
-    singles = [
-        allocator.allocate(layout, target, lost=lost, policy=policy, damage=health, seed=1)
-        for target in targets
-    ]
-    assert 0 < batch.reachable.sum() < len(targets)
-    assert batch.reachable.tolist() == [single.reachable for single in singles]
-    for row, single in enumerate(singles):
-        assert batch.layout == single.layout and batch.lost == single.lost
-        if not single.reachable:
-            np.testing.assert_allclose(batch.command[row], single.command, rtol=0.0, atol=1e-12)
-            np.testing.assert_allclose(batch.err_norm[row], single.err_norm, rtol=1e-12)
-            np.testing.assert_allclose(batch.power[row], single.power, rtol=1e-12)
-
-
 def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
     allocator, layout, targets = AnyRobot(), load_layout("A"), wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
@@ -207,22 +146,6 @@ def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
     weighted = allocator.allocate_batch(layout, targets, policy=Policy(axis_weights=(1, 1, 10, 1, 1, 1)))
     heave = np.abs(weighted.unallocated[:, 2]) - np.abs(batch.unallocated[:, 2])
     assert (heave <= 1e-2).all() and heave.min() < -0.01
-
-
-@pytest.mark.parametrize("method", OF_FINS)
-def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
-    allocator, layout, targets = quick_allocator(method), load_layout("ucat"), wrenches(4)
-    batch = allocator.allocate_batch(layout, targets, lost=[layout.names[2]], seed=5)
-    np.testing.assert_allclose(batch.wrench, Plant(layout).wrench(batch.command), atol=1e-12)
-    np.testing.assert_allclose(batch.forces, Plant(layout).body_forces(batch.command), atol=1e-12)
-    np.testing.assert_allclose(batch.err_norm, np.linalg.norm((targets - batch.wrench) / batch.scale, axis=1))
-    assert len(batch) == 4 and batch.effort.shape == (4,)
-    assert (batch.wrench_expected is not None) == (method == "paper")
-    np.testing.assert_allclose(batch.power, np.nansum(Plant(layout).power(batch.command), axis=-1))
-    for twin in (pickle.loads(pickle.dumps(batch)), copy.copy(batch), copy.deepcopy(batch)):
-        assert twin == batch
-    assert allocator.allocate_batch(layout, targets, lost=[layout.names[2]], seed=5) == batch
-    assert allocator.allocate_batch(layout, 0.5 * targets, lost=[layout.names[2]], seed=5) != batch
 
 
 @pytest.mark.parametrize("method", OF_FINS)

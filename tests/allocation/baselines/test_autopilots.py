@@ -9,7 +9,6 @@ from finlab import Allocator, load_layout
 from finlab.allocation.baselines.autopilots import ArduSub, Px4, Px4Settings, frame_factors, normalised
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
-from finlab.evaluation.splits import make_split
 from finlab.exchange.motor_factors import FRAMES, SIGNS
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -120,17 +119,6 @@ def test_ardusub_scales_its_groups_apart() -> None:
     np.testing.assert_allclose(np.abs(both[:4]), [39.91] * 4)
     signs = SIGNS[4] * FRAMES["VECTORED_6DOF"][:4, 4]
     np.testing.assert_array_equal(np.sign(both[:4]), signs)
-
-
-@pytest.mark.parametrize("method", ["px4", "ardusub"])
-def test_they_keep_to_limits_and_know_lost_thrusters(method: str) -> None:
-    for case in make_split("thrusters", 6, 8, 5):
-        lost = case.layout.names[0]
-        for targets in (case.targets, 10.0 * case.targets, 0.0 * case.targets):
-            command = Allocator(case.layout, method).allocate_batch(targets, lost=[lost]).command[:, 1:]
-            assert np.isfinite(command).all()
-            assert (command >= case.layout.lower[1:]).all() and (command <= case.layout.upper[1:]).all()
-        assert not command.any()
 
 
 @pytest.mark.parametrize("method", ["px4", "ardusub"])

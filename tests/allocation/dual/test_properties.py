@@ -54,23 +54,6 @@ def wrapped(angle: float) -> float:
 
 
 @few(20)
-@given(seed=SEEDS, limits=LIMITS, size=st.sampled_from([0.0, 1e-6, 0.5, 1.0, 5.0, 1e5]))
-def test_limits_hold_to_the_last_bit(search: AnyRobot, seed: int, limits: str, size: float) -> None:
-    layout, target = drawn(seed, limits)
-    assert inside(layout, search.allocate_batch(layout, [size * target, -size * target]).command[0])
-    first = search.allocate(layout, size * target)
-    again = search.allocate(layout, -target, previous=first.command)
-    assert inside(layout, first.command) and inside(layout, again.command)
-
-
-@few(5)
-@given(seed=SEEDS, limits=LIMITS, policy=st.sampled_from(["direction", "priority"]))
-def test_limits_hold_out_of_reach(search: AnyRobot, seed: int, limits: str, policy: str) -> None:
-    layout, target = drawn(seed, limits)
-    assert inside(layout, search.allocate(layout, 20.0 * target, policy=policy).command)
-
-
-@few(20)
 @given(seed=SEEDS)
 def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> None:
     layout, target = drawn(seed)
@@ -137,16 +120,6 @@ def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: 
     np.testing.assert_allclose(without.wrench, removed.wrench, atol=1e-3)
     # Where next to nothing of a target can be had, so is the power.
     assert without.power == pytest.approx(removed.power, rel=1e-4, abs=1e-5)
-
-
-@few(10)
-@given(seed=SEEDS, draw=st.integers(0, 1000), scale=st.sampled_from([1.0, 10.0]))
-def test_the_same_seed_gives_the_same_answer(search: AnyRobot, seed: int, draw: int, scale: float) -> None:
-    layout, target = drawn(seed)
-    first = search.allocate(layout, scale * target, seed=draw, previous=None)
-    search.allocate(layout, -target, seed=draw + 1, previous=first.command)
-    again = search.allocate(layout, scale * target, seed=draw)
-    np.testing.assert_array_equal(again.command, first.command)
 
 
 @few(15)

@@ -121,15 +121,6 @@ def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
         assert answer.err_norm < 1e-4 * 1.0
 
 
-def test_batches_are_single_answers() -> None:
-    layout = random_robot(np.random.default_rng(5), LAWS, n_fins=5)
-    targets, method = reachable(layout, 30), AnyRobot()
-    batch = method.allocate_batch(layout, targets)
-    power = [method.allocate(layout, target).power for target in targets]
-    assert batch.err_norm.max() < 1e-5
-    np.testing.assert_allclose(batch.power, power, rtol=1e-6)
-
-
 def least_cost(
     layout: Layout,
     target: Array,

@@ -1,0 +1,182 @@
+"""Small faults that can be made in sources: signs, comparisons, bounds and indices.
+
+Python is read by its syntax tree. C is read by its tokens, outside of comments, strings, lines of the preprocessor
+and sizes of arrays.
+"""
+
+import ast
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
+SIGNS = {"+": "-", "-": "+", "+=": "-=", "-=": "+="}
+EXTREMES = {
+    "MIN": "MAX",
+    "MAX": "MIN",
+    "min": "max",
+    "max": "min",
+    "minimum": "maximum",
+    "maximum": "minimum",
+}
+
+
+@dataclass(frozen=True, order=True)
+class Fault:
+    """A change of a file's text."""
+
+    file: str
+    start: int
+    """Where the text that is replaced begins [characters]."""
+    end: int
+    kind: str
+    text: str
+    """What stands there instead."""
+
+    def applied(self, source: str) -> str:
+        """The file's text with the fault."""
+        return source[: self.start] + self.text + source[self.end :]
+
+    def shown(self, source: str) -> str:
+        """File, line, kind and both versions of the line."""
+        line = source.count("\n", 0, self.start) + 1
+        before = source.splitlines()[line - 1].strip()
+        after = self.applied(source).splitlines()[line - 1].strip()
+        return f"{self.file}:{line}: {self.kind}\n    - {before}\n    + {after}"
+
+
+def python_faults(file: str, source: str) -> Iterator[Fault]:
+    """Every fault that can be made in a Python file."""
+    begins = [0]
+    for line in source.splitlines(keepends=True):
+        begins.append(begins[-1] + len(line))
+
+    def start(node: ast.expr) -> int:
+        return begins[node.lineno - 1] + node.col_offset
+
+    def end(node: ast.expr) -> int:
+        assert node.end_lineno is not None and node.end_col_offset is not None
+        return begins[node.end_lineno - 1] + node.end_col_offset
+
+    def between(left: ast.expr, right: ast.expr, signs: dict[str, str], kind: str) -> Iterator[Fault]:
+        """The fault of an operator that stands between two operands."""
+        found = re.search(r"[-+<>=!]+", source[end(left) : start(right)])
+        if found and found[0] in signs:
+            first = end(left) + found.start()
+            yield Fault(file, first, first + len(found[0]), kind, signs[found[0]])
+
+    for node in _computing(ast.parse(source)):
+        if isinstance(node, ast.BinOp) and not _is_text(node.left) and not _is_text(node.right):
+            yield from between(node.left, node.right, SIGNS, "sign")
+        elif isinstance(node, ast.AugAssign):
+            yield from between(node.target, node.value, SIGNS, "sign")
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            yield Fault(file, start(node), start(node) + 1, "sign", "")
+        elif isinstance(node, ast.Compare):
+            operands = [node.left, *node.comparators]
+            for left, right in zip(operands, operands[1:], strict=False):
+                yield from between(left, right, OPPOSITE, "comparison")
+        elif isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if name in EXTREMES:
+                yield Fault(file, end(node.func) - len(name), end(node.func), "bound", EXTREMES[name])
+        elif isinstance(node, ast.Subscript):
+            for part in ast.walk(node.slice):
+                if isinstance(part, ast.Constant) and type(part.value) is int:
+                    yield Fault(file, start(part), end(part), "index", str(_other_index(part.value)))
+
+
+def _computing(tree: ast.Module) -> Iterator[ast.AST]:
+    """The nodes of a module but those of annotations and of `axis=`, where -1 is often another word for 1."""
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        for field, value in ast.iter_fields(node):
+            if field in ("annotation", "returns") or (isinstance(node, ast.keyword) and node.arg == "axis"):
+                continue
+            parts = value if isinstance(value, list) else [value]
+            waiting += [part for part in parts if isinstance(part, ast.AST)]
+
+
+def _is_text(node: ast.expr) -> bool:
+    return isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
+
+
+def _other_index(index: int) -> int:
+    """Another index, within an array that has the first."""
+    return index - 1 if index > 0 else 1
+
+
+C_TOKEN = re.compile(
+    r"[A-Za-z_]\w*|\d[\w.]*(?:[eE][-+]?\d+)?|<<|>>|->|\+\+|--|&&|\|\||[-+*/<>=!&|^%]=|.", re.S
+)
+C_HIDDEN = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|^[ \t]*#(?:\\\n|[^\n])*', re.S | re.M)
+"""Comments, strings and lines of the preprocessor."""
+C_TYPE = re.compile(r"(?:const|static|unsigned|int|char|void|double|float|size_t|real|wide|fl_\w+|struct)\b")
+"""How a declaration begins."""
+OPERAND = re.compile(r"[\w\])]")
+"""What the last character before a binary operator is."""
+
+
+def c_faults(file: str, source: str) -> Iterator[Fault]:
+    """Every fault that can be made in a C file, outside of comments, strings, macros and declared sizes."""
+    code = C_HIDDEN.sub(lambda hidden: re.sub(r"[^\n]", " ", hidden[0]), source)
+    tokens = [(found[0], found.start()) for found in C_TOKEN.finditer(code) if not found[0].isspace()]
+    loops = [(found.start(), found.end()) for found in re.finditer(r"\bfor \(.*?;.*?;", code, re.S)]
+    for place, (token, start) in enumerate(tokens):
+        end = start + len(token)
+        before = tokens[place - 1][0] if place else ";"
+        after = tokens[place + 1][0] if place + 1 < len(tokens) else ";"
+        in_loop = next((last for first, last in loops if first <= start < last), None)
+        if token in SIGNS:
+            if OPERAND.match(before[-1]) and before != "return":
+                yield Fault(file, start, end, "sign", SIGNS[token])
+            elif token == "-":
+                yield Fault(file, start, end, "sign", "")
+        elif token == "<" and in_loop is not None:
+            limit = re.match(r" ([\w>.\-]+)(?=;)", code[end:in_loop])
+            if limit:
+                last = end + limit.end()
+                yield Fault(file, end, last, "bound", f" {limit[1]} - 1")
+        elif token in OPPOSITE:
+            yield Fault(file, start, end, "comparison", OPPOSITE[token])
+        elif token in EXTREMES and after == "(":
+            yield Fault(file, start, end, "bound", EXTREMES[token])
+        elif token.isdigit() and before == "[" and after == "]" and not _is_size(code, start):
+            yield Fault(file, start, end, "index", str(_other_index(int(token))))
+
+
+def _is_size(code: str, place: int) -> bool:
+    """Whether brackets in C hold a size or stand in `sizeof`: those of a name that is being declared."""
+    statement = re.split(r"[;(]|[{}]\s*\n", code[:place])[-1].strip()
+    if re.search(r"sizeof [^,]*$|\(\*\w*\)\[$", code[:place].rsplit("\n", 1)[-1]):
+        return True
+    if not C_TYPE.match(statement):
+        return False
+    depth = 0
+    begin = 0
+    for position, letter in enumerate(statement[:-1]):
+        depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and depth == 0:
+            begin = position
+    return "=" not in statement[begin:]
+
+
+def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
+    """Faults drawn by a seed, half of them in C."""
+    faults: dict[bool, list[Fault]] = {True: [], False: []}
+    for path in sorted((root / "finlab/core").rglob("*.c")):
+        file = path.relative_to(root).as_posix()
+        faults[True] += c_faults(file, path.read_text(encoding="utf-8"))
+    for path in sorted((root / "finlab/allocation").rglob("*.py")):
+        file = path.relative_to(root).as_posix()
+        faults[False] += python_faults(file, path.read_text(encoding="utf-8"))
+    print(f"places: {len(faults[True])} in C, {len(faults[False])} in Python", flush=True)
+    source = random.Random(seed)
+    chosen = source.sample(sorted(faults[True]), count // 2)
+    chosen += source.sample(sorted(faults[False]), count - count // 2)
+    source.shuffle(chosen)
+    return chosen
