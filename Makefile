@@ -22,7 +22,7 @@ export PYTHONDONTWRITEBYTECODE :=
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: docs schemas figures help setup core app board-tools test fuzz test-all test-near test-fast check format checkpoint wheel wheels sdist wheel-check clean
+.PHONY: docs schemas figures help setup core app board-tools test fuzz test-all test-near test-durations mutate test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
 	@echo "make setup        make .venv with all that developers need, pinned in constraints.txt (gigabytes, with torch)"
@@ -31,7 +31,9 @@ help:
 	@echo "make test         every test, browser tests included; of long tables of cases a share"
 	@echo "make test-all     every test and every case"
 	@echo "make fuzz         a million mutated robots and wild wrenches for the core in C, under sanitizers"
-	@echo "make test-near    the tests near what was changed since the branch main"
+	@echo "make test-near    the tests near what was changed since the branch main, a minute"
+	@echo "make test-durations  time every test, by which make test-near chooses"
+	@echo "make mutate       small random faults, and whether near tests find them: make mutate SEED=1 COUNT=60"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
 	@echo "make schemas      write the JSON Schema of layout files"
@@ -77,6 +79,17 @@ test-all: test
 
 test-near: setup
 	$(BIN)/python tools/near_tests.py
+
+# Processor seconds of tests, in tests/durations.json: after many tests have come or gone.
+test-durations: setup
+	$(THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal --ignore tests/browser --ignore tests/packaging \
+	    -q -p tools.durations
+
+SEED ?= 0
+COUNT ?= 60
+
+mutate: setup
+	$(BIN)/python tools/mutate.py --seed $(SEED) --count $(COUNT)
 
 test-fast: setup
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser --ignore tests/packaging

@@ -1,7 +1,7 @@
 """Small faults that can be made in sources: signs, comparisons, bounds and indices.
 
-Python is read by its syntax tree. C is read by its tokens, outside of comments, strings, lines of the preprocessor
-and sizes of arrays.
+Python is read by its syntax tree. C is read by its tokens, outside of comments, strings, lines of the
+preprocessor and sizes of arrays.
 """
 
 import ast
@@ -47,45 +47,73 @@ class Fault:
         return f"{self.file}:{line}: {self.kind}\n    - {before}\n    + {after}"
 
 
-def python_faults(file: str, source: str) -> Iterator[Fault]:
-    """Every fault that can be made in a Python file."""
-    begins = [0]
-    for line in source.splitlines(keepends=True):
-        begins.append(begins[-1] + len(line))
+class PythonFile:
+    """A Python file whose places for faults are looked for."""
 
-    def start(node: ast.expr) -> int:
-        return begins[node.lineno - 1] + node.col_offset
+    def __init__(self, file: str, source: str) -> None:
+        """Reads a file.
 
-    def end(node: ast.expr) -> int:
+        Args:
+            file: its path.
+            source: its text.
+        """
+        self.file = file
+        self.source = source
+        self.begins = [0]
+        for line in source.splitlines(keepends=True):
+            self.begins.append(self.begins[-1] + len(line))
+
+    def start(self, node: ast.expr) -> int:
+        """Where an expression begins in the text."""
+        return self.begins[node.lineno - 1] + node.col_offset
+
+    def end(self, node: ast.expr) -> int:
+        """Where an expression ends in the text."""
         assert node.end_lineno is not None and node.end_col_offset is not None
-        return begins[node.end_lineno - 1] + node.end_col_offset
+        return self.begins[node.end_lineno - 1] + node.end_col_offset
 
-    def between(left: ast.expr, right: ast.expr, signs: dict[str, str], kind: str) -> Iterator[Fault]:
-        """The fault of an operator that stands between two operands."""
-        found = re.search(r"[-+<>=!]+", source[end(left) : start(right)])
-        if found and found[0] in signs:
-            first = end(left) + found.start()
-            yield Fault(file, first, first + len(found[0]), kind, signs[found[0]])
+    def faults(self) -> Iterator[Fault]:
+        """Every fault that can be made in the file."""
+        for node in _computing(ast.parse(self.source)):
+            if isinstance(node, ast.BinOp | ast.AugAssign | ast.UnaryOp):
+                yield from self._signs(node)
+            elif isinstance(node, ast.Compare):
+                operands = [node.left, *node.comparators]
+                for left, right in zip(operands, operands[1:], strict=False):
+                    yield from self._between(left, right, OPPOSITE, "comparison")
+            elif isinstance(node, ast.Call):
+                yield from self._bounds(node)
+            elif isinstance(node, ast.Subscript):
+                yield from self._indices(node)
 
-    for node in _computing(ast.parse(source)):
-        if isinstance(node, ast.BinOp) and not _is_text(node.left) and not _is_text(node.right):
-            yield from between(node.left, node.right, SIGNS, "sign")
+    def _signs(self, node: ast.BinOp | ast.AugAssign | ast.UnaryOp) -> Iterator[Fault]:
+        if isinstance(node, ast.UnaryOp):
+            if isinstance(node.op, ast.USub):
+                yield Fault(self.file, self.start(node), self.start(node) + 1, "sign", "")
         elif isinstance(node, ast.AugAssign):
-            yield from between(node.target, node.value, SIGNS, "sign")
-        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            yield Fault(file, start(node), start(node) + 1, "sign", "")
-        elif isinstance(node, ast.Compare):
-            operands = [node.left, *node.comparators]
-            for left, right in zip(operands, operands[1:], strict=False):
-                yield from between(left, right, OPPOSITE, "comparison")
-        elif isinstance(node, ast.Call):
-            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            if name in EXTREMES:
-                yield Fault(file, end(node.func) - len(name), end(node.func), "bound", EXTREMES[name])
-        elif isinstance(node, ast.Subscript):
-            for part in ast.walk(node.slice):
-                if isinstance(part, ast.Constant) and type(part.value) is int:
-                    yield Fault(file, start(part), end(part), "index", str(_other_index(part.value)))
+            yield from self._between(node.target, node.value, SIGNS, "sign")
+        elif not _is_text(node.left) and not _is_text(node.right):
+            yield from self._between(node.left, node.right, SIGNS, "sign")
+
+    def _between(self, left: ast.expr, right: ast.expr, others: dict[str, str], kind: str) -> Iterator[Fault]:
+        """The fault of an operator that stands between two operands."""
+        found = re.search(r"[-+<>=!]+", self.source[self.end(left) : self.start(right)])
+        if found and found[0] in others:
+            first = self.end(left) + found.start()
+            yield Fault(self.file, first, first + len(found[0]), kind, others[found[0]])
+
+    def _bounds(self, node: ast.Call) -> Iterator[Fault]:
+        function = node.func
+        name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+        if name in EXTREMES:
+            end = self.end(function)
+            yield Fault(self.file, end - len(name), end, "bound", EXTREMES[name])
+
+    def _indices(self, node: ast.Subscript) -> Iterator[Fault]:
+        for part in ast.walk(node.slice):
+            if isinstance(part, ast.Constant) and type(part.value) is int:
+                text = str(_other_index(part.value))
+                yield Fault(self.file, self.start(part), self.end(part), "index", text)
 
 
 def _computing(tree: ast.Module) -> Iterator[ast.AST]:
@@ -173,7 +201,7 @@ def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
         faults[True] += c_faults(file, path.read_text(encoding="utf-8"))
     for path in sorted((root / "finlab/allocation").rglob("*.py")):
         file = path.relative_to(root).as_posix()
-        faults[False] += python_faults(file, path.read_text(encoding="utf-8"))
+        faults[False] += PythonFile(file, path.read_text(encoding="utf-8")).faults()
     print(f"places: {len(faults[True])} in C, {len(faults[False])} in Python", flush=True)
     source = random.Random(seed)
     chosen = source.sample(sorted(faults[True]), count // 2)

@@ -1,14 +1,14 @@
-"""Which file of the tree imports which, read from the sources: what `tools/near_tests.py` measures nearness by.
+"""Which file of the tree imports which, read from the sources: by it `tools/near_tests.py` measures nearness.
 
-A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go from a file to
-what it imports. What is not said by an import statement is found, too:
+A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go from a file
+to what it imports. What is not said by an import statement is found, too:
 
 - a name that a package only passes on leads to the file that defines it: `from finlab import Allocator` to
   `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
 - a module that is loaded by name, where its full name stands as a string;
 - a fixture, by the name of an argument, leads to its `conftest.py`;
-- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares its name with
-  a C file does the same work or calls it.
+- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares its name
+  with a C file does the same work or calls it.
 """
 
 import ast
@@ -110,11 +110,9 @@ class ImportGraph:
     def _named(self, module: str, name: str) -> set[str]:
         """Files that `from module import name` needs: the module, and where it only passes the name on, the
         file that defines it."""
-        if module not in self.file_of:
-            return set()
-        found = {self.file_of[module]}
-        if f"{module}.{name}" in self.file_of:
-            return found | {self.file_of[f"{module}.{name}"]}
+        found = self._module(module) | self._module(f"{module}.{name}")
+        if module not in self.file_of or f"{module}.{name}" in self.file_of:
+            return found
         source = self._passed_on(self.file_of[module]).get(name)
         return found | self._named(source, name) if source else found
 

@@ -3,8 +3,8 @@
 
     python tools/mutate.py --seed 1 --count 60
 
-Faults are drawn by the seed from all places of `finlab/core/*.c` and `finlab/allocation` where one of these can be
-made (`tools/faults.py`), half of them in C and half in Python:
+Faults are drawn by the seed from all places of `finlab/core/*.c` and `finlab/allocation` where one of these
+can be made (`tools/faults.py`), half of them in C and half in Python:
 
 - sign: plus for minus, minus for plus, or a minus left out;
 - comparison: its opposite, such as `>=` for `<`;
@@ -12,9 +12,9 @@ made (`tools/faults.py`), half of them in C and half in Python:
 - index: another element, such as `[1]` for `[0]`.
 
 Each is made in a copy of the tree, whose core is compiled again where the fault is in C, and the tests that
-`tools/near_tests.py` chooses for the file run until one fails. A test that hangs and a process that dies have found
-the fault, too. What is printed as missed is to be read: some faults change no behaviour, such as that of a bound
-that is never met.
+`tools/near_tests.py` chooses for the file run until one fails. A test that hangs and a process that dies have
+found the fault, too. What is printed as missed is to be read: some faults change no behaviour, such as that
+of a bound that is never met.
 """
 
 import argparse

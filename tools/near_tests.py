@@ -102,7 +102,7 @@ def one_thread() -> dict[str, str]:
 
 
 def pytest_words(tests: list[NearTest]) -> list[str]:
-    """What pytest is told to run tests: their functions in this order, and which of the timed cases to leave out."""
+    """What pytest is told to run tests: their functions in this order, and which timed cases to leave out."""
     chosen = {test.node for test in tests}
     functions = list(dict.fromkeys(node.split("[")[0] for node in (test.node for test in tests)))
     left_out = [name for name in durations() if "[" in name and name not in chosen]
@@ -113,8 +113,8 @@ def pytest_words(tests: list[NearTest]) -> list[str]:
 def by_halves(tests: list[NearTest]) -> list[NearTest]:
     """Tests in the order in which two processes take them.
 
-    Each begins with one half of what it is told, so every second test file is put into the second half: the nearest
-    come first in both. Slow tests come after all others.
+    Each begins with one half of what it is told, so every second test file is put into the second half: the
+    nearest come first in both. Slow tests come after all others.
     """
     files = list(dict.fromkeys(test.file for test in tests))
     ordered = list[NearTest]()

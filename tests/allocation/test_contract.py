@@ -123,8 +123,8 @@ class Question:
 
 
 def questions(method: str, allocator: Allocator, robot: Robot, damage: Damage) -> Iterator[Question]:
-    """What is asked: each policy of the method, within reach and beyond, outside of ticks and in one, with all
-    axes and with one that is free."""
+    """What is asked: each policy of the method, within reach and beyond, outside of ticks and in one, with
+    all axes and with one that is free."""
     layout = damage.applied_to(allocator.layout)
     plant = plant_of(layout).at(robot.flow)
     lost = [name in damage.lost for name in layout.names]
@@ -259,8 +259,8 @@ def check_figures(answer: Allocation, wrench: Array, free: tuple[str, ...]) -> N
 
 
 def check_default(answer: Allocation, question: Question, robot: Robot, word: str) -> None:
-    """The default method delivers what can be, at no more power than a command that is known to, and no command
-    of a tick has changed faster than its drive can, angles the shorter way round."""
+    """The default method delivers what can be, at no more power than a command that is known to, and no
+    command of a tick has changed faster than its drive can, angles the shorter way round."""
     if question.known is not None:
         assert answer.err_norm <= 1e-5
         if word in ("whole", "lost"):
