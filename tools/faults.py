@@ -193,18 +193,28 @@ def _is_size(code: str, place: int) -> bool:
     return "=" not in statement[begin:]
 
 
+def faults_of(root: Path, file: str) -> list[Fault]:
+    """Every fault that can be made in a file, in the order of its text."""
+    source = (root / file).read_text(encoding="utf-8")
+    return sorted(c_faults(file, source) if file.endswith(".c") else PythonFile(file, source).faults())
+
+
+def drawn_fault(root: Path, file: str, seed: int) -> Fault:
+    """A fault of one file, drawn by a seed."""
+    return random.Random(f"{seed} {file}").choice(faults_of(root, file))
+
+
 def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
-    """Faults drawn by a seed, half of them in C."""
-    faults: dict[bool, list[Fault]] = {True: [], False: []}
-    for path in sorted((root / "finlab/core").rglob("*.c")):
-        file = path.relative_to(root).as_posix()
-        faults[True] += c_faults(file, path.read_text(encoding="utf-8"))
-    for path in sorted((root / "finlab/allocation").rglob("*.py")):
-        file = path.relative_to(root).as_posix()
-        faults[False] += PythonFile(file, path.read_text(encoding="utf-8")).faults()
-    print(f"places: {len(faults[True])} in C, {len(faults[False])} in Python", flush=True)
+    """Faults of the core and of `finlab/allocation` drawn by a seed, half of them in C."""
     source = random.Random(seed)
-    chosen = source.sample(sorted(faults[True]), count // 2)
-    chosen += source.sample(sorted(faults[False]), count - count // 2)
+    chosen = list[Fault]()
+    for folder, pattern, share in (
+        ("finlab/core", "*.c", count // 2),
+        ("finlab/allocation", "*.py", count - count // 2),
+    ):
+        files = [path.relative_to(root).as_posix() for path in sorted((root / folder).rglob(pattern))]
+        faults = [fault for file in files for fault in faults_of(root, file)]
+        print(f"{len(faults)} places in {folder}", flush=True)
+        chosen += source.sample(faults, share)
     source.shuffle(chosen)
     return chosen

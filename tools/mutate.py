@@ -36,42 +36,35 @@ from queue import SimpleQueue
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tools.faults import Fault, drawn_faults
+from hatch_build import FLAGS, target
+from tools.faults import Fault, drawn_fault, drawn_faults
 from tools.import_graph import ImportGraph
-from tools.near_tests import ROOT, SECONDS, SLOW, NearTest, near_tests, one_thread, pytest_words
+from tools.near_tests import ROOT, SECONDS, by_file, near_tests, one_thread, pytest_words
 
-FIRST = 100
-"""How many quick near tests run before the rest of them: most faults are found by them."""
 HANG = 100
 """Seconds after which one test counts as hung."""
-LOADED = (
-    "numpy",
-    "scipy.optimize",
-    "scipy.linalg",
-    "scipy.interpolate",
-    "yaml",
-    "msgspec",
-    "hypothesis",
-    "pytest",
-)
+LOADED = ("numpy", "scipy.optimize", "scipy.linalg", "hypothesis", "pytest")
 """What tests import that no fault changes: a process loads it once, and each fault begins from there."""
+LOADED_FOR_C = ("finlab.allocation.dual.method", "finlab.cli", "finlab.analysis.authority", "finlab.fit")
+"""What no fault in C changes besides."""
 
 
 class Worker:
     """A process that makes faults in a copy of the tree, and is told them one by one."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, objects: Path) -> None:
         """Copies what tests need, and starts the process there.
 
         Args:
             folder: where to, a folder that is not there yet.
+            objects: what the C files of the core are compiled to, without a fault.
         """
         skipped = shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "runs", "test-results")
         shutil.copytree(ROOT, folder, ignore=skipped)
         environment = one_thread() | {"PYTHONPATH": str(folder)}
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
         self.process = subprocess.Popen(
-            [sys.executable, "tools/mutate.py", "--worker"],
+            [sys.executable, "tools/mutate.py", "--worker", str(objects)],
             cwd=folder,
             env=environment,
             stdin=subprocess.PIPE,
@@ -79,10 +72,15 @@ class Worker:
             text=True,
         )
 
-    def found_by(self, fault: Fault) -> str:
-        """What finds a fault: the compiler, or the first test that fails; nothing where all pass."""
+    def found_by(self, fault: Fault, words: list[str]) -> str:
+        """What finds a fault: the compiler, or the first test that fails; nothing where all pass.
+
+        Args:
+            fault: which.
+            words: what pytest is told to run the near tests.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
-        self.process.stdin.write(json.dumps(asdict(fault)) + "\n")
+        self.process.stdin.write(json.dumps([asdict(fault), words]) + "\n")
         self.process.stdin.flush()
         return str(json.loads(self.process.stdout.readline()))
 
@@ -93,50 +91,55 @@ class Worker:
         self.process.wait()
 
 
-def work() -> None:
+def work(objects: Path) -> None:
     """What the process of a `Worker` does: a fault comes in a line, and what finds it goes out in one."""
     for name in LOADED:
         import_module(name)
-    graph = ImportGraph(ROOT)
-    compile_core()
+    library = Path(next((ROOT / "finlab" / "core").glob("libfinlab.*")))
+    whole = library.read_bytes()
     for line in sys.stdin:
-        fault = Fault(**json.loads(line))
-        print(json.dumps(_found_by(fault, graph)), flush=True)
-
-
-def compile_core() -> bool:
-    """Compiles the core of this tree; returns whether the compiler took it."""
-    return subprocess.run([sys.executable, "hatch_build.py"], cwd=ROOT, capture_output=True).returncode == 0
-
-
-def _found_by(fault: Fault, graph: ImportGraph) -> str:
-    path = ROOT / fault.file
-    source = path.read_text(encoding="utf-8")
-    in_c = path.suffix == ".c"
-    path.write_text(fault.applied(source), encoding="utf-8")
-    try:
-        if in_c and not compile_core():
-            return "the compiler"
-        tests = near_tests(graph, [fault.file], SECONDS)
-        first = [test for test in tests if test.seconds <= SLOW][:FIRST]
-        rest = [test for test in tests if test not in first]
-        return _failure(first) or _failure(rest)
-    finally:
+        about, words = json.loads(line)
+        fault = Fault(**about)
+        path = ROOT / fault.file
+        source = path.read_text(encoding="utf-8")
+        path.write_text(fault.applied(source), encoding="utf-8")
+        is_built = path.suffix != ".c" or built(path, objects, library)
+        found = failure(words, LOADED_FOR_C if path.suffix == ".c" else ()) if is_built else "the compiler"
         path.write_text(source, encoding="utf-8")
-        if in_c:
-            compile_core()
+        if path.suffix == ".c":
+            library.unlink()
+            library.write_bytes(whole)
+        print(json.dumps(found), flush=True)
 
 
-def _failure(tests: list[NearTest]) -> str:
+def compiled(path: Path, made: Path) -> bool:
+    """Compiles one C file to an object file; returns whether the compiler took it."""
+    flags = [flag for flag in FLAGS if flag != "-shared"]
+    command = [*target()[0], *flags, "-c", str(path), "-o", str(made)]
+    return subprocess.run(command, capture_output=True).returncode == 0
+
+
+def built(path: Path, objects: Path, library: Path) -> bool:
+    """Builds the core with one C file that was changed; returns whether the compiler took it."""
+    with tempfile.TemporaryDirectory() as folder:
+        changed = Path(folder) / f"{path.stem}.o"
+        if not compiled(path, changed):
+            return False
+        others = [str(made) for made in sorted(objects.glob("*.o")) if made.name != changed.name]
+        library.unlink(missing_ok=True)
+        command = [*target()[0], *FLAGS, str(changed), *others, "-o", str(library), "-lm"]
+        return subprocess.run(command, capture_output=True).returncode == 0
+
+
+def failure(words: list[str], loaded: tuple[str, ...]) -> str:
     """The first of some tests that fails, or what is said where a process dies; nothing where all pass."""
-    if not tests:
-        return ""
+    for name in loaded:
+        import_module(name)
     options = ["-x", "-q", "--tb=no", "-o", f"faulthandler_timeout={HANG}", "-p", "no:cacheprovider"]
-    words = [*options, *pytest_words(sorted(tests, key=lambda test: test.file))]
     with tempfile.TemporaryFile("w+") as output:
         child = os.fork()
         if child == 0:
-            _run_pytest(words, output.fileno())
+            _run_pytest([*options, *words], output.fileno())
         _, status = os.waitpid(child, 0)
         with suppress(ProcessLookupError):  # what a test has started and not ended
             os.killpg(child, signal.SIGKILL)
@@ -162,18 +165,33 @@ def _run_pytest(words: list[str], output: int) -> None:
         os._exit(code)
 
 
-def judged(faults: list[Fault], jobs: int) -> Iterator[tuple[Fault, str]]:
-    """Faults and what finds each, tried by so many processes at once."""
+def judged(faults: list[Fault], jobs: int, seconds: float) -> Iterator[tuple[Fault, str]]:
+    """Faults and what finds each.
+
+    Args:
+        faults: those of Python first, since a process loads more before those of C.
+        jobs: how many processes try them at once.
+        seconds: of the near tests of each.
+    """
+    graph = ImportGraph(ROOT)
+    words = {
+        file: pytest_words(by_file(near_tests(graph, [file], seconds))) for file in {f.file for f in faults}
+    }
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
+        objects = Path(folder) / "objects"
+        objects.mkdir()
+        for path in sorted((ROOT / "finlab/core").rglob("*.c")):
+            if not compiled(path, objects / f"{path.stem}.o"):
+                sys.exit(f"{path} does not compile")
         workers = SimpleQueue[Worker]()
-        started = [Worker(Path(folder) / f"tree{job}") for job in range(jobs)]
+        started = [Worker(Path(folder) / f"tree{job}", objects) for job in range(jobs)]
         for worker in started:
             workers.put(worker)
 
         def found_by(fault: Fault) -> str:
             worker = workers.get()
             try:
-                return worker.found_by(fault)
+                return worker.found_by(fault, words[fault.file])
             finally:
                 workers.put(worker)
 
@@ -187,22 +205,31 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--files", nargs="*", help="draw one fault in each of these files instead")
     parser.add_argument("--only", type=int, nargs="*", help="numbers of faults; by default all")
     parser.add_argument("--jobs", type=int, default=2, help="faults that are tried at once")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of near tests, as they were timed")
     parser.add_argument("--list", action="store_true", help="print the faults and make none")
-    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
-        work()
+        work(options.worker)
         return 0
-    numbered = dict(enumerate(drawn_faults(ROOT, options.count, options.seed)))
-    wanted = {number: numbered[number] for number in options.only or numbered}
+    if options.files:
+        faults = [drawn_fault(ROOT, file, options.seed) for file in options.files]
+    else:
+        faults = drawn_faults(ROOT, options.count, options.seed)
+    numbered = dict(enumerate(faults))
+    numbers = sorted(options.only or numbered, key=lambda number: numbered[number].file.endswith(".c"))
+    wanted = {number: numbered[number] for number in numbers}
     shown = {number: fault.shown((ROOT / fault.file).read_text("utf-8")) for number, fault in wanted.items()}
     if options.list:
         print(*(f"{number} {text}" for number, text in shown.items()), sep="\n")
         return 0
     missed = list[int]()
-    for number, (_, found) in zip(wanted, judged(list(wanted.values()), options.jobs), strict=True):
+    for number, (_, found) in zip(
+        wanted, judged(list(wanted.values()), options.jobs, options.seconds), strict=True
+    ):
         print(f"{number} {shown[number]}\n    {'found by ' + found if found else 'MISSED'}", flush=True)
         if not found:
             missed.append(number)

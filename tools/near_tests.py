@@ -110,6 +110,13 @@ def pytest_words(tests: list[NearTest]) -> list[str]:
     return [*functions, *(f"--deselect={name}" for name in left_out if name.split("[")[0] in wanted)]
 
 
+def by_file(tests: list[NearTest]) -> list[NearTest]:
+    """Tests file by file, the nearest file first; slow tests after all others."""
+    files = list(dict.fromkeys(test.file for test in tests))
+    own = [test for file in files for test in tests if test.file == file]
+    return sorted(own, key=lambda test: test.seconds > SLOW)
+
+
 def by_halves(tests: list[NearTest]) -> list[NearTest]:
     """Tests in the order in which two processes take them.
 
@@ -117,11 +124,8 @@ def by_halves(tests: list[NearTest]) -> list[NearTest]:
     nearest come first in both. Slow tests come after all others.
     """
     files = list(dict.fromkeys(test.file for test in tests))
-    ordered = list[NearTest]()
-    for half in (files[::2], files[1::2]):
-        own = [test for file in half for test in tests if test.file == file]
-        ordered += sorted(own, key=lambda test: test.seconds > SLOW)
-    return ordered
+    halves = [[test for test in tests if test.file in half] for half in (files[::2], files[1::2])]
+    return [test for half in halves for test in by_file(half)]
 
 
 def changed_files() -> list[str]:
