@@ -109,6 +109,8 @@ def work(objects: Path) -> None:
         if path.suffix == ".c":
             library.unlink()
             library.write_bytes(whole)
+        if found.startswith("tests/") and failure([found], ()):
+            found = f"nothing: {found} fails without it, too"
         print(json.dumps(found), flush=True)
 
 

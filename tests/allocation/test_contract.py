@@ -206,7 +206,7 @@ def test_many_wrenches_get_the_answers_of_each(method: str, kind: str, word: str
 def check_row(batch: BatchAllocation, row: int, answer: Allocation, alike: bool) -> None:
     """An answer of many is what a question of its own gets, and keeps what that keeps."""
     assert batch.reachable[row] == answer.reachable
-    if alike or not answer.reachable:
+    if alike or (batch.method == "mdn" and not answer.reachable):
         np.testing.assert_allclose(batch.command[row], answer.command, rtol=1e-9, atol=1e-9)
         for figure in ("wrench", "forces", "unallocated", "err_norm", "power", "expected_error"):
             told = getattr(batch, figure)[row]
