@@ -165,6 +165,20 @@ def test_the_papers_sqp_is_as_exact_as_slsqp_where_wrenches_can_be_had(name: str
         assert answer.reachable.all() and answer.err_norm.max() < 2e-6, method
 
 
+def test_the_papers_sqp_goes_on_to_other_starts_until_one_delivers(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = iter([4.0, 1.0, 2.0, 0.0, 0.0])
+    starts = []
+
+    def descent(self: PaperSqp, target: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, list[float]]:
+        starts.append(start)
+        return start, [9.0, next(errors)]
+
+    monkeypatch.setattr(PaperSqp, "descent", descent)
+    answer = Allocator(load_layout("A"), "paper_sqp", n_starts=5, time_limit_s=60.0).allocate(np.ones(6))
+    assert len(starts) == 4  # the fourth delivers
+    np.testing.assert_array_equal(answer.command, starts[3])
+
+
 @pytest.mark.parametrize("reach", [1.0, 6.0])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:

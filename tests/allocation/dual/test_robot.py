@@ -1,0 +1,69 @@
+"""What the core is given of a robot, against what it stands for, and what is kept between questions."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.allocation.dual.robot import POINTS, _usual_price, gauge_numbers
+from finlab.arrays import Array
+from finlab.layout import load_layout
+from tests.any_robot import AnyRobot
+from tests.mixed_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
+
+DENSE = np.linspace(0.0, 2.0 * math.pi, 200_001)
+
+
+def uneven(direction: Array) -> Array:
+    """A gauge of forces in all directions, smooth and convex."""
+    return 1.0 + 0.15 * np.cos(direction - 0.4) + 0.02 * np.sin(2.0 * direction)
+
+
+def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
+    count = 360
+    gauge = uneven(np.arange(count) * 2.0 * math.pi / count)
+    deflection = np.linspace(-1.0, 1.0, POINTS)
+    numbers = gauge_numbers(gauge, deflection)
+    assert numbers[0] == POINTS
+    support, slope, own, kept = numbers[1:].reshape(POINTS, 4).T
+    for place, angle in enumerate(np.arange(POINTS) * 2.0 * math.pi / POINTS):
+        # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the best psi.
+        worth = uneven(DENSE) * np.cos(angle - DENSE)
+        best = int(worth.argmax())
+        assert support[place] == pytest.approx(worth[best], abs=1e-6)
+        derivative = -uneven(DENSE[best]) * math.sin(angle - DENSE[best])
+        assert slope[place] == pytest.approx(derivative, abs=1e-4)
+        assert own[place] == pytest.approx(float(uneven(np.array(angle))), abs=2e-5)
+    np.testing.assert_array_equal(kept, deflection)
+
+
+def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> None:
+    robot = AnyRobot().method(load(bluerov2_heavy())).compiled.robot
+    dearer = max(T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5)
+    assert robot.largest_power == pytest.approx(8.0 * dearer, rel=1e-3)
+
+
+def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
+    """P = c F^1.5 has the price dP/dF = 1.5 c sqrt(F)."""
+    response = AnyRobot().method(load(bluerov2_heavy())).compiled.robot.responses[0]
+    ahead = 1.5 * T200["forward"] * math.sqrt(T200_FORCE[1])
+    astern = 1.5 * T200["reverse"] * math.sqrt(-T200_FORCE[0])
+    assert _usual_price(response) == pytest.approx(max(ahead, astern), rel=0.02)
+
+
+def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
+    method = AnyRobot().method(load_layout("torpedo"))
+    slow, fast = np.array([1.0, 0, 0, 0, 0, 0]), np.array([2.0, 0, 0, 0, 0, 0])
+    kept = method.at(slow)
+    assert kept is not method and method.at(slow.copy()) is kept
+    assert method.at(fast) is not kept and method.at(None) is method
+
+
+def test_axes_that_come_together_only_are_told_where_they_are_asked_for_apart() -> None:
+    thruster = bluerov2_heavy()["actuators"][0] | {"position_m": [0.0, 0.1, 0.0], "axis": [1.0, 0.0, 0.0]}
+    allocator = Allocator(load(layout_of("aside", [thruster])))  # 1 N along x turns by -0.1 N m about z
+    together = allocator.allocate([10.0, 0.0, 0.0, 0.0, 0.0, -1.0])
+    apart = allocator.allocate([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert together.reachable and not any("apart" in note for note in together.notes)
+    assert any("Fx" in note and "Tz" in note and "apart" in note for note in apart.notes)
