@@ -149,7 +149,7 @@ def failure(words: list[str], loaded: tuple[str, ...]) -> str:
         said = output.read()
     if status == 0:
         return ""
-    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", said, re.M)
+    failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", said, re.M)
     return failed[0] if failed else f"the end of its process: {said[-200:]}"
 
 
