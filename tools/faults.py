@@ -179,7 +179,7 @@ def c_faults(file: str, source: str) -> Iterator[Fault]:
 
 def _is_size(code: str, place: int) -> bool:
     """Whether brackets in C hold a size or stand in `sizeof`: those of a name that is being declared."""
-    statement = re.split(r"[;(]|[{}]\s*\n", code[:place])[-1].strip()
+    statement = re.split(r"[;(]|[{}]\s*\n", _without_calls(code[:place]))[-1].strip()
     if re.search(r"sizeof [^,]*$|\(\*\w*\)\[$", code[:place].rsplit("\n", 1)[-1]):
         return True
     if not C_TYPE.match(statement):
@@ -191,6 +191,15 @@ def _is_size(code: str, place: int) -> bool:
         if letter == "," and depth == 0:
             begin = position
     return "=" not in statement[begin:]
+
+
+def _without_calls(code: str) -> str:
+    """The last lines of some C without what stands in parentheses that are closed."""
+    text = code[-400:]
+    shorter = re.sub(r"\([^()]*\)", "", text)
+    while shorter != text:
+        text, shorter = shorter, re.sub(r"\([^()]*\)", "", shorter)
+    return text
 
 
 def faults_of(root: Path, file: str) -> list[Fault]:

@@ -59,7 +59,10 @@ class ImportGraph:
         for c_file in self.c_files:
             importers[c_file].add(LOADER)
             stem = Path(c_file).stem
-            importers[c_file] |= {file for file in self.trees if Path(file).stem in (stem, f"test_{stem}")}
+            namesakes = {file for file in self.trees if Path(file).stem in (stem, f"test_{stem}")}
+            importers[c_file] |= {
+                file for file in namesakes if not file.startswith(("webapp", "tests/webapp"))
+            }
         return importers
 
     def distances(self, changed: Iterable[str]) -> dict[str, int]:

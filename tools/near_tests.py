@@ -45,6 +45,15 @@ FARTHER = 3.0
 """What a test one import farther off has to be faster to run first."""
 FOLDER = 2
 """Imports that tests in the mirroring folder are off at most."""
+CALLS_THE_CORE = {
+    "tests/core": 1,
+    "tests/allocation/test_contract.py": 1,
+    "tests/allocation/dual": 1,
+    "tests/allocation": 2,
+    "tests/interaction": 2,
+    "tests/forces": 2,
+}
+"""Tests of what calls the core in C, and how many imports they are off a C file at most."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +214,10 @@ def is_test_file(file: str) -> bool:
 
 def kinship(test: str, source: str) -> int:
     """The distance of a test file that its name and its folder say: where its folder mirrors that of the
-    changed file 0 if it is called after it and FOLDER if not, elsewhere 99."""
+    changed file 0 if it is called after it and FOLDER if not, elsewhere 99; of C files see CALLS_THE_CORE."""
+    if source.endswith((".c", ".h")):
+        called = [far for place, far in CALLS_THE_CORE.items() if Path(test).is_relative_to(place)]
+        return min(called, default=99)
     parts = Path(source).parent.parts
     mirror = Path("tests", *(parts[1:] if parts[:1] == ("finlab",) else parts))
     while mirror.parts != ("tests",) and not (ROOT / mirror).is_dir():
