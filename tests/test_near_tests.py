@@ -19,9 +19,9 @@ def graph() -> ImportGraph:
 @pytest.mark.parametrize(
     ("changed", "nearest"),
     [
-        ("finlab/core/jets.c", "tests/core/test_core.py"),
-        ("finlab/core/jets.c", "tests/interaction/test_jets.py"),
-        ("finlab/core/drag.c", "tests/allocation/dual/test_drag.py"),
+        ("finlab/core/src/jets.c", "tests/core/test_core.py"),
+        ("finlab/core/src/jets.c", "tests/interaction/test_jets.py"),
+        ("finlab/core/src/foil_drag.c", "tests/allocation/dual/test_drag.py"),
         ("finlab/allocation/baselines/ipopt.py", "tests/allocation/baselines/test_ipopt.py"),
         ("finlab/actuators/thruster.py", "tests/actuators/test_laws.py"),
         ("finlab/layout/damage.py", "tests/allocation/test_damage_of_robots.py"),

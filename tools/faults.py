@@ -218,7 +218,7 @@ def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
     source = random.Random(seed)
     chosen = list[Fault]()
     for folder, pattern, share in (
-        ("finlab/core", "*.c", count // 2),
+        ("finlab/core/src", "*.c", count // 2),
         ("finlab/allocation", "*.py", count - count // 2),
     ):
         files = [path.relative_to(root).as_posix() for path in sorted((root / folder).rglob(pattern))]

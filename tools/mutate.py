@@ -3,7 +3,7 @@
 
     python tools/mutate.py --seed 1 --count 60
 
-Faults are drawn by the seed from all places of `finlab/core/*.c` and `finlab/allocation` where one of these
+Faults are drawn by the seed from all places of `finlab/core/src` and `finlab/allocation` where one of these
 can be made (`tools/faults.py`), half of them in C and half in Python:
 
 - sign: plus for minus, minus for plus, or a minus left out;
@@ -117,7 +117,7 @@ def work(objects: Path) -> None:
 def compiled(path: Path, made: Path) -> bool:
     """Compiles one C file to an object file; returns whether the compiler took it."""
     flags = [flag for flag in FLAGS if flag != "-shared"]
-    command = [*target()[0], *flags, "-c", str(path), "-o", str(made)]
+    command = [*target()[0], *flags, f"-I{ROOT / 'finlab' / 'core'}", "-c", str(path), "-o", str(made)]
     return subprocess.run(command, capture_output=True).returncode == 0
 
 
@@ -182,7 +182,7 @@ def judged(faults: list[Fault], jobs: int, seconds: float) -> Iterator[tuple[Fau
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         objects = Path(folder) / "objects"
         objects.mkdir()
-        for path in sorted((ROOT / "finlab/core").rglob("*.c")):
+        for path in sorted((ROOT / "finlab/core/src").glob("*.c")):
             if not compiled(path, objects / f"{path.stem}.o"):
                 sys.exit(f"{path} does not compile")
         workers = SimpleQueue[Worker]()
