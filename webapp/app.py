@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable
 import viser
 
 from finlab.layout import Layout
-from webapp.panels.frame import View
 from webapp.session import Display, Session
-from webapp.tasks.background import Workers
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
+from webapp.view import View
 from webapp.viser_internals import disable_sharing, stored
 
 FRAME_S = 1 / 25
@@ -84,7 +84,7 @@ class App:
         """Take over a server; a new session opens a `layout`, and looks as `display` says."""
         self._server = server
         self._solver = solver
-        self._workers = Workers()
+        self._pools = Pools()
         self._store = SessionStore(lambda: Session(layout, display))
         self.views: dict[int, View] = {}
         self._keys: dict[int, str] = {}
@@ -101,11 +101,11 @@ class App:
         self._clock = asyncio.run_coroutine_threadsafe(self._animate(), self._loop)
 
     def stop(self) -> None:
-        """Stop clock and workers; the server is stopped by its owner."""
+        """Stop clock and threads; the server is stopped by its owner."""
         self._clock.cancel()
         with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that it ends
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
-        self._workers.stop()
+        self._pools.stop()
 
     async def _connected(self, client: viser.ClientHandle) -> None:
         """Wait for the page to say which sessions it knows; one that says nothing is dropped in time."""
@@ -129,7 +129,7 @@ class App:
         if key not in remembered:
             remembered = [key, *remembered]
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
-        self.views[client.client_id] = View(client, session, self._solver, self._workers, self._loop)
+        self.views[client.client_id] = View(client, session, self._solver, self._pools, self._loop)
 
     async def _drop_if_gone(self, client_id: int) -> None:
         try:

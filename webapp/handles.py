@@ -11,6 +11,7 @@ from markupsafe import escape
 
 from finlab.errors import FinlabError
 from webapp.markup.words import html, marker
+from webapp.tasks.slot import Bell
 from webapp.viser_internals import run_file, run_script, uuid_of
 
 
@@ -33,7 +34,7 @@ def put(handle: Any, **values: Any) -> None:
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
     """Call `act(value)` on the loop when the user, not we, changes an input; a value of another kind than the
-    input's own is not from our page: it goes back to what it held."""
+    input's own is not from our page: it goes back to what it held last."""
     honest = handle.value
     buttons = isinstance(handle, viser.GuiButtonGroupHandle)
 
@@ -43,8 +44,8 @@ def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
             return
         value = event.target.value
         if _alike(honest, value):
+            honest = value
             act(value)
-            honest = event.target.value  # what the session has refused is corrected by now
         elif not buttons:
             handle.value = honest
 
@@ -95,14 +96,9 @@ def placed(key: str, count: int) -> int:
 class Presses:
     """All of one page."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        do: Callable[[Callable[[], object]], None],
-        later: Callable[[float, Callable[[], object]], object],
-    ) -> None:
-        """Listen to the page; `do` carries out what was meant, `later` something after some time [s]."""
-        self._gui, self._do, self._later = gui, do, later
+    def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None], bell: Bell) -> None:
+        """Listen to the page; `do` carries out what was meant."""
+        self._gui, self._do, self._bell = gui, do, bell
         self._acts: dict[str, Act] = {}
         self._last = 0
         hidden = "<style>[data-fl~=presses] + div {{ display: none; }}</style>{}"
@@ -134,10 +130,12 @@ class Presses:
                 self._last = number
                 if kind in self._acts:
                     self._do(partial(self._acts[kind], key, text))
-        self._later(HEARD_S, self._tell)
+        self._bell.ring_later(HEARD_S, self)
 
-    def _tell(self) -> None:
+    def attend(self) -> bool:
+        """Tell the page what was heard."""
         run_script(self._gui, f"finlabPresses.heard({self._last});")
+        return False
 
 
 class Asking:

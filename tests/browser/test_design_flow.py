@@ -181,16 +181,16 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
     improver = page.view.jobs.improver
     page.until(lambda: session.draft.way[0] == 0.03)
     page.press("Search")
-    page.until(lambda: improver.progress is not None or improver.findings is not None)
-    if improver.findings is None:
-        improver.cancel()  # as the button does; it may be gone before it can be pressed
-    page.until(lambda: improver.findings is not None)
-    found = improver.findings
+    page.until(lambda: improver.progress is not None or improver.answer is not None)
+    if improver.answer is None:
+        improver.stop()  # as the button does; it may be gone before it can be pressed
+    page.until(lambda: improver.answer is not None)
+    found = improver.answer
     accept = page.page.get_by_role("button", name="Accept")
     page.until(lambda: accept.count() == int(found.improved))
     if found.improved:
         page.press("Accept")
-        page.until(lambda: session.state.layout == found.layout and improver.findings is None)
+        page.until(lambda: session.state.layout == found.layout and improver.answer is None)
         page.press("Undo")
         page.until(lambda: session.state.layout == before)
 

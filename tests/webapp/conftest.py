@@ -1,4 +1,4 @@
-"""What the tests of the app share: a worker, a session and a swim; the process that reads files is ready."""
+"""What the tests of the app share: a thread, a session and a swim; the process that reads files is ready."""
 
 from collections.abc import Iterator
 
@@ -6,17 +6,17 @@ import pytest
 
 from finlab.files.worker import prepare
 from finlab.layout import load_layout
-from tests.webapp.stand_in import page_of
+from tests.webapp.stand_in import context_of
 from webapp.session import Session
-from webapp.tasks.background import Worker
+from webapp.tasks.slot import Pool
 from webapp.tasks.swimming import Swimming
 
 prepare(["webapp.session.files", "webapp.tasks.fitting"])
 
 
 @pytest.fixture
-def worker() -> Iterator[Worker]:
-    worker = Worker()
+def worker() -> Iterator[Pool]:
+    worker = Pool()
     yield worker
     worker.stop()
 
@@ -27,9 +27,7 @@ def session() -> Session:
 
 
 @pytest.fixture
-def swimming(worker: Worker) -> Iterator[Swimming]:
-    notes: list[str] = []
-    swim = Swimming(page_of(worker, notify=lambda _, text: notes.append(text)))
-    swim.notes = notes
+def swimming(worker: Pool) -> Iterator[Swimming]:
+    swim = Swimming(context_of(worker))
     yield swim
-    swim.stop()
+    swim.halt()

@@ -1,11 +1,12 @@
-"""Stand-ins: an allocator without a trained network, a silent page, an event loop at hand, a user's hand."""
+"""Stand-ins: an allocator without a trained network, a silent page, a bell without a page, a user's hand."""
 
-import asyncio
 import time
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import viser
@@ -16,13 +17,14 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import METHODS, MethodChoice
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
-from finlab.errors import AllocationError
+from finlab.errors import AllocationError, FinlabError
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
 from finlab.physics.objective import costs
 from webapp.session import Session
-from webapp.tasks.background import Context, EventLoop
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Attended, Bell, Deferred, Pool, Pools, Slot
 from webapp.tasks.solver import Solver
 
 N_REFINED = 4
@@ -128,58 +130,91 @@ def turn_fin(session: Session, name: str, angle: float) -> None:
     session.turn_selected(angle)
 
 
-class AtOnce(EventLoop):
-    """Runs everything where it is posted from; its timers ring by hand."""
+class Direct(Pool):
+    """Does all where it is asked for."""
 
     def __init__(self) -> None:
-        """Nothing is waiting."""
-        self.ring: Callable[[], object] = lambda: None
+        """No thread is needed."""
 
-    def post(self, act: Callable[[], object]) -> None:
-        """Run it now."""
-        act()
+    def submit(self, work: Callable[[], Any]) -> "Future[Any]":
+        """Do it now."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(work())
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
-    def later(self, seconds: float, act: Callable[[], object]) -> Any:
-        """Keep it until somebody rings."""
-        self.ring = act
-        return type("Timer", (), {"cancel": lambda _: None})()
-
-
-def raised(error: Exception) -> None:
-    """In place of a page that tells of faults."""
-    raise error
+    def stop(self) -> None:
+        """There is nothing to end."""
 
 
-def running() -> EventLoop:
-    """The loop that runs, as a page uses it."""
-    return EventLoop(asyncio.get_running_loop(), raised)
+class LoneBell(Bell):
+    """A bell without a page: a test looks itself, by `attend` or `until`."""
+
+    all: ClassVar[list["LoneBell"]] = []
+
+    def __init__(self) -> None:
+        """Nobody has rung."""
+        self._rung: deque[tuple[float, Attended]] = deque()
+        self.refused: list[str] = []
+        """What the page would have told the user."""
+        self.stages: list[Any] = []
+        """How far what has rung was."""
+        LoneBell.all.append(self)
+
+    def ring(self, *waiting: Attended) -> None:
+        """Keep who has rung."""
+        self._rung.extend((0.0, each) for each in waiting)
+
+    def ring_from_thread(self, waiting: Attended) -> None:
+        """Keep who has rung."""
+        self._rung.append((0.0, waiting))
+
+    def ring_later(self, seconds: float, waiting: Attended) -> None:
+        """Keep who rings later."""
+        self._rung.append((time.monotonic() + seconds, waiting))
+
+    def attend(self) -> None:
+        """Let all go on that have rung by now, as a page does."""
+        for _ in range(len(self._rung)):
+            due, waiting = self._rung.popleft()
+            if due > time.monotonic():
+                self._rung.append((due, waiting))
+                continue
+            try:
+                came = waiting.attend()
+            except FinlabError as error:
+                self.refused.append(str(error))
+                continue
+            if came and isinstance(waiting, Slot):
+                self.stages.append(waiting.progress)
+                if waiting.is_error_new:
+                    self.refused.append(f"{waiting.title}: {waiting.error}")
 
 
-class AloneContext(Context):
+def context_of(pool: Pool, session: Any = None, solver: Solver | None = None) -> Context:
+    """Tasks that do all their work on one pool, with the stand-in allocator unless told otherwise."""
+    pools = Pools(answers=pool, swims=pool, brief=pool, long=pool)
+    return Context(session, solver or Solver(load=load_stand_in), pools, LoneBell())
+
+
+class AtOnce(Deferred):
     """Makes everything where it is asked to."""
+
+    def __init__(self) -> None:
+        """No page is needed."""
 
     def make(self, work: Any, use: Callable[[Any], object], kind: Any = "") -> None:
         """Make it now."""
-        self.do(lambda: use(work()))
-
-
-def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
-    """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
-    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker, fits=worker)
-    silent: dict[str, Any] = {
-        "client": None,
-        "solver": Solver(load=load_stand_in),
-        "loop": AtOnce(),
-        "do": lambda act: act(),
-        "changed": lambda: None,
-        "notify": lambda title, text, calm=False: None,
-    }
-    return AloneContext(session=session, workers=workers, **{**silent, **options})
+        use(work())
 
 
 def until(condition: Callable[[], bool]) -> None:
-    """Wait for something."""
+    """Wait for something; what has rung without a page goes on meanwhile."""
     end = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < end
+        for bell in LoneBell.all:
+            bell.attend()
         time.sleep(0.005)

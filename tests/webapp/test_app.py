@@ -20,10 +20,10 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import SilentClient, load_stand_in, until
 from webapp.app import App, SessionStore, _session_keys
-from webapp.panels.frame import View
 from webapp.serving import serve
 from webapp.session import Session
 from webapp.tasks.solver import Solver
+from webapp.view import View
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def view(server: viser.ViserServer, app: App) -> Iterator[View]:
     client: Any = SilentClient(server)
     loop = server.get_event_loop()
     session = Session(load_layout(shipped_layouts()["ucat"]))
-    view = on_loop(server, lambda: View(client, session, app._solver, app._workers, loop))
+    view = on_loop(server, lambda: View(client, session, app._solver, app._pools, loop))
     yield view
     view.close()
     on_loop(server, lambda: (server.gui.reset(), server.scene.reset()))

@@ -2,11 +2,8 @@
 
 import shutil
 import threading
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +13,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
-from tests.webapp.stand_in import AtOnce, StandIn, load_stand_in, page_of
+from tests.webapp.stand_in import StandIn, context_of, load_stand_in, until
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
 from webapp.panels.files_tab import command_line
@@ -24,19 +21,18 @@ from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS
-from webapp.tasks.background import Worker
-from webapp.tasks.jobs import Comparison, Run
+from webapp.tasks.comparing import Comparison, Run
+from webapp.tasks.slot import Pool
 from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 
 
-def test_all_methods_answer_one_after_the_other(worker: Worker) -> None:
-    done = threading.Event()
-    comparison = Comparison(page_of(worker, changed=lambda: comparison.run.running or done.set()))
+def test_all_methods_answer_one_after_the_other(worker: Pool) -> None:
+    comparison = Comparison(context_of(worker))
     assert "side by side" in comparison_table(comparison.run, False)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
-    assert done.wait(60)
+    until(lambda: not comparison.run.running)
     answers = dict(comparison.run.answers)
     assert tuple(answers) == COMPARED
     assert all(isinstance(answer, Allocation) for answer in answers.values())
@@ -45,30 +41,28 @@ def test_all_methods_answer_one_after_the_other(worker: Worker) -> None:
 
 
 @pytest.mark.parametrize("robot", ["ucat", "bluerov2", "torpedo"])
-def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str) -> None:
-    state, loop = State(load_layout(robot)), AtOnce()
-    worker: Any = SimpleNamespace(submit=lambda _, job, __: jobs.append(job), forget=lambda _: None)
-    jobs: list[Callable[[], None]] = []
-    comparison = Comparison(page_of(worker, loop=loop, solver=Solver()))
+def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str, worker: Pool) -> None:
+    state, gate = State(load_layout(robot)), threading.Event()
+    comparison = Comparison(context_of(worker, solver=Solver()))
     comparison.start(state)
-    jobs.pop()()
+    until(lambda: bool(comparison.run.answers))
     comparison.cancel()
     assert not comparison.run.running
-    jobs.pop()()  # it was under way
-    assert [method for method, _ in comparison.run.answers] == ["dual"] and jobs == []
+    worker.submit(gate.set)
+    assert gate.wait(60)  # what was under way has come
+    comparison.attend()
+    assert [method for method, _ in comparison.run.answers] == ["dual"] and not comparison.busy
     table = comparison_table(comparison.run, False)
     assert "…" not in table and table.count("<tr") == 1 + len(compared(state.layout))
 
 
-def test_a_method_that_fails_keeps_nobody_else_waiting(worker: Worker) -> None:
+def test_a_method_that_fails_keeps_nobody_else_waiting(worker: Pool) -> None:
     def load(method: str = "dual", checkpoint: object = None) -> object:
         return load_stand_in("ipopt" if method == "paper" else method)
 
-    done = threading.Event()
-    context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.run.running or done.set())
-    comparison = Comparison(context)
+    comparison = Comparison(context_of(worker, solver=Solver(load=load)))
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
-    assert done.wait(60)
+    until(lambda: not comparison.run.running)
     answers = dict(comparison.run.answers)
     assert answers["paper"] == "ipopt is out of order in this test"
     assert isinstance(answers["sqp"], Allocation)

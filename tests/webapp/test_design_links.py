@@ -5,6 +5,7 @@ import re
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
-from tests.webapp.stand_in import page_of
+from tests.webapp.stand_in import AtOnce
 from webapp.session import Session, files
 from webapp.tasks.designs import Designs
+from webapp.tasks.solver import Solver
 
 
 @pytest.fixture(autouse=True)
@@ -102,8 +104,11 @@ def designs_of(session: Session, browser: Browser) -> Designs:
         if title != "Saved":
             browser.notes.append(text)
 
-    client = SimpleNamespace(gui=None, send_file_download=lambda name, *_, **__: browser.sent.append(name))
-    return Designs(page_of(None, session, client=client, notify=notify))
+    def send(name: str, *_: object, **__: object) -> None:
+        browser.sent.append(name)
+
+    client: Any = SimpleNamespace(gui=None, send_file_download=send)
+    return Designs(client, session, Solver(), AtOnce(), notify)
 
 
 def test_a_new_design_is_whole_and_can_be_taken_back() -> None:

@@ -19,12 +19,12 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.exhaustive import sampled
 from tests.webapp.stand_in import SilentClient, load_stand_in
-from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
-from webapp.tasks import jobs
-from webapp.tasks.background import Workers
+from webapp.tasks import analysing
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
+from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
@@ -34,9 +34,9 @@ WORDS = "out of order"
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
     "webapp.tasks.solver.modes_of",
-    "webapp.tasks.jobs.score_card",
-    "webapp.tasks.jobs.attainable_set",
-    "webapp.tasks.jobs.axis_ranges",
+    "webapp.tasks.analysing.score_card",
+    "webapp.tasks.analysing.attainable_set",
+    "webapp.tasks.analysing.axis_ranges",
 )
 """Where a fault meets a worker's thread."""
 DRAWN = (
@@ -65,7 +65,7 @@ DRAWN = (
 class Tab:
     """One page on a server of its own."""
 
-    def __init__(self, workers: Workers, layout: Any, solver: Solver | None = None) -> None:
+    def __init__(self, workers: Pools, layout: Any, solver: Solver | None = None) -> None:
         self.server = start_server()
         self.client: Any = SilentClient(self.server)
         session = Session(layout, DISPLAY)
@@ -100,14 +100,10 @@ class Tab:
         self.settle()
 
     def settle(self) -> None:
-        view, end = self.view, time.monotonic() + 60
-        jobs = view.jobs
-        while view.busy or any(
-            (jobs.answering.searching, jobs.analyst.busy, jobs.ranging.busy, jobs.both.busy)
-        ):
+        end = time.monotonic() + 60
+        while not self.on_loop(lambda: self.view.is_settled):
             assert time.monotonic() < end
             time.sleep(0.01)
-        self.on_loop(self.view._draw)
 
     def figures(self) -> list[str]:
         """The markup that can be seen in any task, in order, without what no two runs have in common."""
@@ -146,8 +142,8 @@ def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def workers() -> Iterator[Workers]:
-    workers = Workers()
+def workers() -> Iterator[Pools]:
+    workers = Pools()
     with pytest.MonkeyPatch.context() as patch:  # nobody types here, so nothing need come to rest first
         for name in ("jobs.CARD_REST_S", "jobs.REST_S", "answering.SEARCH_REST_S"):
             patch.setattr(f"webapp.tasks.{name}", 0.01)
@@ -156,7 +152,7 @@ def workers() -> Iterator[Workers]:
 
 
 @pytest.fixture(scope="module")
-def tab(workers: Workers) -> Iterator[Tab]:
+def tab(workers: Pools) -> Iterator[Tab]:
     """One page that meets one fault after the other."""
     tab = Tab(workers, BEFORE)
     yield tab
@@ -175,7 +171,7 @@ def tab(workers: Workers) -> Iterator[Tab]:
     ),
 )
 def test_no_figure_of_the_robot_before_stays(
-    workers: Workers, tab: Tab, place: str, fault: Exception, monkeypatch: pytest.MonkeyPatch
+    workers: Pools, tab: Tab, place: str, fault: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: Any, **__: Any) -> Any:
         raise fault
@@ -185,7 +181,7 @@ def test_no_figure_of_the_robot_before_stays(
     whole = tab.figures()
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
-        for known in (jobs.find, jobs.find_ranges):
+        for known in (analysing.find, analysing.find_ranges):
             known.cache_clear()
         tab.open(OPENED)
         shown = tab.figures()

@@ -12,17 +12,17 @@ import viser
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.exhaustive import sampled
-from tests.webapp.stand_in import SilentClient
-from tests.webapp.test_app import app, on_loop, server, until, view
+from tests.webapp.stand_in import LoneBell, SilentClient, until
+from tests.webapp.test_app import app, on_loop, server, view
 from webapp.app import App
-from webapp.panels.frame import View
 from webapp.session import Session
 from webapp.session.lessons import Guide
-from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
+from webapp.tasks.slot import Pool, Slot, Work
 from webapp.tasks.swimming import Swimming
+from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 
@@ -89,7 +89,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
     with monkeypatch.context() as patch:  # while the page is built: widgets keep what they call
         for owner, name in intents():
             patch.setattr(owner, name, broken)
-        view = on_loop(server, lambda: View(client, session, app._solver, app._workers, loop))
+        view = on_loop(server, lambda: View(client, session, app._solver, app._pools, loop))
         assert faults(view) == []
         until(lambda: not view.busy)
         before, told = session.state, 0
@@ -149,46 +149,68 @@ def test_every_widget_survives_a_fault_in_what_is_written(
     assert view.shown is not None and view.shown.target[0] == 0.3 and faults(view) == []
 
 
-def shout(text: str) -> None:
-    raise AssertionError(text)
+def test_a_live_slot_works_on_one_question_and_then_on_the_newest(worker: Pool) -> None:
+    gate, asked = threading.Event(), list[int]()
 
+    def solve(question: int) -> int:
+        asked.append(question)
+        assert gate.wait(30)
+        return question
 
-def test_only_the_newest_waits(worker: Worker) -> None:
-    gate, done = threading.Event(), threading.Event()
-    ran: list[int] = []
-    worker.submit("block", lambda: gate.wait(10) and None, shout)
-    for k in range(100):
-        worker.submit("a", lambda k=k: ran.append(k), shout)
-    worker.submit("end", done.set, shout)
+    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, live=True)
+    for question in range(100):
+        slot.ask(question)
     gate.set()
-    assert done.wait(10)
-    assert ran == [99]
+    until(lambda: not slot.busy)
+    assert asked == [0, 99] and slot.answer == 99
 
 
-def test_askers_take_turns(worker: Worker) -> None:
-    gate, done = threading.Event(), threading.Event()
-    ran: list[str] = []
-    worker.submit("block", lambda: gate.wait(10) and None, shout)
-    for key in ("a", "b", "c", "a"):
-        worker.submit(key, lambda key=key: ran.append(key), shout)
-    worker.forget("b")
-    worker.submit("end", done.set, shout)
+def test_another_slot_is_cancelled_and_a_stale_answer_is_never_taken(worker: Pool) -> None:
+    gate, seen = threading.Event(), list[bool]()
+
+    def solve(question: int, work: Work[int]) -> int:
+        assert gate.wait(30)
+        seen.append(work.cancelled.is_set())
+        return question
+
+    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, watched=True)
+    answers = set()
+    for question in range(3):
+        slot.ask(question)
     gate.set()
-    assert done.wait(10)
-    assert ran == ["a", "c"]
+
+    def ended() -> bool:
+        answers.add(slot.answer)
+        return not slot.busy
+
+    until(ended)
+    assert answers <= {None, 2} and slot.answer == 2 and seen[-1] is False and seen.count(False) == 1
 
 
-def test_a_fault_does_not_end_the_thread(worker: Worker, capsys: pytest.CaptureFixture[str]) -> None:
-    done = threading.Event()
-    told: list[str] = []
+def test_a_question_waits_until_it_rests_and_what_was_asked_costs_nothing(worker: Pool) -> None:
+    asked: list[str] = []
+    slot: Slot[str, None] = Slot(worker, LoneBell(), asked.append, rest_s=0.05)
+    for question in ("a", "b", "c", "c"):
+        slot.ask(question)
+        assert not slot.attend()
+    until(lambda: not slot.busy)
+    slot.ask("c")
+    assert not slot.busy and asked == ["c"]
+    slot.ask("d", at_once=True)
+    worker.submit(lambda: None).result(30)
+    assert asked == ["c", "d"]
 
-    def refuse() -> None:
+
+def test_a_fault_does_not_end_the_thread(worker: Pool, capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse(_question: str) -> None:
         raise FinlabError("not so")
 
-    worker.submit("bad", lambda: 1 / 0, told.append)  # type: ignore[arg-type]
-    worker.submit("refused", refuse, told.append)
-    worker.submit("good", done.set, shout)
-    assert done.wait(10)
-    assert told == ["it failed: division by zero", "not so"]
+    bad: Slot[str, None] = Slot(worker, LoneBell(), lambda _: 1 / 0)  # type: ignore[arg-type,return-value]
+    refused: Slot[str, None] = Slot(worker, LoneBell(), refuse)
+    good: Slot[str, str] = Slot(worker, LoneBell(), str.upper)
+    for slot in (bad, refused, good):
+        slot.ask("a")
+    until(lambda: not any(slot.busy for slot in (bad, refused, good)))
+    assert (bad.error, refused.error) == ("it failed: division by zero", "not so") and good.answer == "A"
     printed = capsys.readouterr().err
     assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"

@@ -3,7 +3,6 @@
 import io
 import threading
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,13 +19,13 @@ from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
-from tests.webapp.stand_in import page_of, until
+from tests.webapp.stand_in import LoneBell, context_of, until
 from webapp.markup.outcomes import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
 from webapp.tasks import fitting
-from webapp.tasks.background import Worker
 from webapp.tasks.fitting import Fitting
+from webapp.tasks.slot import Pool
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
 
@@ -49,43 +48,30 @@ def cell(tmp_path: Path, n: int = 70) -> bytes:
 class Opened:
     """A page without a browser."""
 
-    def __init__(self, worker: Worker) -> None:
-        self.session, self.told, self.refused = Session(load_layout("ucat")), [], []
-        self.told: list[str] = []
-        self.refused: list[str] = []
-        context = page_of(
-            worker,
-            self.session,
-            do=self._do,
-            notify=lambda title, text: self.told.append(f"{title}: {text}"),
-            changed=lambda: self.stages.append(self.fitting.progress),
-        )
-        self.stages: list[str] = []
+    def __init__(self, worker: Pool) -> None:
+        self.session = Session(load_layout("ucat"))
+        context = context_of(worker, self.session)
+        assert isinstance(context.bell, LoneBell)
+        self.refused, self.stages = context.bell.refused, context.bell.stages
         self.fitting = Fitting(context)
-
-    def _do(self, act: Callable[[], object]) -> None:
-        try:
-            act()
-        except FinlabError as error:
-            self.refused.append(str(error))
 
     @property
     def models(self) -> list[str]:
         return [fin.model.type for fin in self.session.state.layout.fins]
 
 
-def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Path, worker: Worker) -> None:
+def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Path, worker: Pool) -> None:
     opened = Opened(worker)
     before, fitting = opened.session.state, opened.fitting
     fitting.start("back_left", "../cell.csv", cell(tmp_path))
     with pytest.raises(FinlabError, match="under way already"):
         fitting.start("back_left", "cell.csv", b"")
-    until(lambda: fitting.findings is not None)
+    until(lambda: fitting.answer is not None)
     until(lambda: opened.session.state != before)
     assert "looking for samples that contradict the others" in opened.stages
     assert opened.models == ["drag", "drag", "table", "drag"]
     assert opened.session.history.undo_name == "Fit back_left"
-    found = fitting.findings
+    found = fitting.answer
     assert found is not None and found.fit is not None and found.upload.content == b""
     card = fit_card(found)
     assert "May be trusted" in card and "1 sample contradicts the others: cell.csv line 7." in card
@@ -101,13 +87,13 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     assert opened.session.state == before
 
 
-def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Worker) -> None:
+def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Pool) -> None:
     opened = Opened(worker)
     opened.session.open_layout(load_layout("bluerov2"))
     before, first = opened.session.state.layout, opened.session.state.layout.actuators[0]
     opened.fitting.start(first.name, "t200.csv", T200.read_bytes())
     until(lambda: opened.session.state.layout != before)
-    found, part = opened.fitting.findings, opened.session.state.layout.actuators[0]
+    found, part = opened.fitting.answer, opened.session.state.layout.actuators[0]
     assert found is not None and isinstance(part, Thruster) and isinstance(part.model, PowerTable)
     assert part.force == (part.model.rows[0][1], part.model.rows[-1][1]) and part.axis == first.axis
     assert "Force -39.91 to 51.44 N" in fit_card(found) and "<b>table</b> of" in model_card(part)
@@ -120,14 +106,14 @@ def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Work
         opened.fitting.start(rudder, "t200.csv", b"")
 
 
-def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
+def test_a_finished_table_is_recognized(tmp_path: Path, worker: Pool) -> None:
     opened = Opened(worker)
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     until(lambda: "table" in opened.models)
     path = str(opened.session.state.layout.fins[2].model.values()["path"])
     opened.fitting.start("front_left", "fin.csv", table_bytes(path))
     until(lambda: opened.models == ["drag", "table", "table", "drag"])
-    found = opened.fitting.findings
+    found = opened.fitting.answer
     assert found is not None and found.fit is None and "fin.csv is a finished table" in fit_card(found)
     assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
     words = model_card(opened.session.state.layout.fins[1])
@@ -148,18 +134,18 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
     ],
 )
 def test_bad_files_get_a_sentence_and_change_nothing(
-    name: str, content: bytes, sentence: str, worker: Worker, cache: Path
+    name: str, content: bytes, sentence: str, worker: Pool, cache: Path
 ) -> None:
     opened = Opened(worker)
     before = opened.session.state
     opened.fitting.start("back_left", name, content)
-    until(lambda: bool(opened.told))
-    assert opened.told[0].startswith(f"Not fitted: {sentence}"), "without the server's folder"
+    until(lambda: bool(opened.refused))
+    assert opened.refused[0].startswith(f"Not fitted: {sentence}"), "without the server's folder"
     assert opened.session.state == before and not opened.fitting.busy and not cache.exists()
 
 
 def test_large_files_and_unknown_fins_are_refused_at_once(
-    worker: Worker, monkeypatch: pytest.MonkeyPatch
+    worker: Pool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened = Opened(worker)
     with pytest.raises(FinlabError, match="nobody"):
@@ -170,20 +156,20 @@ def test_large_files_and_unknown_fins_are_refused_at_once(
     assert not opened.fitting.busy
 
 
-def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Worker) -> None:
+def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Pool) -> None:
     opened, gate = Opened(worker), threading.Event()
     before = opened.session.state
-    worker.submit("hold", lambda: gate.wait(30), lambda _: None)  # type: ignore[arg-type,func-returns-value]
+    worker.submit(lambda: gate.wait(30))
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     opened.fitting.forget()
     gate.set()
-    done = threading.Event()
-    worker.submit("after", done.set, lambda _: None)
-    assert done.wait(60) and opened.session.state == before and opened.stages == []
+    worker.submit(lambda: None).result(60)
+    until(lambda: True)
+    assert opened.session.state == before and opened.stages == []
 
 
 def test_a_cancelled_fit_ends_at_its_next_step(
-    tmp_path: Path, worker: Worker, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, worker: Pool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened, begun, gate = Opened(worker), threading.Event(), threading.Event()
     steps: list[int] = []
@@ -200,23 +186,23 @@ def test_a_cancelled_fit_ends_at_its_next_step(
     assert begun.wait(30)
     opened.fitting.forget()
     gate.set()
-    done = threading.Event()
-    worker.submit("after", done.set, lambda _: None)
-    assert done.wait(60) and steps == [0] and opened.told == []
+    worker.submit(lambda: None).result(60)
+    opened.fitting.attend()
+    assert steps == [0] and opened.refused == []
 
 
-def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worker: Worker) -> None:
+def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worker: Pool) -> None:
     opened, gate = Opened(worker), threading.Event()
-    worker.submit("hold", lambda: gate.wait(30), lambda _: None)  # type: ignore[arg-type,func-returns-value]
+    worker.submit(lambda: gate.wait(30))
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     opened.session.open_layout(load_layout("penta"))
     gate.set()
     until(lambda: bool(opened.refused))
     assert "back_left is no longer what cell.csv was for" in opened.refused[0]
-    assert "table" not in opened.models and opened.fitting.findings is None
+    assert "table" not in opened.models and opened.fitting.answer is None
 
 
-def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Worker) -> None:
+def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Pool) -> None:
     one, other = Opened(worker), Opened(worker)
     content = cell(tmp_path)
     one.fitting.start("back_left", "one.csv", content)
@@ -224,15 +210,15 @@ def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Worker) -> N
     until(lambda: "table" in other.models)
     assert one.models == ["drag", "drag", "table", "drag"]
     assert other.models == ["drag", "table", "drag", "drag"]
-    assert one.fitting.findings is not None and one.fitting.findings.upload.name == "one.csv"
+    assert one.fitting.answer is not None and one.fitting.answer.upload.name == "one.csv"
 
 
-def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
+def test_doubts_come_first(tmp_path: Path, worker: Pool) -> None:
     opened = Opened(worker)
     opened.fitting.start("back_left", "few.csv", cell(tmp_path, 25))
     until(lambda: "table" in opened.models)
-    assert opened.fitting.findings is not None
-    assert fit_card(opened.fitting.findings).startswith(
+    assert opened.fitting.answer is not None
+    assert fit_card(opened.fitting.answer).startswith(
         "<div class='fl'><div class='said'><b class='missing'>Not to be trusted: "
     )
     fin = opened.session.state.layout.fins[2]

@@ -1,8 +1,7 @@
 """A search that is watched, stopped, taken or left; the analyst answers what came to rest."""
 
-import asyncio
 import math
-import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,35 +11,35 @@ from finlab.analysis import mirror_pairs
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Damage, Fin, load_layout
-from tests.webapp.stand_in import page_of, running, until
+from tests.webapp.stand_in import LoneBell, context_of, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.looking import SearchRequest
 from webapp.session.state import State
-from webapp.tasks.background import Newest, Worker
+from webapp.tasks.analysing import Findings, Question, find
 from webapp.tasks.improving import Improver, Room
-from webapp.tasks.jobs import Findings, Question, find
+from webapp.tasks.slot import Pool, Slot
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
 
 
-def test_search_is_cancelled_and_what_it_found_is_offered(worker: Worker) -> None:
-    improver = Improver(page_of(worker))
+def test_search_is_cancelled_and_what_it_found_is_offered(worker: Pool) -> None:
+    improver = Improver(context_of(worker))
     request = SearchRequest("weakest direction")
     improver.start(State(NO_YAW), request)
     with pytest.raises(FinlabError, match="running already"):
         improver.start(State(NO_YAW), request)
     until(lambda: improver.progress is not None and improver.progress.best > improver.progress.before)
-    improver.cancel()
-    until(lambda: improver.findings is not None)
-    assert improver.findings is not None and improver.findings.cancelled and not improver.busy
+    improver.stop()
+    until(lambda: improver.answer is not None)
+    assert improver.answer is not None and improver.answer.cancelled and not improver.busy
     session = Session(NO_YAW)
-    session.accept_layout(improver.findings.layout)
+    session.accept_layout(improver.answer.layout)
     assert session.history.undo_name == "Improve the layout"
     session.undo()
     assert session.state.layout == NO_YAW
     improver.forget()
-    assert improver.findings is None and not improver.busy
+    assert improver.answer is None and not improver.busy
 
 
 def test_bad_searches_are_refused() -> None:
@@ -54,8 +53,8 @@ def test_bad_searches_are_refused() -> None:
             request.with_way(way)
 
 
-def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Worker) -> None:
-    improver = Improver(page_of(worker))
+def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Pool) -> None:
+    improver = Improver(context_of(worker))
     first, second = NO_YAW.names[:2]
     request = replace(SearchRequest("power for a mission"), held=NO_YAW.names[2:])
     request = request.with_way((0.04, 0.01, 0.0, 0.0))
@@ -65,33 +64,34 @@ def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Worker) -> N
     assert bounds[first].mounting_angle[0] == bounds[first].mounting_angle[1]
     improver.start(State(NO_YAW), request)
     until(lambda: improver.progress is not None)
-    improver.cancel()
-    until(lambda: improver.findings is not None)
-    assert improver.findings is not None and improver.findings.goal == "mission_power"
-    assert improver.findings.moved == (first, second)
+    improver.stop()
+    until(lambda: improver.answer is not None)
+    assert improver.answer is not None and improver.answer.goal == "mission_power"
+    assert improver.answer.moved == (first, second)
 
 
-def test_analyst_answers_only_the_question_that_stays(worker: Worker) -> None:
-    asked = threading.Event()
+def test_analyst_answers_only_the_question_that_stays(worker: Pool) -> None:
     layout = load_layout(shipped_layouts()["pair"])
+    asked: list[Question] = []
 
-    async def run() -> Newest[Question, Findings]:
-        analyst: Newest[Question, Findings] = Newest(running(), worker, find, asked.set, 0.1)
-        for k in range(20):
-            moved = layout.replace_actuator(layout.names[0], position=(0.01 * k, 0.2, 0.0))
-            analyst.ask(Question(moved, (), layout, "none"))
-            await asyncio.sleep(0.01)
-        while analyst.busy:
-            await asyncio.sleep(0.02)
-        return analyst
+    def answer(question: Question) -> Findings:
+        asked.append(question)
+        return find(question)
 
-    analyst = asyncio.run(run())
-    assert analyst.findings is not None
-    assert analyst.findings.question.layout.fins[0].position[0] == pytest.approx(0.19)
-    assert analyst.findings.before is not None
+    analyst: Slot[Question, Findings] = Slot(worker, LoneBell(), answer, rest_s=0.1)
+    for k in range(20):
+        moved = layout.replace_actuator(layout.names[0], position=(0.01 * k, 0.2, 0.0))
+        analyst.ask(Question(moved, (), layout, "none"))
+        time.sleep(0.01)
+        analyst.attend()
+    until(lambda: not analyst.busy)
+    assert len(asked) < 4
+    assert analyst.answer is not None
+    assert analyst.answer.question.layout.fins[0].position[0] == pytest.approx(0.19)
+    assert analyst.answer.before is not None
 
 
-def test_what_is_proposed_can_be_built(worker: Worker) -> None:
+def test_what_is_proposed_can_be_built(worker: Pool) -> None:
     """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that stay."""
     ucat = load_layout(shipped_layouts()["ucat"])
     inside = replace(ucat, actuators=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
@@ -102,11 +102,11 @@ def test_what_is_proposed_can_be_built(worker: Worker) -> None:
     assert any("tail beats inside" in text for text in warnings(stuck))
     room = Room(stuck, 0.02)
     assert room.broken(stuck.position[None], stuck.frames[None])[0] > 0.0
-    improver = Improver(page_of(worker))
+    improver = Improver(context_of(worker))
     request = SearchRequest().with_way((0.15, 0.05, 0.05, 60.0))
     improver.start(State(stuck), request)
-    until(lambda: improver.findings is not None)
-    found = improver.findings
+    until(lambda: improver.answer is not None)
+    found = improver.answer
     assert found is not None and found.improved
     layout = found.layout
     assert warnings(layout) == ()
@@ -127,15 +127,15 @@ def test_what_is_proposed_can_be_built(worker: Worker) -> None:
 @pytest.mark.parametrize(
     ("robot", "lost"), [("bluerov2", 1), ("catamaran", 1), ("turtle_hybrid", 1), ("torpedo", 0)]
 )
-def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worker: Worker) -> None:
+def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worker: Pool) -> None:
     layout = load_layout(robot)
     state = State(layout, Damage(layout.names[:lost]), speed=1.0)
-    improver = Improver(page_of(worker))
+    improver = Improver(context_of(worker))
     improver.start(state, SearchRequest())
     until(lambda: improver.progress is not None or improver.error is not None)
-    improver.cancel()
+    improver.stop()
     until(lambda: not improver.busy)
-    found = improver.findings
+    found = improver.answer
     assert found is not None, improver.error
     assert found.layout.names == layout.names and not set(found.moved) & set(state.failed)
     assert found.layout.actuators[:lost] == layout.actuators[:lost]

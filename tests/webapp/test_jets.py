@@ -17,7 +17,7 @@ from webapp.panels.wrench_tab import jets_table
 from webapp.scene.jet_nodes import cone
 from webapp.session import Session, files
 from webapp.session.state import State
-from webapp.tasks.background import Workers
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 HEAVY = load_layout("bluerov2_heavy")
@@ -63,7 +63,7 @@ def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
 
 @pytest.fixture(scope="module")
 def tab() -> Iterator[Tab]:
-    workers = Workers()
+    workers = Pools()
     tab = Tab(workers, HEAVY, Solver())
     tab.on_loop(lambda: tab.view.do(partial(tab.view.session.ask_for, [str(value) for value in AHEAD])))
     tab.settle()
@@ -93,7 +93,7 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
 
     def fail() -> object:
         view.do(partial(session.toggle_failure, "front_left"))
-        view._refresh()
+        view._write_words()
         return view.board.facts and view.board.facts["both"]
 
     assert tab.on_loop(fail) is None, "no figure stands under another question"

@@ -7,8 +7,7 @@ import pytest
 
 from finlab.layout import load_layout
 from tests.log.conftest import px4_dive
-from tests.webapp.stand_in import page_of
-from tests.webapp.test_modes import Direct
+from tests.webapp.stand_in import Direct, context_of
 from webapp.panels.log_tab import _losses, _said, log_plots, replays_table
 from webapp.session import Session
 from webapp.tasks.log_reading import LogReading
@@ -19,14 +18,15 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, LogReadin
     """A dive whose yaw was out of reach for a while."""
     path = px4_dive(tmp_path_factory.mktemp("log") / "dive.ulg", n=600).path
     session = Session(load_layout("ucat"))
-    reading = LogReading(page_of(Direct(), session))
+    reading = LogReading(context_of(Direct(), session))
     reading.open("../some where/dive.ulg", path.read_bytes())
+    reading.attend()
     assert reading.error is None and session.desk.task == "Log"
     return session, reading
 
 
 def test_it_says_what_was_lost_and_draws_it(judged: tuple[Session, LogReading]) -> None:
-    log = judged[1].findings
+    log = judged[1].answer
     assert log is not None and log.source == "dive.ulg"
     said = _said(log, None, None)
     assert "Yaw (Tz) was lost" in said and "--" not in said
@@ -41,7 +41,7 @@ def test_it_says_what_was_lost_and_draws_it(judged: tuple[Session, LogReading]) 
 
 def test_a_moment_of_it_is_put_on_the_robot(judged: tuple[Session, LogReading]) -> None:
     session, reading = judged
-    log = reading.findings
+    log = reading.answer
     assert log is not None
     spell = log.spells[0]
     reading.jump(0.5 * (spell.start + spell.end))
@@ -54,22 +54,11 @@ def test_a_moment_of_it_is_put_on_the_robot(judged: tuple[Session, LogReading]) 
 
 
 def test_what_is_no_log_is_refused_in_a_sentence(judged: tuple[Session, LogReading], tmp_path: Path) -> None:
-    session, notes = Session(load_layout("ucat")), []
-    reading = LogReading(page_of(Failing(), session, notify=lambda *words: notes.append(words)))
+    session = Session(load_layout("ucat"))
+    reading = LogReading(context_of(Direct(), session))
     reading.open("dive.ulg", b"no log")
-    assert (
-        reading.findings is None and reading.error is not None and str(tmp_path.parent) not in reading.error
-    )
-    assert notes == [("Not judged", reading.error)] and "/tmp" not in reading.error
+    assert reading.attend() and reading.answer is None and reading.error is not None
+    assert str(tmp_path.parent) not in reading.error and "/tmp" not in reading.error
+    assert reading.is_error_new and reading.title == "Not judged"
     reading.choose_robot(True)
     assert reading.question is not None and reading.question.robot == session.state.layout
-
-
-class Failing(Direct):
-    """Works at once, and says why it failed."""
-
-    def submit(self, key: object, job: object, failed: object) -> None:
-        try:
-            job()  # type: ignore[operator]
-        except Exception as error:
-            failed(str(error))  # type: ignore[operator]

@@ -1,7 +1,6 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.stand_in import AtOnce, load_stand_in, page_of
+from tests.webapp.stand_in import Direct, context_of, load_stand_in
 from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
 from webapp.markup.plot import WIDTH
 from webapp.markup.words import error_digits, small, three_digits
@@ -107,26 +106,20 @@ def test_figures_keep_their_width() -> None:
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
 
 
-class Direct:
-    """Works at once."""
-
-    def submit(self, key: object, job: Callable[[], None], failed: object) -> None:
-        job()
-
-    def forget(self, key: object) -> None:
-        pass
-
-
-def test_a_refinement_is_played_step_by_step_on_the_robot() -> None:
-    session, loop, worker = Session(load_layout("ucat")), AtOnce(), Direct()
+def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("webapp.tasks.answering.SEARCH_REST_S", 0.0)
+    monkeypatch.setattr("webapp.tasks.answering.STEP_S", 0.0)
+    session = Session(load_layout("ucat"))
     session.set_setting("method", "mdn")
-    context = page_of(worker, session, loop=loop)
-    answering = Answering(context, lambda: None)
+    context = context_of(Direct(), session)
+    answering = Answering(context)
     refining = Refining(context, answering)
     with pytest.raises(FinlabError, match="proposes nothing"):
         refining.toggle()
     answering.ask()
-    loop.ring()
+    answering.slot.attend()
+    answering.ask()
+    answering.search.attend()
     modes, best = answering.modes, answering.seen().shown
     assert modes.steps == 2 and not answering.searching
     session.show_mode(1)
@@ -137,17 +130,17 @@ def test_a_refinement_is_played_step_by_step_on_the_robot() -> None:
         assert shown is not None and refining.running
         np.testing.assert_array_equal(shown.command, modes.ways[session.step].command[proposal])
         seen.append(session.step)
-        loop.ring()
+        refining.attend()
     assert seen == [0, 1] and not refining.running and answering.seen().shown not in (None, best)
     np.testing.assert_array_equal(answering.seen().shown.command, modes.shown[1].mode.command)
     session.set_loop(True)
     refining.toggle()
     for _ in range(2 + HOLD):
-        loop.ring()
+        refining.attend()
     assert session.step == 0 and refining.running, "it begins anew"
     session.set_target(1, 0.3)
     assert session.step is None
-    loop.ring()
+    refining.attend()
     assert not refining.running, "another question ends it"
 
 

@@ -8,8 +8,7 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.layout import Layout, load_layout
-from tests.webapp.stand_in import AtOnce, page_of
-from tests.webapp.test_modes import Direct
+from tests.webapp.stand_in import Direct, context_of, until
 from webapp.panels.modes_tab import mode_table
 from webapp.session import Session
 from webapp.session.looking import WAYS
@@ -45,15 +44,22 @@ def test_a_robot_without_another_way_says_so() -> None:
     assert modes.null is not None and modes.null.names == () and len(modes.shown) == 1
 
 
-def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
-    session, loop = Session(HYBRID), AtOnce()
-    answering = Answering(page_of(Direct(), session, solver=Solver(), loop=loop), lambda: None)
-    assert session.drawer == WAYS[1], "the network proposes for fins alone"
+def ask(answering: Answering) -> None:
+    """As a page does, until all is known."""
     answering.ask()
-    loop.ring()
+    until(lambda: not answering.busy)
+    answering.ask()
+    until(lambda: not answering.searching)
+
+
+def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
+    session = Session(HYBRID)
+    answering = Answering(context_of(Direct(), session, Solver()))
+    assert session.drawer == WAYS[1], "the network proposes for fins alone"
+    ask(answering)
     best = answering.seen().shown
     session.shift(0, 5.0)
-    answering.ask()
+    ask(answering)
     seen = answering.seen()
     assert seen.shown is not seen.best is best and seen.shown is not None and best is not None
     assert seen.shown.reachable and seen.shown.power > best.power

@@ -20,7 +20,7 @@ from webapp.panels.actuator_list import actuator_list
 from webapp.session import Session, files
 from webapp.session.state import State
 from webapp.session.targets import axis_reach, full_thrust
-from webapp.tasks.background import Workers
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 HYBRID, BLUEROV = load_layout("turtle_hybrid"), load_layout("bluerov2_heavy")
@@ -53,7 +53,7 @@ FISH = Layout(
 @pytest.fixture(scope="module")
 def tab() -> Iterator[Tab]:
     """One page, at a robot of fins."""
-    workers = Workers()
+    workers = Pools()
     tab = Tab(workers, load_layout("ucat"), Solver())
     yield tab
     tab.close()

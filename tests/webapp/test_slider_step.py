@@ -18,7 +18,7 @@ from finlab.layout import load_layout
 from tests.webapp.test_faults import Tab
 from tests.webapp.test_faults_in_handlers import handles, use
 from webapp.board import Board, Facts
-from webapp.tasks.background import Workers
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 OURS = tuple(f"{Path(room.__file__).parent}/" for room in (finlab, webapp))
@@ -57,7 +57,7 @@ def count() -> Iterator[Count]:
 
 @pytest.fixture(scope="module")
 def tab(count: Count) -> Iterator[Tab]:
-    workers = Workers()
+    workers = Pools()
     tab = Tab(workers, load_layout("ucat"), Solver())
     tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.set_display("drawn", "none")))
     yield tab

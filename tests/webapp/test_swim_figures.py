@@ -14,14 +14,14 @@ from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Damage, Layout, load_layout
 from finlab.sim import Fault, make_trajectory
-from tests.webapp.stand_in import page_of, until
+from tests.webapp.stand_in import AtOnce, context_of, until
 from tests.webapp.test_swimming import SHORT, now
 from webapp.markup.outcomes import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.state import State
 from webapp.session.swim_plan import SCENARIOS, Plan, SwimSettings
-from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
+from webapp.tasks.slot import Pool
 from webapp.tasks.swimmer import POWER, Figures, Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
@@ -31,12 +31,13 @@ UCAT = load_layout("ucat")
 class Shelf:
     """A page's tasks, and what was sent to its browser."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: Pool) -> None:
         self.sent: dict[str, bytes] = {}
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
-        context = page_of(worker, client=client)
+        context = context_of(worker)
         self.swimming = Swimming(context)
-        self.files = Designs(context)
+        silent: Any = None
+        self.files = Designs(client, silent, context.solver, AtOnce(), lambda *_, **__: None)
 
     def begun(self) -> Swimmer:
         assert self.swimming.swimmer is not None
@@ -53,10 +54,10 @@ class Shelf:
 
 
 @pytest.fixture
-def shelf(worker: Worker) -> Iterator[Shelf]:
+def shelf(worker: Pool) -> Iterator[Shelf]:
     shelf = Shelf(worker)
     yield shelf
-    shelf.swimming.stop()
+    shelf.swimming.halt()
 
 
 def test_what_a_swim_comes_to(shelf: Shelf) -> None:

@@ -11,11 +11,12 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import Trajectory, make_trajectory
-from tests.webapp.stand_in import load_stand_in, until
+from tests.webapp.stand_in import LoneBell, context_of, load_stand_in, until
 from webapp.markup.outcomes import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
+from webapp.tasks.slot import Pool
 from webapp.tasks.solver import Solver
 from webapp.tasks.swimmer import ERROR, FORCES, TIME
 from webapp.tasks.swimming import LAG_S, Swimming
@@ -41,6 +42,7 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     begin(swimming, method="analytic")
     while not swimming.done:
         swimming.tick(0.05)
+        swimming.attend()
         time.sleep(0.002)
     assert not swimming.running and swimming.time == pytest.approx(2.0)
     first = swimming.swimmer
@@ -60,7 +62,7 @@ def test_a_slow_machine_drops_time_instead_of_piling_it_up(swimming: Swimming) -
     begin(swimming, path=make_trajectory("circle"))
     for _ in range(100):
         swimming.tick(1.0)  # a hundred seconds pass while the first stretch is swum
-    until(lambda: not swimming._stretch.busy)
+    until(lambda: not swimming.busy)
     assert swimming.pace._owed <= LAG_S and swimming.time <= 3 * LAG_S
 
 
@@ -103,13 +105,15 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
     assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))
 
 
-def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
+def test_bad_plans_and_methods_out_of_order(worker: Pool) -> None:
     settings = SwimSettings()
     assert settings.plan(State(UCAT, method="qp")).method == "qp", "that of the bar"
-    swimming._solver = Solver(load=lambda *_, **__: load_stand_in("ipopt"))
-    swimming.start(Plan(UCAT, (), make_trajectory("circle"), "qp"))
-    until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
-    assert not swimming.active
+    solver = Solver(load=lambda *_, **__: load_stand_in("ipopt"))
+    refused = Swimming(context_of(worker, solver=solver))
+    refused.start(Plan(UCAT, (), make_trajectory("circle"), "qp"))
+    until(lambda: not refused.active)
+    bell = refused._bell
+    assert isinstance(bell, LoneBell) and "cannot go on: ipopt is out of order" in bell.refused[0]
 
 
 def test_a_long_record_is_thinned(swimming: Swimming, monkeypatch: pytest.MonkeyPatch) -> None:

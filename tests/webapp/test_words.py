@@ -39,7 +39,8 @@ from webapp.session import Session, files
 from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
-from webapp.tasks.jobs import Question, Run, find
+from webapp.tasks.analysing import Question, find
+from webapp.tasks.comparing import Run
 from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
 

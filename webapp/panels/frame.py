@@ -86,6 +86,9 @@ class Frame:
 
     def __init__(self, page: Page) -> None:
         self._page, gui = page, page.gui
+        gui.main_panel.dock_right()
+        gui.set_panel_label("finlab")
+        places.add_keys(page)
         run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         page.board.group()
@@ -184,13 +187,3 @@ def _strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
     attributes = html("class='fold' aria-label='{}' title='{}'", word, word)
     tabs.append(button("▴" if folded else "▾", "fold", "", attributes))
     return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", tabs)
-
-
-class View(Page):
-    """Panels and scene of one client around its session."""
-
-    def _build(self) -> None:
-        self.gui.main_panel.dock_right()
-        self.gui.set_panel_label("finlab")
-        places.add_keys(self)
-        self.frame = Frame(self)

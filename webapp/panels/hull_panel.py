@@ -32,7 +32,7 @@ def add_hull(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def load(name: str, content: bytes) -> None:
-        page.context.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
+        page.deferred.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
 
     def take(hull: Hull) -> None:
         """Mesh files do not say in which unit they are: where it need not be metres, the user says it."""
@@ -96,7 +96,7 @@ def _add_turns(page: Page) -> None:
         if hull is None:
             raise FinlabError("the hull is drawn from a shape; import a mesh first")
         matrix, name = rotation.as_matrix(), f"Turn the hull about {axis}"
-        page.context.make(
+        page.deferred.make(
             lambda: _drawn(page, reshaped_hull(hull, lambda mesh: turned(mesh, matrix))),
             partial(put_on, name, hull),
             "hull",

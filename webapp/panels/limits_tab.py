@@ -15,7 +15,7 @@ from webapp.markup.words import fins_words, html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
-from webapp.tasks.jobs import Findings
+from webapp.tasks.analysing import Findings
 
 
 def add_reach(page: Page) -> None:
@@ -51,7 +51,7 @@ def add_improving(page: Page) -> None:
         change(SearchRequest.with_way, way)
 
     def accept() -> None:
-        result = improver.findings
+        result = improver.answer
         improver.forget()
         if result is not None:
             session.accept_layout(result.layout)
@@ -89,7 +89,7 @@ def add_improving(page: Page) -> None:
     bar = gui.add_progress_bar(0.0, visible=False)
     board.show(bar, value=lambda progress: 100.0 * progress.round / progress.n_rounds if progress else 0.0)
     offered = "What was found so far is offered."
-    cancel = page.add_button("Cancel", improver.cancel, icon=viser.Icon.X, visible=False, hint=offered)
+    cancel = page.add_button("Cancel", improver.stop, icon=viser.Icon.X, visible=False, hint=offered)
     for handle in (bar, cancel):
         board.show(handle, visible=lambda improving: improving)
     add_html(gui, marker("fl-verdict"))

@@ -41,7 +41,7 @@ def add_log(page: Page) -> None:
 
 
 def _improve(page: Page) -> None:
-    judged = page.jobs.log.findings
+    judged = page.jobs.log.answer
     if judged is not None and judged.improved is not None:
         page.jobs.log.use(judged.improved, f"Robot for {judged.source}")
 
@@ -62,7 +62,7 @@ def add_losses(page: Page) -> None:
     """What was lost on each axis, and when; a spell that is pressed is put on the robot."""
 
     def jump(key: str, _held: str) -> None:
-        judged = page.jobs.log.findings
+        judged = page.jobs.log.answer
         spells = () if judged is None else judged.spells
         page.jobs.log.jump(spells[placed(key, len(spells))].start)
 

@@ -16,7 +16,7 @@ from webapp.markup.verdict import Verdict, verdict_of
 from webapp.markup.words import error_digits, html, marker, source_words, three_digits, unlearned_sentence
 from webapp.page import Page
 from webapp.session.state import DRAWING, State, least_of
-from webapp.tasks.jobs import Run
+from webapp.tasks.comparing import Run
 from webapp.tasks.solver import Modes
 from webapp.theme import MODE_COLORS, css
 

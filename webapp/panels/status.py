@@ -17,7 +17,7 @@ from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
-from webapp.tasks.jobs import Findings
+from webapp.tasks.analysing import Findings
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, TAKEN, WATER, css

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet, Improvement, Progress
@@ -15,16 +16,17 @@ from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
 from webapp.board import Board
 from webapp.handles import put
+from webapp.intents import Intents
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
+from webapp.session import Session
 from webapp.session.looking import DRAWN, Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.background import Context
-from webapp.tasks.jobs import Findings
+from webapp.tasks.analysing import Findings
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color
 from webapp.viser_internals import run_script
@@ -43,8 +45,8 @@ FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
-    def __init__(self, context: Context, board: Board) -> None:
-        self._client, self._session, self._do = context.client, context.session, context.do
+    def __init__(self, client: viser.ClientHandle, session: Session, board: Board, intents: Intents) -> None:
+        self._client, self._session, self._do = client, session, intents.do
         self._board = board
         scene, session = self._client.scene, self._session
         self.root = scene.add_frame("/robot", show_axes=False)

@@ -1,7 +1,7 @@
 """The view of one page: the robot that is designed, or the one that swims in its water."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,16 @@ from finlab.arrays import Array
 from finlab.hull.mesh_file import Mesh
 from webapp.board import Board
 from webapp.handles import put
+from webapp.intents import Intents
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
+from webapp.session import Session
 from webapp.session.files import file_stem
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.background import Context
 from webapp.tasks.swimmer import PLACE, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
@@ -33,19 +34,19 @@ class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
 
     def __init__(
-        self, context: Context, swimming: Swimming, board: Board, fault: Callable[[Exception], None]
+        self, client: viser.ClientHandle, session: Session, swimming: Swimming, board: Board, intents: Intents
     ) -> None:
-        """`board` lets it show the facts, `fault` tells of what went wrong with that."""
-        self._client, self._session, self._swimming = context.client, context.session, swimming
+        """`board` lets it show the facts, `intents` takes what a user does in the view."""
+        self._client, self._session, self._swimming = client, session, swimming
         self._stop: Stop | None = None
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
-        self._fault = fault
+        self._fault = intents.fault
         self._scale = self._swam = FIRST
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
         board.group(self._fail, is_view=True)
         board.act(self._show)
-        self.robot = RobotScene(context, board)
+        self.robot = RobotScene(client, session, board, intents)
         self.swim = SwimScene(self._client, swimming, self.robot.root)
         board.act(self.swim.refresh)
 
@@ -95,7 +96,7 @@ class Scenery:
     def end_swim(self) -> None:
         """Go back from the robot that swims to the one that is designed."""
         if self._swimming.active:
-            self._swimming.stop()
+            self._swimming.halt()
             self.robot.look_from("3D")
 
     def follow_guide(self) -> None:

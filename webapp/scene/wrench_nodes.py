@@ -16,7 +16,7 @@ from webapp.handles import put
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
-from webapp.tasks.jobs import Findings
+from webapp.tasks.analysing import Findings
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING, REACH, Rgb
 

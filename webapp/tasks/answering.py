@@ -1,7 +1,6 @@
 """The newest answer of one page, its modes and their refinement, and what of them is shown."""
 
-import asyncio
-from collections.abc import Callable
+import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +10,16 @@ from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.looking import WAYS
-from webapp.tasks.background import Context, Newest
-from webapp.tasks.null_ways import null_modes
+from webapp.session.state import State
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Slot
 from webapp.tasks.solver import NO_MODES, Modes, Reply
+from webapp.tasks.ways import Search, find_ways
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
+PROVED = ("Allocate", "Log")
+"""Tasks in which it is said how far an answer may be from the best."""
 STEP_S = 0.2
 """Time between two steps [s]."""
 HOLD = 5
@@ -48,38 +51,39 @@ class Seen(NamedTuple):
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
-    def __init__(self, context: Context, known: Callable[[], None]) -> None:
-        """Answer what the page's session asks; `known` is called when its candidates are."""
+    def __init__(self, context: Context) -> None:
+        """Answer what the page's session asks."""
         self._session: Session = context.session
-        self._changed, self._known, self._notify = context.changed, known, context.notify
-        self._noted: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
-        self._solver, loop, worker = context.solver, context.loop, context.workers.answers
-        self._answer = Newest(loop, worker, self._solver.reply, self._take)
-        self._search = Newest(loop, worker, self._modes, self._take_modes, SEARCH_REST_S)
+        pool, bell, solver = context.pools.answers, context.bell, context.solver
+        self.slot: Slot[State, Reply] = Slot(pool, bell, solver.reply, live=True, title="No answer")
+        self.search: Slot[Search, Modes] = Slot(
+            pool, bell, find_ways, rest_s=SEARCH_REST_S, title="No candidates"
+        )
+        self._solver = solver
 
     @property
     def modes(self) -> Modes:
         """The ways to do what an answer does, known after a moment of rest; until then those of the answer
         before, of which none can be chosen."""
-        return self._search.findings or NO_MODES
+        return self.search.answer or NO_MODES
 
     @property
     def busy(self) -> bool:
         """True while the newest answer is older than the state."""
-        return self._answer.answered != self._session.state
+        return self.slot.answered != self._session.state
 
     @property
     def searching(self) -> bool:
         """True until all modes of the newest answer are known."""
-        return self.busy or self._search.busy
+        return self.busy or self.search.busy
 
     def seen(self) -> Seen:
         """What is seen of the newest answer now."""
-        session, search, reply = self._session, self._search, self._answer.findings
-        busy, modes, mode = self.busy, search.findings or NO_MODES, session.mode
+        session, search, reply = self._session, self.search, self.slot.answer
+        busy, modes, mode = self.busy, search.answer or NO_MODES, session.mode
         searching = busy or search.busy
-        known = search.answered is not None and search.answered[0] is reply
+        known = search.answered is not None and search.answered.reply is reply
         best = shown = None if reply is None else reply.answer
         steps = 0 if searching else modes.steps
         step = session.step if steps else None
@@ -90,9 +94,16 @@ class Answering:
             elif 0 < mode < len(modes.shown):
                 shown = self._variant(best, modes.shown[mode].mode.command)
         return Seen(
-            *(best, shown, reply is not None and reply.in_reach, busy, None if busy else self._answer.error),
-            *(modes, searching, busy or not known),
-            *(min(mode, max(len(modes.shown) - 1, 0)), step),
+            best=best,
+            shown=shown,
+            in_reach=reply is not None and reply.in_reach,
+            busy=busy,
+            error=None if busy else self.slot.error,
+            modes=modes,
+            searching=searching,
+            proving=busy or not known,
+            mode=min(mode, max(len(modes.shown) - 1, 0)),
+            step=step,
         )
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
@@ -103,61 +114,46 @@ class Answering:
         return known[2]
 
     def ask(self) -> None:
-        """Have the worker answer the present state, unless it was asked already."""
-        self._answer.ask(self._session.state)
-        if not self.busy:
-            self._look(at_once=True)
-
-    def _look(self, at_once: bool) -> None:
-        """Prove the newest answer, and search for its modes once these can be seen."""
-        reply, session, before = self._answer.findings, self._session, self._search.question
-        kept = "" if before is None else before[1]
-        kind = drawer if (drawer := session.drawer) in WAYS else kept * (session.mode > 0)
-        known = before is not None and before[0] is reply and not kind  # it is proved, and not looked at
-        if reply is not None and not known:
-            self._search.ask((reply, kind, session.shifts if kind == WAYS[1] else ()), at_once)
+        """Have the present state answered; then have the answer proved, where that is said, and its modes
+        found, where these can be seen."""
+        session = self._session
+        self.slot.ask(session.state)
+        reply, before = self.slot.answer, self.search.question
+        if reply is None:
+            self.search.forget()
+            return
+        drawer = session.drawer
+        if session.desk.task not in PROVED:
+            return
+        kind = "" if drawer is None else drawer
+        if kind not in WAYS:  # a mode that is chosen stays on the robot when the drawer is closed
+            kind = before.kind if before is not None and session.mode > 0 else ""
+        known = before is not None and before.reply is reply
+        if known and not kind:  # it is proved, and its modes are not looked at
+            return
+        shifts = session.shifts if kind == WAYS[1] else ()
+        # A drawer that is opened has rested already.
+        self.search.ask(Search(self._solver, reply, kind, shifts), at_once=known)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
-        for task in (self._answer, self._search):
-            task.forget()
-
-    def _modes(self, question: tuple[Reply, str, tuple[float, ...]]) -> Modes:
-        """On the worker's thread."""
-        reply, kind, shifts = question
-        modes = self._solver.modes(reply, seen=kind == WAYS[0])
-        return null_modes(reply.answer, shifts) if kind == WAYS[1] else modes
-
-    def _take(self) -> None:
-        error = self._answer.error
-        if self._answer.findings is not None:
-            self._look(at_once=False)
-        else:
-            self._search.forget()
-            if error is not None and error != self._noted:
-                self._notify("No answer", error)
-        self._noted = error
-        self._changed()
-
-    def _take_modes(self) -> None:
-        if self._search.error is not None:
-            self._notify("No candidates", self._search.error)
-        self._known()
+        self.slot.forget()
+        self.search.forget()
 
 
 class Refining:
     """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said."""
 
     def __init__(self, context: Context, answering: Answering) -> None:
-        self._session, self._loop, self._changed = context.session, context.loop, context.changed
+        self._session, self._bell = context.session, context.bell
         self._answering = answering
-        self._timer: asyncio.TimerHandle | None = None
+        self._due: float | None = None
         self._held = 0
 
     @property
     def running(self) -> bool:
         """Whether it goes on by itself."""
-        return self._timer is not None
+        return self._due is not None
 
     def toggle(self) -> None:
         """Play, from the proposals where the end is shown, or pause. FinlabError: nothing can be played."""
@@ -175,9 +171,7 @@ class Refining:
 
     def stop(self) -> None:
         """Stay where it is."""
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer = None
+        self._due = None
 
     def hold(self, step: Any) -> None:
         """Stay at a step."""
@@ -185,10 +179,14 @@ class Refining:
         self._session.show_step(int(step), self._answering.modes.steps)
 
     def _wait(self) -> None:
-        self._timer = self._loop.later(STEP_S, self._go_on)
+        self._due = time.monotonic() + STEP_S
+        self._bell.ring_later(STEP_S, self)
 
-    def _go_on(self) -> None:
-        session, steps, self._timer = self._session, self._answering.modes.steps, None
+    def attend(self) -> bool:
+        """Take the next step, when its time has come."""
+        if self._due is None or time.monotonic() < self._due:
+            return False
+        session, steps, self._due = self._session, self._answering.modes.steps, None
         looked_at = session.opened == WAYS[0]
         if self._answering.searching or not steps or not looked_at:
             session.step = None
@@ -201,4 +199,4 @@ class Refining:
                 session.step = 0 if self._held >= HOLD else None
             if session.step is not None or session.loops:
                 self._wait()
-        self._changed()
+        return True

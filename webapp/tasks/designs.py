@@ -5,6 +5,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
 
+import viser
+
 from finlab.allocation.allocation import Allocation
 from finlab.deploy.bundle import graph_text, make_bundle
 from finlab.deploy.design_files import Opened
@@ -14,11 +16,11 @@ from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
 from finlab.hull import hull_of
 from webapp.handles import Presses
-from webapp.session import files
+from webapp.session import Session, files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
-from webapp.tasks.background import Context
-from webapp.tasks.solver import Modes
+from webapp.tasks.slot import Deferred
+from webapp.tasks.solver import Modes, Solver
 from webapp.tasks.swimming import Swimming
 from webapp.tasks.ways_file import ways_csv
 from webapp.viser_internals import run_script
@@ -38,8 +40,17 @@ Take = Callable[[str, bytes], object]
 class Designs:
     """What one page does with its design; files are made beside the event loop."""
 
-    def __init__(self, context: Context) -> None:
-        self._context, self._session = context, context.session
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        solver: Solver,
+        deferred: Deferred,
+        notify: Callable[..., None],
+    ) -> None:
+        """`notify` shows a note: title and sentence, and whether it is `calm`."""
+        self._client, self._session, self._solver = client, session, solver
+        self._deferred, self._notify = deferred, notify
 
     def new(self, kind: str) -> None:
         """A robot with one hull and one actuator of a type."""
@@ -63,20 +74,20 @@ class Designs:
             hull_of(opened.layout)  # what is drawn of it takes its time
             return opened
 
-        self._context.make(ready, partial(self._take, wrench), "open")
+        self._deferred.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
         self._session.open_layout(opened.layout, failed=opened.lost)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
-            self._context.notify("Opened from a link", text, calm=True)
+            self._notify("Opened from a link", text, calm=True)
         if wrench:
             self._session.ask_for(wrench.split(","))
         if opened.notes:
-            self._context.notify(f"Opened {opened.layout.name}", " ".join(opened.notes), calm=True)
+            self._notify(f"Opened {opened.layout.name}", " ".join(opened.notes), calm=True)
         for file in opened.missing:
             text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
-            self._context.notify("Without its hull", text)
+            self._notify("Without its hull", text)
 
     def save(self) -> None:
         """Send the design's file to the browser."""
@@ -86,7 +97,7 @@ class Designs:
             self._download(*file)
             self._session.saved = layout
 
-        self._context.make(partial(files.layout_file, layout), send, "save")
+        self._deferred.make(partial(files.layout_file, layout), send, "save")
 
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
@@ -95,14 +106,14 @@ class Designs:
         def show(text: str) -> None:
             wrench = WRENCH + ",".join(f"{value:.6g}" for value in target)
             card = json.dumps([f"Share {layout.name}", SHARED, FRAGMENT + text + wrench])
-            run_script(self._context.client.gui, f"finlabCards.share(...{card});")
+            run_script(self._client.gui, f"finlabCards.share(...{card});")
 
-        self._context.make(partial(packed, layout), show, "share")
+        self._deferred.make(partial(packed, layout), show, "share")
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried out on the
         page does not go to the robot."""
-        now, solver = self._session.state, self._context.solver
+        now, solver = self._session.state, self._solver
         shipped = State(now.layout, method=now.method)
         self._export(
             file_stem(now.layout.name) + files.BUNDLE,
@@ -128,11 +139,11 @@ class Designs:
         self._export(f"{name}.npz", log.npz)
 
     def _export(self, name: str, make: Callable[[], bytes]) -> None:
-        self._context.make(make, partial(self._download, name), name)
+        self._deferred.make(make, partial(self._download, name), name)
 
     def _download(self, name: str, content: bytes) -> None:
-        self._context.client.send_file_download(name, content, save_immediately=True)
-        self._context.notify("Saved", f"{name}, among the downloads of this browser", calm=True)
+        self._client.send_file_download(name, content, save_immediately=True)
+        self._notify("Saved", f"{name}, among the downloads of this browser", calm=True)
 
 
 class Opening:

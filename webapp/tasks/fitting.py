@@ -5,7 +5,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,8 @@ from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker
 from finlab.layout import Actuator, Fin
 from webapp.session.files import table_folder
-from webapp.tasks.background import Context, Newest
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Slot, Work
 
 if TYPE_CHECKING:  # scipy takes its time, and only who fits needs it
     from finlab.fit.fin_fit import FinFit
@@ -47,12 +47,17 @@ class Fitted:
     """The fit; None where the file was a finished table."""
 
 
-class Fitting(Newest[Upload, Fitted]):
+class Fitting(Slot[Upload, Fitted]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it off."""
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context.loop, context.workers.fits, self._fit, self._put_on)
-        self._context = context
+        super().__init__(context.pools.long, context.bell, fitted, watched=True, title="Not fitted")
+        self._session = context.session
+
+    @property
+    def progress(self) -> str | None:
+        """What is done with the file."""
+        return (super().progress or "reading the file") if self.busy else None
 
     def start(self, actuator: str, name: str, content: bytes) -> None:
         """Begin with a file for an actuator. FinlabError: another file is under way, the file is too large,
@@ -65,66 +70,63 @@ class Fitting(Newest[Upload, Fitted]):
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter "
                 "series, write cycle means, or use `finlab fit fin`"
             )
-        part = self._context.session.state.layout.part(actuator)
+        part = self._session.state.layout.part(actuator)
         if not part.MODELS:
             raise FinlabError(f"{actuator} is a {part.type}, without a table; type its coefficients")
         self.forget()
-        self.progress = "reading the file"
         self.ask(Upload(part, short, content))
 
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        fitted, session = self.findings, self._context.session
-        if fitted is not None:
-            old = fitted.upload.part
+        found, session = self.answer, self._session
+        if found is not None:
+            old = found.upload.part
             alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
             if not alike:
                 raise FinlabError("no other actuator has the model that this one had")
-            session.set_model(alike, **fitted.found)
+            session.set_model(alike, **found.found)
 
-    def _put_on(self) -> None:
-        """On the loop, when there is progress, and when the worker is done."""
-        context = self._context
-        if self.findings is not None:
-            context.do(partial(self._take_over, self.findings))
-            return
-        if self.error is not None:
-            context.notify("Not fitted", self.error)
-        context.changed()
+    def attend(self) -> bool:
+        """Put what was found on its actuator. FinlabError: that is another one by now."""
+        was_busy, came = self.busy, super().attend()
+        if was_busy and not self.busy and self.answer is not None:
+            self._put_on(self.answer)
+        return came
 
-    def _take_over(self, fitted: Fitted) -> None:
-        upload, session = fitted.upload, self._context.session
+    def _put_on(self, fitted: Fitted) -> None:
+        upload, session = fitted.upload, self._session
         name, layout = upload.part.name, session.state.layout
         if name not in layout.names or _model(layout.part(name)) != _model(upload.part):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
         session.set_model([name], **fitted.found)
 
-    def _fit(self, upload: Upload) -> Fitted:
-        """On the worker's thread."""
-        done = Upload(upload.part, upload.name, b"")
-        with as_file(upload.name, upload.content) as path:
-            if not isinstance(upload.part, Fin):
-                return _bench(path, done)
-            if in_worker(_is_table, path):
-                return Fitted(done, {"model": stored_table(upload.content, table_folder())})
-            return self._fit_measurements(path, upload, done)
 
-    def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
-        from finlab.fit.fin_fit import fin_csv, fit_fin
-        from finlab.fit.measurements import read_measurements
+def fitted(upload: Upload, work: Work[Upload]) -> Fitted:
+    """What a file is worth for its actuator. FinlabError: it cannot be read or fitted, or nobody waits."""
+    done = Upload(upload.part, upload.name, b"")
+    with as_file(upload.name, upload.content) as path:
+        if not isinstance(upload.part, Fin):
+            return _bench(path, done)
+        if in_worker(_is_table, path):
+            return Fitted(done, {"model": stored_table(upload.content, table_folder())})
+        return _measured(path, done, work)
 
-        tell = partial(self._tell, upload)
-        fit = fit_fin(in_worker(read_measurements, [path]), progress=tell)
-        tell("writing the table")
-        model = stored_table(fin_csv(fit).encode(), table_folder())
-        return Fitted(done, {"model": model}, fit)
 
-    def _tell(self, upload: Upload, words: str) -> None:
-        """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
-        if upload is not self.question:
+def _measured(path: Path, done: Upload, work: Work[Upload]) -> Fitted:
+    """A fin by noisy measurements; a fit whose result is not waited for ends before its next step."""
+    from finlab.fit.fin_fit import fin_csv, fit_fin
+    from finlab.fit.measurements import read_measurements
+
+    def tell(words: str) -> None:
+        if work.cancelled.is_set():
             raise FinlabError("cancelled")
-        self.report(upload, words)
+        work.report(words)
+
+    fit = fit_fin(in_worker(read_measurements, [path]), progress=tell)
+    tell("writing the table")
+    model = stored_table(fin_csv(fit).encode(), table_folder())
+    return Fitted(done, {"model": model}, fit)
 
 
 def short_name(name: str) -> str:

@@ -1,22 +1,22 @@
 """A search for a better layout that can be watched, stopped, and taken or left."""
 
 import math
-import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finlab.analysis import AttainableSet, Bounds, Improvement, Progress, attainable_set, optimize_layout
+from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
-from webapp.session.looking import DRAWN, GOAL_WORDS, SearchRequest
+from webapp.session.looking import GOAL_WORDS, SearchRequest
 from webapp.session.state import State
-from webapp.tasks.background import Context, Newest
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Slot, Work
 
 ALONG = np.linspace(ROOT, ROOT + SPAN, 4)
 """Places along a fin's shaft, from where its blade begins to where it ends [m]."""
@@ -73,18 +73,21 @@ class Search:
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
-    stop: threading.Event = field(default_factory=threading.Event)
 
 
-class Improver(Newest[Search, Improvement]):
+class Improver(Slot[Search, Improvement]):
     """One search at a time for one page."""
 
-    def __init__(self, context: Context, drawn: Callable[[], str] = lambda: "none") -> None:
-        """`drawn` says of what the set is drawn, a key of `DRAWN`."""
-        super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
-        self._drawn = drawn
-        self.reach: AttainableSet | None = None
-        """What the best layout so far attains, where a set is drawn; kept while it is offered."""
+    def __init__(self, context: Context) -> None:
+        super().__init__(context.pools.long, context.bell, improve, watched=True)
+
+    @property
+    def best(self) -> Layout | None:
+        """What works of the best layout so far; of the offered one, once the search is done."""
+        if self.answer is not None and self.question is not None:
+            return self.answer.layout.without(self.question.state.failed)
+        progress: Progress | None = self.progress
+        return None if progress is None else progress.layout
 
     def start(self, state: State, request: SearchRequest) -> None:
         """Search from a layout for places of what works; mirror pairs stay mirror pairs. FinlabError: a
@@ -95,48 +98,29 @@ class Improver(Newest[Search, Improvement]):
         self.forget()
         self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
 
-    def cancel(self) -> None:
-        """Stop soon; what has been found by then is offered."""
-        if self.question is not None:
-            self.question.stop.set()
 
-    def forget(self) -> None:
-        """The result has been taken or left, or the page has gone."""
-        self.cancel()
-        super().forget()
-        self.reach = None
+def improve(search: Search, work: Work[Search]) -> Improvement:
+    """The best layout that is found until the work is cancelled, or all rounds are done."""
+    layout, state = search.state.layout, search.state
+    left, rests = layout.without(state.failed), time.monotonic()
 
-    def _improve(self, search: Search) -> Improvement:
-        """On the worker's thread."""
-        layout, state = search.state.layout, search.state
-        left, rests = layout.without(state.failed), time.monotonic()
+    def report(progress: Progress) -> None:
+        nonlocal rests
+        if time.monotonic() >= rests:
+            work.report(progress)
+            rests = time.monotonic() + REST_S
 
-        def report(progress: Progress) -> None:
-            nonlocal rests
-            if time.monotonic() >= rests:
-                self._look(search, progress.layout)
-                self.report(search, progress)
-                rests = time.monotonic() + REST_S
-
-        improvement = optimize_layout(
-            left,
-            tuple(search.bounds),
-            search.bounds,
-            search.goal,
-            rule=Room(left, APART_M).broken,
-            grid=GRID,
-            flow=state.flow,
-            progress=report,
-            cancelled=search.stop.is_set,
-        )
-        self._look(search, improvement.layout)
-        for part in improvement.layout.actuators:
-            layout = layout.with_part(part)
-        return replace(improvement, layout=layout)
-
-    def _look(self, search: Search, layout: Layout) -> None:
-        """What a layout attains, of the kind that is drawn."""
-        kind = DRAWN[self._drawn()]
-        reach = None if kind is None else attainable_set(layout, kind, flow=search.state.flow)
-        if search is self.question:
-            self.reach = reach
+    improvement = optimize_layout(
+        left,
+        tuple(search.bounds),
+        search.bounds,
+        search.goal,
+        rule=Room(left, APART_M).broken,
+        grid=GRID,
+        flow=state.flow,
+        progress=report,
+        cancelled=work.cancelled.is_set,
+    )
+    for part in improvement.layout.actuators:
+        layout = layout.with_part(part)
+    return replace(improvement, layout=layout)

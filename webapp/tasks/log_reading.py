@@ -9,8 +9,9 @@ from finlab.assets import install
 from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
-from webapp.tasks.background import Context, Newest
+from webapp.tasks.context import Context
 from webapp.tasks.fitting import as_file, short_name
+from webapp.tasks.slot import Slot, Work
 
 if TYPE_CHECKING:  # who opens no log needs none of it
     from finlab.log import Judgement
@@ -28,16 +29,21 @@ class LogFile:
     """By whose laws it is judged; None for what its own parameters say."""
 
 
-class LogReading(Newest[LogFile, "Judgement"]):
+class LogReading(Slot[LogFile, "Judgement"]):
     """One log at a time for one page."""
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context.loop, context.workers.fits, self._judge, self._told)
-        self._context, self._session = context, context.session
+        super().__init__(context.pools.long, context.bell, judged, watched=True, title="Not judged")
+        self._session = context.session
         self.by_page = False
         """Whether the page's robot counts, not that of the log's parameters."""
         self.moment: float | None = None
         """Which moment of the log is on the robot [s]."""
+
+    @property
+    def progress(self) -> str | None:
+        """What is done with the log."""
+        return (super().progress or "reading the log") if self.busy else None
 
     def choose_robot(self, by_page: object) -> None:
         """Judge by the page's robot, or by the one that the log tells; a log that is there is judged anew."""
@@ -50,12 +56,11 @@ class LogReading(Newest[LogFile, "Judgement"]):
         self.forget()
         self.moment = None
         self._session.show_task("Log")
-        self.progress = "reading the log"
         self.ask(LogFile(short_name(name), content, self._session.state.layout if self.by_page else None))
 
     def jump(self, time: float) -> None:
         """Put the robot of the log, and the wrench that it asked for at a time [s], on the page."""
-        judged = self.findings
+        judged = self.answer
         if judged is None:
             raise FinlabError("open a log first")
         place = int(np.abs(judged.timeline.time - time).argmin())
@@ -68,19 +73,15 @@ class LogReading(Newest[LogFile, "Judgement"]):
         if self._session.state.layout != layout:
             self._session.open_layout(layout, step)
 
-    def _told(self) -> None:
-        if self.error is not None:
-            self._context.notify("Not judged", self.error)
-        self._context.changed()
 
-    def _judge(self, file: LogFile) -> "Judgement":
-        """On the worker's thread."""
-        try:
-            from finlab.log import judge, read_log
+def judged(file: LogFile, work: Work[LogFile]) -> "Judgement":
+    """What is said of a log. FinlabError: it cannot be read."""
+    try:
+        from finlab.log import judge, read_log
 
-            with as_file(file.name, file.content) as path:
-                log = in_worker(read_log, path, file.robot)
-        except ModuleNotFoundError as error:
-            raise FinlabError(f"{file.name} needs {error.name}; {install('logs')}") from None
-        self.report(file, "asking other methods and policies the same")
-        return judge(log)
+        with as_file(file.name, file.content) as path:
+            log = in_worker(read_log, path, file.robot)
+    except ModuleNotFoundError as error:
+        raise FinlabError(f"{file.name} needs {error.name}; {install('logs')}") from None
+    work.report("asking other methods and policies the same")
+    return judge(log)

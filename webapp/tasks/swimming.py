@@ -4,13 +4,16 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from finlab.errors import FinlabError
 from finlab.layout.damage import Kind
 from finlab.sim import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
-from webapp.tasks.background import Context, Newest
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Slot
+from webapp.tasks.solver import Solver
 from webapp.tasks.swimmer import Moment, Swimmer, closed_loop
 
 LAG_S = 0.25
@@ -27,29 +30,24 @@ class Stretch:
 
     n_steps: int
     swimmer: Swimmer
+    acts: tuple[Callable[[Swimmer], None], ...] = ()
+    """What is done to the robot before them."""
 
 
-class Swimming:
-    """The swim of one page. All methods but `_made` and `_advance` run on the event loop."""
+class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
+    """The swim of one page: its start, then one stretch after the other."""
 
     def __init__(self, context: Context) -> None:
         # An allocator of its own, for it is used on the thread that swims.
-        self._solver, self._changed, self._notify = context.solver.aside, context.changed, context.notify
-        loop, worker = context.loop, context.workers.swims
-        self._start = Newest(loop, worker, self._made, self._begin)
-        self._stretch = Newest(loop, worker, self._advance, self._take)
+        swim = partial(swum, context.solver.aside)
+        super().__init__(context.pools.swims, context.bell, swim)
         self.swimmer: Swimmer | None = None
         """The robot; None while it is being made."""
         self.active = False
         """Whether there is a swim, running or not."""
         self.running = False
         self.pace = Pace()
-        self._acts: deque[Callable[[Swimmer], None]] = deque()
-
-    @property
-    def busy(self) -> bool:
-        """Whether it is just swimming a stretch."""
-        return self._stretch.busy
+        self._acts: list[Callable[[Swimmer], None]] = []
 
     @property
     def done(self) -> bool:
@@ -63,29 +61,32 @@ class Swimming:
 
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
-        self.stop()
+        self.halt()
         self.running = self.active = True
-        self._start.ask(plan)
+        self.ask(plan)
 
-    def _made(self, plan: Plan) -> Swimmer:
-        allocator = self._solver.allocator(State(plan.layout, method=plan.method))
-        return Swimmer(plan, closed_loop(plan, allocator))
+    def attend(self) -> bool:
+        """Take the robot, or what it has swum. FinlabError: it cannot go on."""
+        was_busy, came = self.busy, super().attend()
+        if not was_busy or self.busy:
+            return came
+        if isinstance(self.answer, Swimmer):
+            self.swimmer = self.answer
+        elif self.answer is not None and self.swimmer is not None:
+            done, self.swimmer.shown = self.answer
+            self.pace.paid(done * self.swimmer.period_s, self.time)
+            self.running = self.running and not self.done
+            if self._acts and not self.running:
+                self._submit(0)
+        else:
+            error = self.error
+            self.halt()
+            raise FinlabError(f"the swim cannot go on: {error}")
+        return True
 
-    def _begin(self) -> None:
-        if self._start.error is not None:
-            self._give_up(self._start.error)
-            return
-        self.swimmer = self._start.findings
-        self._changed()
-
-    def _give_up(self, text: str) -> None:
-        self.stop()
-        self._notify("Not possible", f"the swim cannot go on: {text}")
-
-    def stop(self) -> None:
+    def halt(self) -> None:
         """Give up and forget."""
-        self._start.forget()
-        self._stretch.forget()
+        self.forget()
         self.swimmer, self.running, self.active = None, False, False
         self._acts.clear()
         self.pace.start_anew()
@@ -128,31 +129,25 @@ class Swimming:
             self._submit(n_steps)
 
     def _submit(self, n_steps: int) -> None:
-        if self.swimmer is not None and not self._stretch.busy:
-            self._stretch.ask(Stretch(n_steps, self.swimmer))
+        if self.swimmer is not None and not self.busy:
+            acts, self._acts = tuple(self._acts), []
+            self.ask(Stretch(n_steps, self.swimmer, acts))
 
-    def _advance(self, stretch: Stretch) -> tuple[int, Moment]:
-        """On the worker's thread: some steps, but no longer than the others can wait."""
-        end, done, swimmer = time.monotonic() + BUDGET_S, 0, stretch.swimmer
-        while self._acts:
-            self._acts.popleft()(swimmer)
-        while done < stretch.n_steps and not swimmer.swim.done:
-            swimmer.step()
-            done += 1
-            if time.monotonic() > end:
-                break
-        return done, swimmer.moment()
 
-    def _take(self) -> None:
-        swimmer = self.swimmer
-        if self._stretch.findings is None or swimmer is None:
-            self._give_up(self._stretch.error or "")
-            return
-        done, swimmer.shown = self._stretch.findings
-        self.pace.paid(done * swimmer.period_s, self.time)
-        if self.done:
-            self.running = False
-        self._changed()
+def swum(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Moment]":
+    """A robot at its start; or some steps of one, as many as the others can wait for, and its moment then."""
+    if isinstance(question, Plan):
+        allocator = solver.allocator(State(question.layout, method=question.method))
+        return Swimmer(question, closed_loop(question, allocator))
+    end, done, swimmer = time.monotonic() + BUDGET_S, 0, question.swimmer
+    for act in question.acts:
+        act(swimmer)
+    while done < question.n_steps and not swimmer.swim.done:
+        swimmer.step()
+        done += 1
+        if time.monotonic() > end:
+            break
+    return done, swimmer.moment()
 
 
 class Pace:

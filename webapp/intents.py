@@ -1,0 +1,62 @@
+"""What a user does on one page, and what the page tells of it in notes."""
+
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from finlab.errors import FinlabError
+from webapp.markup.words import in_app
+from webapp.tasks.slot import Bell
+from webapp.theme import BLUE, VERMILLION
+
+
+class Intents:
+    """Carries out intents; nothing else changes a session. What came of it is written when the page wakes.
+
+    Everything here is called on viser's event loop.
+    """
+
+    def __init__(self, client: viser.ClientHandle, bell: Bell) -> None:
+        """`bell` wakes the page after each."""
+        self._client, self._bell = client, bell
+        self._note: viser.NotificationHandle | None = None
+        self._faults: set[str] = set()
+        self.is_new = False
+        """Whether something was done, or went wrong, since the page was written."""
+        self.doubted: list[Any] = []
+        """Handles that a user has changed: the session may have refused it."""
+        self.is_distrusted = False
+        """Whether something went wrong since the page was written: nothing that was drawn is trusted."""
+
+    def do(self, act: Callable[[], object], handle: Any = None) -> None:
+        """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal becomes a
+        note, and the page goes back to what the session holds."""
+        self._faults.clear()
+        try:
+            act()
+        except FinlabError as error:
+            self.notify("Not possible", str(error))
+        except Exception as error:  # the page must go on, whatever we have got wrong
+            self.fault(error)
+        if handle is not None:
+            self.doubted.append(handle)
+        self.is_new = True
+        self._bell.ring()
+
+    def notify(self, title: str, body: str, calm: bool = False) -> None:
+        """Show a note to the user, in place of the last one; a calm one is no warning."""
+        if self._note is not None:
+            self._note.remove()
+        color = BLUE if calm else VERMILLION
+        self._note = self._client.add_notification(title, in_app(body), auto_close_seconds=8.0, color=color)
+
+    def fault(self, error: Exception) -> None:
+        """An error of our own is reported, once however often the page is written."""
+        self.is_distrusted = True
+        text = f"{type(error).__name__}: {error}"
+        if text not in self._faults:
+            self._faults.add(text)
+            traceback.print_exception(error)
+            self.notify("A fault of the app", text)

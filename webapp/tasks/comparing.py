@@ -1,0 +1,78 @@
+"""Several methods on the same question, one after the other."""
+
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+from finlab.allocation.allocation import Allocation
+from webapp.session.state import State, compared
+from webapp.tasks.context import Context
+from webapp.tasks.slot import Slot
+from webapp.tasks.solver import Solver
+
+TRIES = 3
+"""Answers of each method, of whose times the shortest counts: the first one may have to load a network, and
+on a busy machine any may have to wait."""
+
+Answer = Allocation | str
+
+
+class Run(NamedTuple):
+    """One comparison, as far as it has come."""
+
+    state: State | None = None
+    """The question, None before the first run."""
+    answers: tuple[tuple[str, Answer], ...] = ()
+    cancelled: bool = False
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """All of them, in their order."""
+        return () if self.state is None else compared(self.state.layout)
+
+    @property
+    def running(self) -> bool:
+        """True until all methods have answered."""
+        return len(self.answers) < len(self.methods) and not self.cancelled
+
+
+class Comparison(Slot[State, Allocation]):
+    """The runs of one page: one question per method, so that those of other pages are answered in between."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context.pools.answers, context.bell, partial(_quickest, context.solver))
+        self.run = Run()
+
+    def start(self, state: State) -> None:
+        """Ask all methods about a state; a run that is still going on is given up."""
+        super().forget()
+        self.run = Run(state)
+        self._next(state)
+
+    def cancel(self) -> None:
+        """Ask no more; the answers so far stay."""
+        super().forget()
+        self.run = self.run._replace(cancelled=True)
+
+    def forget(self) -> None:
+        """Give up and forget."""
+        super().forget()
+        self.run = Run()
+
+    def attend(self) -> bool:
+        """Note an answer that has come, and ask the next method."""
+        came = super().attend()
+        if came and self.answered is not None:
+            answer = self.answer or self.error or "no answer"
+            self.run = self.run._replace(answers=(*self.run.answers, (self.answered.method, answer)))
+            self._next(self.answered)
+        return came
+
+    def _next(self, state: State) -> None:
+        if self.run.running:
+            self.ask(replace(state, method=self.run.methods[len(self.run.answers)]))
+
+
+def _quickest(solver: Solver, state: State) -> Allocation:
+    answers = [solver.solve(state) for _ in range(TRIES)]
+    return min(answers, key=lambda answer: answer.solve_ms)

@@ -1,0 +1,304 @@
+"""Questions that take time: asked on the event loop, answered on threads; the newest one counts.
+
+A `Slot` keeps what one page has asked of one kind, and what came of it. Nothing is locked: a question is
+frozen, an answer is never changed, and all that a slot holds belongs to the event loop.
+"""
+
+import asyncio
+import contextlib
+import threading
+import time
+import traceback
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from queue import SimpleQueue
+from typing import Any, Generic, Protocol, TypeVar
+
+from finlab.errors import FinlabError
+
+Question = TypeVar("Question")
+Answer = TypeVar("Answer")
+Job = tuple["Future[Any]", Callable[[], Any]]
+
+
+class Pool:
+    """Threads that take one job after the other, in the order in which they came."""
+
+    def __init__(self, size: int = 1) -> None:
+        """Start so many threads; they do not keep the process from ending."""
+        self._jobs: SimpleQueue[Job | None] = SimpleQueue()
+        self._threads = [threading.Thread(target=self._run, daemon=True) for _ in range(size)]
+        for thread in self._threads:
+            thread.start()
+
+    def submit(self, work: Callable[[], Answer]) -> "Future[Answer]":
+        """Have a job done; one that is cancelled before it has begun is left out."""
+        future: Future[Answer] = Future()
+        self._jobs.put((future, work))
+        return future
+
+    def stop(self) -> None:
+        """End the threads after what they are at."""
+        for _ in self._threads:
+            self._jobs.put(None)
+        for thread in self._threads:
+            thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            future, work = job
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(work())
+            except BaseException as error:  # whoever asked is told, and the others go on
+                future.set_exception(error)
+
+
+@dataclass(frozen=True)
+class Pools:
+    """The threads that all pages of a server share."""
+
+    answers: Pool = field(default_factory=Pool)
+    """Allocations: milliseconds. One thread, as a solver belongs to one."""
+    swims: Pool = field(default_factory=Pool)
+    """Robots that swim: all the time, in short turns, with a solver of their own."""
+    brief: Pool = field(default_factory=partial(Pool, 3))
+    """Ranges, score cards, files: up to a second."""
+    long: Pool = field(default_factory=partial(Pool, 2))
+    """Searches, fits, logs: up to minutes."""
+
+    def stop(self) -> None:
+        """End all threads."""
+        for pool in vars(self).values():
+            pool.stop()
+
+
+class Attended(Protocol):
+    """What a page looks after when its bell rings for it."""
+
+    def attend(self) -> bool:
+        """Go on, on the loop; whether there is something new to show."""
+        ...
+
+
+class Bell:
+    """Wakes the loop of one page, and says for whom."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        """A bell for a coroutine on a loop."""
+        self._loop = loop
+        self._event = asyncio.Event()
+        self._waiting: dict[Attended, None] = {}
+
+    def ring(self, *waiting: Attended) -> None:
+        """Wake the page, for some that wait; called on the loop."""
+        self._waiting.update(dict.fromkeys(waiting))
+        self._event.set()
+
+    def ring_from_thread(self, waiting: Attended) -> None:
+        """The same, called from any thread."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self.ring, waiting)
+
+    def ring_later(self, seconds: float, waiting: Attended) -> None:
+        """The same after some time [s]; called on the loop."""
+        self._loop.call_later(seconds, self.ring, waiting)
+
+    async def wait(self, seconds: float | None = None) -> None:
+        """Until it rings, or some time has passed [s]."""
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._event.wait(), seconds)
+
+    @property
+    def rings(self) -> bool:
+        """Whether the page has still to look."""
+        return self._event.is_set()
+
+    def take(self) -> list[Attended]:
+        """Whom it rang for, once each; from now on it is silent again."""
+        self._event.clear()
+        waiting = list(self._waiting)
+        self._waiting.clear()
+        return waiting
+
+
+class Work(Generic[Question]):
+    """A question on its way through a thread."""
+
+    def __init__(self, question: Question, tell: Callable[[], None]) -> None:
+        """`tell` says, from any thread, that there is progress."""
+        self.question = question
+        self.cancelled = threading.Event()
+        """Set when nobody waits for the answer any more, or for no more of it."""
+        self.progress: Any = None
+        self.future: Future[Any] | None = None
+        self._tell = tell
+
+    def report(self, progress: Any) -> None:
+        """How far it is; called by whoever works on it."""
+        self.progress = progress
+        self._tell()
+
+
+class Slot(Generic[Question, Answer]):
+    """What one page has asked of one kind, and what came of it."""
+
+    def __init__(
+        self,
+        pool: Pool,
+        bell: Bell,
+        solve: Callable[..., Answer],
+        *,
+        rest_s: float = 0.0,
+        live: bool = False,
+        watched: bool = False,
+        title: str = "",
+    ) -> None:
+        """An empty slot.
+
+        Args:
+            pool: threads that answer.
+            bell: rung for this slot when there is an answer, or progress.
+            solve: gives the answer to a question, on a thread; what it raises is the slot's `error`.
+            rest_s: how long a question must not change before it is worked on [s].
+            live: whether what is under way is finished when the question changes, so that a page follows a
+                dragged slider; else it is cancelled.
+            watched: whether `solve` also gets the `Work`: to report, and to see that it is cancelled.
+            title: heading of the note that tells of an error; empty where the page says it elsewhere.
+        """
+        self._pool, self._bell, self._solve = pool, bell, solve
+        self._rest_s, self._live, self._watched = rest_s, live, watched
+        self.title = title
+        self._work: Work[Question] | None = None
+        self._due: float | None = None
+        self.question: Question | None = None
+        """The newest one."""
+        self.answered: Question | None = None
+        """The one that answer and error belong to; it may be an earlier one."""
+        self.answer: Answer | None = None
+        self.error: str | None = None
+        self.is_error_new = False
+        """Whether the answer before had no such error."""
+
+    @property
+    def busy(self) -> bool:
+        """True while the newest question has no answer."""
+        return self.answered is not self.question
+
+    @property
+    def progress(self) -> Any:
+        """How far the work on the question is, where it reports that."""
+        return None if self._work is None else self._work.progress
+
+    def ask(self, question: Question, at_once: bool = False) -> None:
+        """Have a question answered, unless it is the one that was asked last; `at_once` without a rest."""
+        if self.question is not None and question == self.question:
+            return
+        self.question = question
+        if self._work is not None:
+            if self._live:  # the newest comes next
+                return
+            self._cancel()
+        if at_once or self._rest_s == 0.0:
+            self._begin()
+        else:
+            self._due = time.monotonic() + self._rest_s
+            self._bell.ring_later(self._rest_s, self)
+
+    def attend(self) -> bool:
+        """Begin what has rested, or take an answer that has come."""
+        if self._due is not None and time.monotonic() >= self._due:
+            self._begin()
+        work = self._work
+        if work is None:
+            return False
+        future = work.future
+        if future is None or not future.done():
+            return work.progress is not None
+        self._work = None
+        self.answered = work.question
+        error_before = self.error
+        self.answer = self.error = None
+        try:
+            self.answer = future.result()
+        except FinlabError as error:
+            self.error = str(error)
+        except Exception as error:  # one asker's fault must not silence all the others
+            traceback.print_exception(error)
+            self.error = f"it failed: {error or type(error).__name__}"
+        self.is_error_new = self.error is not None and self.error != error_before
+        if self.busy and self._due is None:
+            self._begin()
+        return True
+
+    def stop(self) -> None:
+        """Answer soon, with what is known by then."""
+        if self._work is not None:
+            self._work.cancelled.set()
+
+    def forget(self) -> None:
+        """Drop question and answer; what is under way counts no more."""
+        self._cancel()
+        self._due = None
+        self.question = self.answered = self.answer = self.error = None
+
+    def _begin(self) -> None:
+        assert self.question is not None
+        self._due = None
+        tell = partial(self._bell.ring_from_thread, self)
+        work = self._work = Work(self.question, tell)
+        more = (work,) if self._watched else ()
+        work.future = self._pool.submit(partial(self._solve, work.question, *more))
+        work.future.add_done_callback(lambda _: tell())
+
+    def _cancel(self) -> None:
+        work, self._work = self._work, None
+        if work is not None:
+            work.cancelled.set()
+            if work.future is not None:
+                work.future.cancel()
+
+
+class Deferred:
+    """Work of one page that a user has asked for, and what is done with its result."""
+
+    def __init__(self, pool: Pool, bell: Bell, do: Callable[[Callable[[], object]], None]) -> None:
+        """`do` carries out an intent of the user: what is done with a result, or a refusal."""
+        self._pool, self._bell, self._do = pool, bell, do
+        self._begun: dict[Hashable, tuple[Future[Any], Callable[[Any], object]]] = {}
+        self._next: dict[Hashable, tuple[Callable[[], Any], Callable[[Any], object]]] = {}
+
+    def make(self, work: Callable[[], Answer], use: Callable[[Answer], object], kind: Hashable) -> None:
+        """Do what takes time on a thread, and use what it gives on the loop. What waits for one of its
+        `kind` to end gives way to a newer one."""
+        self._next[kind] = work, use
+        self._begin(kind)
+
+    def attend(self) -> bool:
+        """Use what has come, and begin what waited for it."""
+        done = [kind for kind, (future, _) in self._begun.items() if future.done()]
+        for kind in done:
+            future, use = self._begun.pop(kind)
+            self._do(partial(_use, future, use))
+            self._begin(kind)
+        return bool(done)
+
+    def forget(self) -> None:
+        """The page has gone."""
+        self._next.clear()
+        self._begun.clear()
+
+    def _begin(self, kind: Hashable) -> None:
+        if kind in self._begun or kind not in self._next:
+            return
+        work, use = self._next.pop(kind)
+        future = self._pool.submit(work)
+        self._begun[kind] = future, use
+        future.add_done_callback(lambda _: self._bell.ring_from_thread(self))
+
+
+def _use(future: "Future[Answer]", use: Callable[[Answer], object]) -> None:
+    use(future.result())
