@@ -13,6 +13,7 @@ from markupsafe import Markup, escape
 Facts = dict[str, Any]
 """Whoever shows a part names the facts that it is made of, each with its type."""
 
+
 PLAIN = (str, int, float, bool, tuple)
 """Facts that are compared by value; the others, which may hold arrays, by identity."""
 Fail = Callable[[Exception | None], None]

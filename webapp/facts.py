@@ -18,6 +18,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
     tasks: dict[str, Slot[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
     tasks |= {"better": jobs.improver, "fitted": jobs.fitting, "judged": jobs.log}
     known: Facts = {}
+    opened = session.opened
     both = jobs.both.answer
     for name, task in tasks.items():
         known |= {name: task.answer, f"{name}_error": task.error}
@@ -32,8 +33,8 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,
-        "drawer": session.drawer,
-        "opened": session.opened,
+        "drawer": None if session.desk.folded else opened or None,
+        "opened": opened,
         "undo": session.history.undo_name,
         "redo": session.history.redo_name,
         "stop": session.guide.stop,

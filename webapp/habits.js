@@ -134,6 +134,7 @@
       const parts = [...holder.children], words = parts.flatMap((part) => [...part.classList]).map((word) => word.replace('fl-', ''));
       words.push(...['plot', 'score'].filter((word) => holder.querySelector(`.${word}`)));
       if (parts.every((part) => part.matches('i, style'))) words.push('bare');
+      if (words.includes('modes')) holder.parentElement?.toggleAttribute('data-asking', words.includes('asking'));
       holder.dataset.fl = words.join(' ');
       if (element.matches('.fl-chrome'))
         for (let up = holder; up; up = up.parentElement) if (up.matches(`[data-dock-region], #root ${FOLDER}`)) up.dataset.fl = 'panel';

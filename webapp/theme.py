@@ -1,6 +1,5 @@
 """Colours and sizes of everything that is drawn: the Okabe-Ito palette, safe for colour-blind eyes."""
 
-import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -55,9 +54,6 @@ MODE_COLORS: tuple[Rgb, ...] = (
     (74, 152, 206),
     (158, 92, 178),
 )
-
-HALF_TURN = math.pi
-"""Angle of the torque ring that the legend speaks of [rad]."""
 
 
 @dataclass(frozen=True)

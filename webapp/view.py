@@ -29,7 +29,8 @@ PATIENCE_S = 0.025
 write a page twice than once."""
 TOGETHER_S = 0.4
 """How long what comes beside an answer waits for the rest of it [s]."""
-Slots = tuple[Slot[Any, Any], ...]
+Slots = frozenset[Slot[Any, Any]]
+NONE: Slots = frozenset()
 DRAWN_S = 0.004
 """How long after its words the view is drawn [s]: a browser shows what comes without nodes of the view at
 once, and the rest with its next picture."""
@@ -55,10 +56,10 @@ class View:
         self.designs, self.deferred = page.designs, page.deferred
         self.frame = Frame(page)
         page.presses.start()
-        self._revision = session.revision
+        self._revision: int | None = None
         self._is_due = True
         self._held_until = 0.0
-        self._held_for: Slots = ()
+        self._held_for: Slots = NONE
         self.bell.ring()
         self._task = loop.create_task(self._run())
 
@@ -92,18 +93,24 @@ class View:
 
     def _look(self) -> None:
         """Take what has been answered and done, ask what follows, and see whether the page is due."""
-        came = [waiting for waiting in self.bell.take() if self._attend(waiting)]
-        done, self.intents.is_new = self.intents.is_new, False
-        revised = self._revision != self.session.revision
-        self._revision = self.session.revision
+        came = []
+        for waiting in self.bell.take():
+            if self._attend(waiting):
+                came.append(waiting)
+        done = self.intents.is_new
+        if not came and not done and self._revision is not None:
+            return
+        self._is_due = True
+        self.intents.is_new = False
         jobs = self.jobs
         jobs.ask()
-        self._is_due = self._is_due or done or bool(came)
+        revised = self._revision != self.session.revision
+        self._revision = self.session.revision
         if revised and self.busy:
-            self._hold(PATIENCE_S, (jobs.answering.slot,))
-        elif done or any(task not in jobs.beside for task in came):
-            self._held_for = ()
-        elif came:
+            self._hold(PATIENCE_S, frozenset([jobs.answering.slot]))
+        elif done or not jobs.beside.issuperset(came):
+            self._held_for = NONE
+        else:
             self._hold(TOGETHER_S, jobs.beside)
 
     def _attend(self, waiting: Attended) -> bool:
@@ -129,9 +136,10 @@ class View:
     def _held_s(self) -> float | None:
         """How much longer the page is left as it is [s]; None where it is to be written."""
         left = self._held_until - time.monotonic()
-        if left > 0.0 and any(slot.busy for slot in self._held_for):
-            return left
-        self._held_for = ()
+        for slot in self._held_for:
+            if left > 0.0 and slot.busy:
+                return left
+        self._held_for = NONE
         return None
 
     async def _write(self) -> None:

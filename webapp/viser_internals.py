@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
-from itertools import starmap
 from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -136,13 +135,6 @@ def _quicken() -> None:
             kind.finlab_hints = get_type_hints(kind)
     handles: Any = AssignablePropsBase
     handles._prop_hints = property(attrgetter("_impl.props.finlab_hints"))
-
-
-def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, str], ...]) -> None:
-    """Other marks (value and text) on a slider that stands already; viser takes them only when it is made."""
-    wanted = tuple(starmap(_messages.GuiSliderMark, marks))
-    if slider._marks != wanted:
-        slider._marks = wanted
 
 
 def uuid_of(handle: Any) -> str:

@@ -167,7 +167,7 @@ class LoneBell(Bell):
         """Keep who has rung."""
         self._rung.extend((0.0, each) for each in waiting)
 
-    def ring_from_thread(self, waiting: Attended) -> None:
+    def ring_from_thread(self, waiting: Attended, _done: object = None) -> None:
         """Keep who has rung."""
         self._rung.append((0.0, waiting))
 

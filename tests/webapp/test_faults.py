@@ -44,7 +44,7 @@ DRAWN = (
     "webapp.panels.status.corner",
     "webapp.panels.wrench_tab.axis_reach",
     "webapp.panels.wrench_tab.slider_end",
-    "webapp.panels.wrench_tab.wrench_bars",
+    "webapp.markup.answer.wrench_bars",
     "webapp.panels.wrench_tab.full_thrust",
     "webapp.panels.wrench_tab.fin_table",
     "webapp.panels.cards.quick_check",

@@ -12,7 +12,7 @@ from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
 from finlab.hull.mesh_file import Mesh
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
-from webapp.panels.wrench_tab import reach_marks
+from webapp.markup.reach import reach_marks
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, torque_ring

@@ -11,7 +11,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import WHOLE, Damage
 from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
 from webapp.theme import DEAD, css, fin_color, ink
@@ -31,6 +31,12 @@ PLAIN_HEADER = Markup(
     "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
+
+
+def bars_of(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
+    """The bars of an answer; one to an earlier question stands beside what was asked then."""
+    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, None if shown is None else shown.wrench)
 
 
 def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
@@ -99,12 +105,14 @@ def fin_table(
 ) -> str:
     """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
     limits = None if allocation is None else saturated(allocation)
+    is_damaged = damage != WHOLE
     rows = []
     for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (remark := damage_words(damage, fin.name, fin.TURNS)):
+        remark = damage_words(damage, fin.name, fin.TURNS) if is_damaged and not failed else ""
+        if remark:
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5

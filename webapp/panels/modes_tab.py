@@ -38,7 +38,6 @@ PLOT_PX = 152
 def add_candidates(page: Page) -> None:
     """Plot and table, the refinement as a picture, and how widely the mixture is drawn from."""
     session, gui, jobs, board = page.session, page.gui, page.jobs, page.board
-    page.add_html(lambda searching: marker("fl-asking" if searching else "fl-asked"))
     page.add_html(lambda modes, mode, step: mode_plot(modes, mode, step, PLOT_PX))
 
     def choose(key: str, _held: str) -> None:
@@ -63,9 +62,15 @@ def add_candidates(page: Page) -> None:
         networks, partial(session.set_setting, "network"), lambda network: network or solver.first_network
     )
     board.show(networks, visible=lambda method: method == "paper")
-    page.add_html(mode_table)
+    page.add_html(_listed)
     add_saving(page)
     page.add_html(_origin_words)
+
+
+def _listed(modes: Modes, mode: int, searching: bool) -> str:
+    """The table; the drawer is dimmed (`habits.js`) while what it shows belongs to an earlier question."""
+    asking = "asking" if searching else ""
+    return html("<div class='fl-modes {}'>{}</div>", asking, mode_table(modes, mode))
 
 
 def add_saving(page: Page) -> None:
@@ -82,7 +87,7 @@ def add_saving(page: Page) -> None:
         icon=viser.Icon.DOWNLOAD,
         hint="All candidates: error, watts, and the command and force of each actuator.",
     )
-    page.board.show(button, disabled=lambda modes, searching: searching or not modes.shown)
+    page.board.show(button, disabled=lambda modes: not modes.shown)
 
 
 def _temperature(state: State) -> float:

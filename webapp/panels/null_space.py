@@ -12,7 +12,6 @@ from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
 from webapp.tasks.null_ways import MOST
 from webapp.tasks.solver import Modes
-from webapp.viser_internals import put_marks
 
 ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
 ALONE = "Each wrench has one set of forces here: the null space is empty."
@@ -40,7 +39,6 @@ def add_null_space(page: Page) -> None:
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
             put(slider, label=f"{known.names[k]} [N]", hint=f"Shares: {known.about[k]}.", step=step, **ends)
             put(slider, value=round(value, 6))
-            put_marks(slider, ((0.0, ""),))
 
     page.board.act(place, *sliders)
     add_html(page.gui, marker("fl-column"))
@@ -50,7 +48,9 @@ def add_null_space(page: Page) -> None:
 
 
 def _add_slider(page: Page, direction: int) -> viser.GuiSliderHandle[float]:
-    slider = page.gui.add_slider(f"{direction + 1} [N]", -1.0, 1.0, 0.01, 0.0, visible=False)
+    slider = page.gui.add_slider(
+        f"{direction + 1} [N]", -1.0, 1.0, 0.01, 0.0, marks=((0.0, ""),), visible=False
+    )
     slider.precision = 3
     page.on_change(slider, partial(page.session.shift, direction))
     return slider

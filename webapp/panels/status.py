@@ -1,6 +1,5 @@
 """What lies over the 3D view: the status line and the legend."""
 
-import math
 from functools import lru_cache
 
 import numpy as np
@@ -20,7 +19,7 @@ from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.analysing import Findings
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, TAKEN, WATER, css
+from webapp.theme import ASKED, DEAD, DELIVERED, REACH, TAKEN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
@@ -70,13 +69,12 @@ def _written(
 
 
 @lru_cache(maxsize=32)
-def legend(newtons: float, torque: float, cut: bool, size: float, also: str) -> str:
-    """Arrows, scales ([N] of 0.1 m where `size` is 1, [N m] of half a turn; `cut` where a ring would have to
-    be longer than one), and rows of more."""
+def legend(newtons: float, torque: float, size: float, also: str) -> str:
+    """Arrows, scales ([N] of an arrow of 0.1 m, [N m] of such a ring, where `size` is 1), and more rows."""
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
-    ring = f"{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
-    scales = "<div class='dim scales'><span>{}</span><span><i>ring </i>{}</span></div>"
+    ring = f"{0.1 * size:g} m = {torque:g} N m"
+    scales = "<div class='dim scales'><span>{}</span><span><i>radius </i>{}</span></div>"
     return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons, size), ring))
 
 

@@ -1,6 +1,7 @@
 """The question and its answer: the target wrench, bars, failures, commands, and what jets change."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import viser
@@ -10,8 +11,10 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
-from webapp.handles import add_html, placed, press, put
-from webapp.markup.answer import fin_table, wrench_bars
+from webapp.handles import add_html, placed, press
+from webapp.kept import Kept
+from webapp.markup.answer import bars_of, fin_table
+from webapp.markup.reach import reach_style
 from webapp.markup.verdict import answer_sentence, rest_sentence
 from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, three_digits
 from webapp.page import Page
@@ -19,10 +22,6 @@ from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.tasks.solver import BothWays
-from webapp.viser_internals import put_marks
-
-CLOSE = 0.28
-"""Share of a slider below which the texts of two marks would lie on each other."""
 
 
 def add_commands(page: Page) -> None:
@@ -58,25 +57,38 @@ def add_target(page: Page) -> None:
     def ask(target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for value, slider, most in zip(target, sliders, ends, strict=True):
-            end = max(most, abs(value))
-            put(slider, max=end, min=-end, value=round(value, 4) + 0.0)
+            slider.max = end = max(most, abs(value))
+            slider.min = -end
+            shown = round(value, 4) + 0.0
+            if slider.value != shown:
+                slider.value = shown
 
     board.act(reach)
     board.act(ask, *sliders)
+    style = Kept(reach_style)
+    said: dict[str, Any] = {}
 
-    def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
-        """Show what is within reach on the sliders."""
+    def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
+        """Show what is within reach on the sliders: the marks of all are one message."""
+        del target  # it may have moved the ends
+        shown: Markup = style(ranges, able, *[slider.max for slider in sliders])
+        return shown
+
+    def hint(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+        """Say what the marks are; they change more often than that."""
+        known = None if ranges is None else (able, failed, flow, *np.isfinite(ranges.low).tolist())
+        if known is None or known == said.get("hints"):
+            return
+        said["hints"] = known
         most = axis_reach(able, failed, flow)  # with the others free
         for k, slider in enumerate(sliders):
-            marks: tuple[tuple[float, str], ...] = ()
-            hint = AXIS_WORDS[k].capitalize()
-            if ranges is not None and able.commanded[k]:
-                low, high = float(ranges.low[k]), float(ranges.high[k])
-                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, most[k])
-            put_marks(slider, marks)
-            put(slider, hint=hint)
+            if able.commanded[k]:
+                slider.hint = _hint(k, ranges.low[k], most[k])
+            else:
+                slider.hint = AXIS_WORDS[k].capitalize()
 
-    board.act(mark)
+    page.add_html(mark)
+    board.act(hint)
     page.add_html(_sentence)
     policies = "Come closest, keep the direction, or serve axes by priority, heave first."
     box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
@@ -95,7 +107,7 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     session, step = page.session, 0.01 if axis < 3 else 0.001
     label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
-    slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
+    slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
     slider.precision = 4
     page.on_change(slider, partial(session.set_target, axis))
@@ -106,8 +118,9 @@ def _switch(axis: int, counts: bool) -> str:
     """Whether an axis counts; it lies beside the axis's slider."""
     does = "counts: press to free it" if counts else "is free, takes what comes: press to command it"
     return html(
-        "<div class='fl-axis'><span role='switch' tabindex='0' aria-checked='{}' aria-label='{}' "
+        "<div class='fl-axis fl-axis-{}'><span role='switch' tabindex='0' aria-checked='{}' aria-label='{}' "
         "title='{}' {}></span></div>",
+        axis,
         "true" if counts else "false",
         f"{AXES[axis]} counts",
         f"{AXES[axis]} {does}",
@@ -128,47 +141,26 @@ def _sentence(ranges_error: str | None) -> str:
     return "" if ranges_error is None else html(said, ranges_error)
 
 
-def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:
-    """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
-    if not np.isfinite(low):
-        return ()
-    fine, ends = 1 if width >= 2.0 else 2 if width >= 0.2 else 3, []
-    for value in (low, high):
-        digits = 0 if abs(value) >= 9.95 else fine
-        rounded = round(value, digits)
-        ends.append(f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0")
-    first, last = ends
-    if high - low <= 1e-3:
-        return ((round(low, 3), first),)
-    if high - low < CLOSE * width:
-        first, last = "", f"±{last}" if first == f"−{last}" else f"{first} … {last}"
-    return (round(low, 3), first), (round(high, 3), last)
-
-
-def _hint(axis: int, low: float, high: float, reach: float) -> str:
+def _hint(axis: int, low: float, reach: float) -> str:
     word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
-    ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
-    return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."
+    return f"{word}: the marks show what is within reach with the others as they are; {at_most}."
 
 
 def add_answer(page: Page) -> None:
     """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
     stands beside what was asked then."""
-    page.add_html(_bars)
-    page.add_html(_said)
+    bars = Kept(bars_of)
 
+    def write(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> Markup:
+        """Bars and words are one message; what is proved of an answer changes the words alone."""
+        said = answer_sentence(state, shown, busy, proving or step is not None)
+        words = "<div class='fl'><div class='said'>{}</div></div>"
+        return Markup(bars(shown, state.target, state.layout, busy) + html(words, said))
 
-def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
-    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
-    return wrench_bars(demanded, None if shown is None else shown.wrench)
-
-
-def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
-    said = answer_sentence(state, shown, busy, proving or step is not None)
-    return html("<div class='fl'><div class='said'>{}</div></div>", said)
+    page.add_html(write)
 
 
 JETS_HEADER = Markup(

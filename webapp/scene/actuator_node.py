@@ -1,4 +1,4 @@
-"""One actuator in the scene: its gizmo, and under it what moves, what holds it, its sweep and its force.
+"""One actuator in the scene: its gizmo, and under it what moves and what holds it.
 
 A fin beats, a foil is deflected, a propeller spins, a pod turns as well; `frames.js` moves them.
 """
@@ -17,7 +17,7 @@ from finlab.hull.mesh_file import Mesh
 from finlab.layout import Actuator
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes
-from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
+from webapp.scene.actuator_shapes import NOTHING, joined, tube
 from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, MISSING, fin_color
 
@@ -117,9 +117,6 @@ class ActuatorNode:
         self._spinning = Shape(scene, f"{parent}/blade/propeller", LIGHT.metal, side="double")
         self._mount = Shape(scene, f"{parent}/shaft", LIGHT.metal)
         self._pin = Shape(scene, f"{parent}/pin", MISSING)
-        self._force = Shape(scene, f"{parent}/force", self._color, cast_shadow=False)
-        fan: dict[str, Any] = {"opacity": 0.3, "side": "double", "cast_shadow": False}
-        self._fan = Shape(scene, f"{parent}/fan", self._color, shapes.sweep(0.1), **fan)
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )
@@ -164,11 +161,8 @@ class ActuatorNode:
         self._spinning.show(_propeller, int(is_pod) if is_pod or part.LOOKS == "thruster" else -1)
         for shape in (self._moving, self._spinning, self._mount):
             put(shape.node, scale=scale)
-        put(self._fan.node, scale=size)
-        put(self._force.node, scale=arrows)
         self._pin.show(shapes.pin, size)
         put(self._pin.node, visible=stuck)
-        self._root = np.array([size / arrows * (shapes.ROOT + shapes.SPAN / 2) * is_fin, 0.0, 0.0])
         put(self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows)
         if not owned_by_user:
             put(self._move, position=place)
@@ -182,17 +176,10 @@ class ActuatorNode:
         self._strut.show(_strut, place, hull, 0.008 * size)
         put(self._strut.node, visible=True)
 
-    def command(self, moves: Motion, alive: bool, arrow: Array, frame: Array) -> None:
-        """Show how it moves, and its force as a body-frame arrow (3,) [m], given the own axes (3, 3)."""
-        put(self._moving.node, color=self._color if alive else DEAD)
-        put(self._spinning.node, color=LIGHT.metal if alive else DEAD)
-        put(self._force.node, visible=alive)
-        put(self._fan.node, visible=alive and moves.amplitude > 0.0)
-        if alive:
-            half = moves.angle / 2
-            self._fan.show(shapes.sweep, moves.amplitude)
-            put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
-            self._force.show(force_arrow, frame @ arrow, self._root, 0.007)
+    def command(self, alive: bool) -> None:
+        """Show whether it works."""
+        self._moving.node.color = self._color if alive else DEAD
+        self._spinning.node.color = LIGHT.metal if alive else DEAD
 
 
 def _strut(end: Array, hull: Surface, radius: float) -> Mesh:

@@ -14,10 +14,10 @@ from finlab.hull.surface import grid_faces, revolved, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""
-SMALLEST_TURN, LONGEST_TURN = math.radians(3.0), math.radians(330.0)
-"""Rings shorter than this are not drawn, longer ones are cut off [rad]."""
-RING_RADIUS = 0.12
-"""Radius of a torque ring [m]."""
+HEAD = 0.28
+"""Share of a unit arrow that is its head."""
+TURN = math.radians(300.0)
+"""How far a ring goes round [rad]."""
 
 
 NOTHING = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], dtype=np.int32))
@@ -74,25 +74,25 @@ def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
     return tube(np.asarray(start) + stations[:, None] * direction, radii, 18)
 
 
-def torque_ring(turn: Array, center: Array, thickness: float, radius: float = RING_RADIUS) -> Mesh:
-    """A ring arrow about a vector (3,) [rad] by the right-hand rule: a torque times the rings' scale."""
-    size = float(np.linalg.norm(turn))
-    if size < SMALLEST_TURN:
-        return NOTHING
-    axis = np.asarray(turn) / size
-    # The arrow starts astern, out of the way of the force arrow, which mostly points ahead.
-    astern = np.array([-1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
-    first = astern - axis * (astern @ axis)
-    first /= np.linalg.norm(first)
-    second = np.cross(axis, first)
-    angle = min(size, LONGEST_TURN)
-    head = min(5.0 * thickness / radius, 0.6 * angle)
-    body = np.linspace(0.0, angle - head, 40)
-    tip = np.linspace(angle - head, angle, 8)
+def unit_arrow(thickness: float) -> Mesh:
+    """A straight arrow of length 1 along x, its shaft of a radius [m]: a node scales it along x alone."""
+    stations = np.array([0.0, 1.0 - HEAD, 1.0 - HEAD, 1.0])
+    path = stations[:, None] * np.array([1.0, 0.0, 0.0])
+    return tube(path, thickness * np.array([1.0, 1.0, 2.6, 0.02]), 18)
+
+
+def unit_ring(thickness: float) -> Mesh:
+    """A ring arrow of radius 1 about z by the right-hand rule, from x most of the way round.
+
+    The radius of its tube is a share of that of the ring.
+    """
+    head = 5.0 * thickness
+    body = np.linspace(0.0, TURN - head, 48)
+    tip = np.linspace(TURN - head, TURN, 8)
     way = np.concatenate([body, tip])
-    radii = np.concatenate([np.full(40, thickness), thickness * np.linspace(2.6, 0.02, 8)])
-    circle = np.cos(way)[:, None] * first + np.sin(way)[:, None] * second
-    return tube(np.asarray(center) + radius * circle, radii, 14, across=axis)
+    radii = thickness * np.concatenate([np.ones(48), np.linspace(2.6, 0.02, 8)])
+    circle = np.stack([np.cos(way), np.sin(way), np.zeros(len(way))], axis=1)
+    return tube(circle, radii, 14, across=np.array([0.0, 0.0, 1.0]))
 
 
 CHORD = 0.18
@@ -119,18 +119,6 @@ def shaft() -> Mesh:
     housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
     rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
     return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
-
-
-_FAN = triangles(*(np.arange(16) + shift for shift in (0, 1, 17, 1, 18, 17)))
-
-
-def sweep(amplitude: float) -> Mesh:
-    """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
-    angle = np.linspace(-amplitude, amplitude, 17)
-    arc = np.stack([np.full(17, ROOT + SPAN / 2), -np.cos(angle), -np.sin(angle)], axis=-1)
-    rings = np.array([0.035, CHORD - 0.004])[:, None, None] * arc
-    rings[..., 0] = arc[:, 0]
-    return Mesh(rings.reshape(-1, 3), _FAN)
 
 
 def foil(slenderness: float) -> Mesh:

@@ -19,6 +19,7 @@ from webapp.handles import put
 from webapp.intents import Intents
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
+from webapp.scene.force_nodes import ForceNodes
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
@@ -28,7 +29,7 @@ from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.analysing import Findings
 from webapp.tasks.swimmer import Moment, Swimmer
-from webapp.theme import HALF_TURN, LIGHT, fin_color
+from webapp.theme import LIGHT, fin_color
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -54,13 +55,16 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
         self._offered = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
+        self._forces = ForceNodes(scene)
         self._jets = JetNodes(scene)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._fins: list[ActuatorNode] = []
         self.dragged: int | None = None
         self._moves: list[Motion] = []
+        self._works: list[bool] = []
         self._size = view_size(session.state.layout)
+        self._arrow_size, self._top = 1.0, 0.0
         self._flaps = ""
         shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
         for show in (*shows, self._offer):
@@ -130,6 +134,7 @@ class RobotScene:
         swims: bool,
     ) -> None:
         hull, sizes = hull_of(drawn), (part_size(drawn), arrow_size(drawn))
+        self._arrow_size, self._top = sizes[1], hull_top(drawn)
         while len(self._fins) < drawn.n:
             self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[drawn.n :]:
@@ -143,6 +148,8 @@ class RobotScene:
             label = " ".join([word for word in words if word])
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
+        self._forces.place(drawn, sizes)
+        self._works = []
         if edited is None:
             self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
         else:
@@ -160,22 +167,29 @@ class RobotScene:
     ) -> None:
         lost = failed if moment is None else moment.lost
         if moment is not None:
-            commands, forces, frames = moment.motion, moment.force, drawn.frames
+            commands, forces = moment.motion, moment.force
         elif shown is not None:
-            # The forces belong to the answer's own axes, which a drag may have left behind.
-            commands, forces, frames = shown.command, shown.forces, shown.layout.frames
+            commands, forces = shown.command, shown.forces
         else:
-            commands, forces, frames = np.full((drawn.n, 3), np.nan), np.zeros((drawn.n, 3)), drawn.frames
-        self._moves = []
-        for i, part in enumerate(drawn.actuators):
-            alive = part.name not in lost and math.isfinite(commands[i, 0])
-            self._moves.append(motion(part, commands[i] if alive else None))
-            arrow = forces[i] * (LENGTH / scale.newtons) if alive else np.zeros(3)
-            self._fins[i].command(self._moves[i], alive, arrow, frames[i])
+            commands, forces = np.full((drawn.n, 3), np.nan), np.zeros((drawn.n, 3))
+        scaled = LENGTH / scale.newtons
+        works = [
+            part.name not in lost and math.isfinite(commands[i, 0]) for i, part in enumerate(drawn.actuators)
+        ]
+        self._moves = [
+            motion(part, commands[i] if works[i] else None) for i, part in enumerate(drawn.actuators)
+        ]
+        if works != self._works:
+            self._works = works
+            for node, alive in zip(self._fins, works, strict=False):
+                node.command(alive)
+        arrows = np.where(np.array(works)[:, None], forces, 0.0) * (scaled * self._arrow_size)
+        moves = np.array(self._moves)
+        self._forces.command(arrows, moves[:, 0] * works, moves[:, 2])
         if drawn.interaction is not None or self._jets.drawn:
             robot = shown.layout if shown is not None and moment is None else drawn
             jets = None if drawn.interaction is None else robot
-            self._jets.refresh(jets, forces, LENGTH / scale.newtons, arrow_size(drawn))
+            self._jets.refresh(jets, forces, scaled, self._arrow_size)
 
     def _flap(
         self,
@@ -207,8 +221,8 @@ class RobotScene:
             demanded, delivered = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
         elif shown is not None:
             delivered, missing = shown.wrench, missing_part(shown)
-        lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
-        self._wrench.refresh(demanded, delivered, missing, hull_top(drawn), *lengths, arrow_size(drawn))
+        lengths = LENGTH / scale.newtons, LENGTH / scale.torque
+        self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
     def _show_sets(
         self,

@@ -27,7 +27,7 @@ from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
 from webapp.viser_internals import run_script
 
-FIRST = Scale(1.0, 1.0, False)
+FIRST = Scale(1.0, 1.0)
 
 
 class Scenery:

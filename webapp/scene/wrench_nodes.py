@@ -1,6 +1,5 @@
 """Nodes of the target wrench, and the needle by which the selected actuator is turned."""
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -14,23 +13,24 @@ from finlab.arrays import Array
 from finlab.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
-from webapp.scene.actuator_shapes import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
+from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring
+from webapp.scene.force_nodes import DIGITS, Arrows, quaternion
 from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Findings
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING, REACH, Rgb
+from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING, REACH, Rgb
 
 NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Forces [N] that an arrow of 0.1 m may stand for."""
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
-LONGEST, SHORTEST = 0.3, 0.1
+ARROWS = (0.1, 0.3)
 """The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
 
 TORQUES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Torques [N m] that half a turn of a ring may stand for."""
-SHORTEST_TURN = math.radians(60.0)
-"""The longest ring is no shorter than this [rad], unless nothing is asked to speak of."""
+"""Torques [N m] that a ring of a radius of 0.1 m may stand for."""
+RINGS = (0.05, 0.16)
+"""The largest ring's radius stays within these [m]."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 LARGEST = 0.42
@@ -43,9 +43,7 @@ class Scale(NamedTuple):
     newtons: float
     """Force of an arrow of 0.1 m [N]."""
     torque: float
-    """Torque of half a turn of a ring [N m]."""
-    cut: bool
-    """Whether a ring would have to be longer than a turn."""
+    """Torque of a ring of a radius of 0.1 m [N m]."""
 
 
 def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale) -> Scale:
@@ -55,17 +53,16 @@ def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale)
     if shown is not None:
         forces += [shown.wrench[:3], *shown.forces]
         torques += [missing_part(shown)[3:], shown.wrench[3:]]
-    force, torque = (float(np.sqrt((np.array(some) ** 2).sum(axis=1).max())) for some in (forces, torques))
-    newtons = fitting(NEWTONS, force, now.newtons, LENGTH, (SHORTEST, LONGEST))
-    turns = SHORTEST_TURN, 0.95 * LONGEST_TURN
-    per_turn = fitting(TORQUES, torque, now.torque, HALF_TURN, turns)
-    return Scale(newtons, per_turn, HALF_TURN * torque / per_turn > LONGEST_TURN)
+    force = float(np.sqrt((np.array(forces) ** 2).sum(axis=1).max()))
+    torque = float(np.sqrt((np.array(torques) ** 2).sum(axis=1).max()))
+    newtons = fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS)
+    return Scale(newtons, fitting(TORQUES, torque, now.torque, LENGTH, RINGS))
 
 
 def fitting(
     steps: Sequence[float], largest: float, current: float, unit: float, ends: tuple[float, float]
 ) -> float:
-    """What `unit` [m or rad] in the view stands for, one of `steps`, so that `largest` ends within two ends;
+    """What `unit` [m] in the view stands for, one of `steps`, so that `largest` ends within two ends;
     `current` while that is good enough, or next to nothing is shown."""
     if largest < steps[0] / 100.0 or ends[0] <= unit * largest / current <= ends[1]:
         return current
@@ -76,8 +73,8 @@ def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
     """The scale of a swim, which only grows, so that its arrows compare; `before` is the last one."""
     moment = swimmer.shown
     sizes = [np.linalg.norm(v, axis=-1).max() for v in (moment.force, moment.asked[:3], moment.delivered[:3])]
-    fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= LONGEST)
-    return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0, False)
+    fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= ARROWS[1])
+    return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0)
 
 
 class WrenchNodes:
@@ -91,31 +88,83 @@ class WrenchNodes:
             scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
         ]
 
-        def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
-            shape = Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, cast_shadow=False)
-            self._nodes.append(shape.node)
-            return shape
+        def part(name: str, color: Rgb, mesh: Mesh, opacity: float | None = None) -> viser.MeshHandle:
+            shape = Shape(scene, f"/robot/wrench/{name}", color, mesh, opacity=opacity, cast_shadow=False)
+            return shape.node
 
-        self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
-        self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
-        self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
+        self._forces = Arrows(scene, "/robot/wrench/forces", 0.0065)
+        self._asked_force = UnitMesh(part("asked_force", ASKED, unit_arrow(0.011), 0.4), along_x)
+        rings = (
+            part("asked_torque", ASKED, unit_ring(0.07), 0.4),
+            part("delivered_torque", DELIVERED, unit_ring(0.042)),
+            part("missing_torque", MISSING, unit_ring(0.05)),
+        )
+        self._torques = [UnitMesh(ring, about_z) for ring in rings]
 
     def refresh(
         self, target: Array, got: Array, missing: Array, top: float, scale: float, turn: float, size: float
     ) -> None:
         """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is missing
-        enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of rings [rad/(N m)]."""
-        put(self._root, position=np.array([0.0, 0.0, top + HEIGHT * size]))
-        if self._nodes[0].scale != size:
-            for node in self._nodes:
-                put(node, scale=size)
-        zero = np.zeros(3)
-        self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
-        self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
-        self._given[0].show(force_arrow, got[:3] * scale, zero, 0.0065)
-        self._given[1].show(torque_ring, got[3:] * turn, zero, 0.005)
-        self._missing[0].show(force_arrow, missing[:3] * scale, got[:3] * scale, 0.006)
-        self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005, 1.35 * RING_RADIUS)
+        enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of rings [m/(N m)]."""
+        self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
+        for node in self._nodes:
+            node.scale = size
+        asked, delivered = size * scale * target[:3], size * scale * got[:3]
+        starts = np.stack([np.zeros(3), delivered])
+        ways = np.stack([delivered, size * scale * missing[:3]])
+        self._forces.show(starts, ways, [DELIVERED, MISSING], size)
+        length = float(np.linalg.norm(asked))
+        self._asked_force.show(asked, length, (round(length, DIGITS), size, size))
+        for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
+            torque = wrench[3:]
+            length = float(np.linalg.norm(torque))
+            radius = round(size * turn * length, DIGITS)
+            ring.show(torque, length, (radius, radius, radius))
+
+
+class UnitMesh:
+    """A mesh that is sent once, and then turned and scaled."""
+
+    def __init__(self, node: viser.MeshHandle, turn: Callable[[Array], Array]) -> None:
+        """`turn` gives the rotation (3, 3) for a direction (3,)."""
+        self.node = node
+        self._turn = turn
+        self._direction = np.zeros(3)
+
+    def show(self, way: Array, length: float, scale: tuple[float, float, float]) -> None:
+        """Turn it to a vector (3,) of a length, and scale it; one of no length is hidden."""
+        self.node.visible = is_seen = scale[0] > SHORTEST
+        if not is_seen:
+            return
+        self.node.scale = scale
+        direction = way / length
+        if abs(direction - self._direction).max() > 1e-4:
+            self._direction = direction
+            self.node.wxyz = quaternion(self._turn(direction))
+
+
+def along_x(way: Array) -> Array:
+    """A rotation (3, 3) that takes the x axis to a direction (3,)."""
+    across = np.eye(3)[int(np.argmin(np.abs(way)))]
+    side = _cross(way, across)
+    side /= np.linalg.norm(side)
+    return np.stack([way, side, _cross(way, side)], axis=1)
+
+
+def about_z(axis: Array) -> Array:
+    """A rotation (3, 3) that takes the z axis to a direction (3,), and the x axis astern as far as it goes.
+
+    So a ring begins out of the way of the force's arrow, which mostly points ahead.
+    """
+    astern = np.array([-1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    first = astern - axis * (astern @ axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, _cross(axis, first), axis], axis=1)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors (3,); numpy's own takes ten times as long."""
+    return a[[1, 2, 0]] * b[[2, 0, 1]] - a[[2, 0, 1]] * b[[1, 2, 0]]
 
 
 class AttainableNodes:

@@ -68,7 +68,7 @@ class State:
         """The layout with the limits that are left to damaged fins."""
         return self.layout if self.damage == WHOLE else self.damage.applied_to(self.layout)
 
-    @property
+    @cached_property
     def failed(self) -> tuple[str, ...]:
         """Names of the actuators that are lost."""
         return tuple(self.damage.lost)

@@ -82,7 +82,7 @@ class Answering:
         """What is seen of the newest answer now."""
         session, search, reply = self._session, self.search, self.slot.answer
         busy, modes, mode = self.busy, search.answer or NO_MODES, session.mode
-        searching = busy or search.busy
+        searching = busy or search.answered is not search.question
         known = search.answered is not None and search.answered.reply is reply
         best = shown = None if reply is None else reply.answer
         steps = 0 if searching else modes.steps

@@ -1,5 +1,7 @@
 """All that one page asks for, and what came of it."""
 
+from typing import Any
+
 from finlab.analysis import AttainableSet
 from finlab.forces.reach import Ranges
 from webapp.session.looking import DRAWN
@@ -40,7 +42,7 @@ class Jobs:
         self.log = LogReading(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context)
-        self.beside = (self.answering.search, self.ranging, self.both)
+        self.beside = frozenset[Slot[Any, Any]]([self.answering.search, self.ranging, self.both])
         """What is told shortly after an answer, all of it together."""
 
     def ask(self) -> None:
@@ -60,11 +62,13 @@ class Jobs:
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
             question = Question(state.able, state.failed, session.saved, drawn, state.flow)
             self.analyst.ask(question)
-        kind, best = DRAWN[drawn], self.improver.best
-        if kind is None or best is None:
-            self.growing.forget()
-        elif task == "Design":
-            self.growing.ask(Attained(best, kind, state.flow))
+        kind = DRAWN[drawn]
+        if task == "Design" and kind is not None:
+            best = self.improver.best
+            if best is None:
+                self.growing.forget()
+            else:
+                self.growing.ask(Attained(best, kind, state.flow))
         if task in ("Design", "Allocate") and state.layout.interaction is not None:
             self.both.ask(state)
 

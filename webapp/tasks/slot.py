@@ -98,7 +98,7 @@ class Bell:
         self._waiting.update(dict.fromkeys(waiting))
         self._event.set()
 
-    def ring_from_thread(self, waiting: Attended) -> None:
+    def ring_from_thread(self, waiting: Attended, _done: object = None) -> None:
         """The same, called from any thread."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self.ring, waiting)
@@ -230,7 +230,7 @@ class Slot(Generic[Question, Answer]):
             traceback.print_exception(error)
             self.error = f"it failed: {error or type(error).__name__}"
         self.is_error_new = self.error is not None and self.error != error_before
-        if self.busy and self._due is None:
+        if self.answered is not self.question and self._due is None:
             self._begin()
         return True
 
@@ -248,11 +248,10 @@ class Slot(Generic[Question, Answer]):
     def _begin(self) -> None:
         assert self.question is not None
         self._due = None
-        tell = partial(self._bell.ring_from_thread, self)
-        work = self._work = Work(self.question, tell)
+        work = self._work = Work(self.question, partial(self._bell.ring_from_thread, self))
         more = (work,) if self._watched else ()
         work.future = self._pool.submit(partial(self._solve, work.question, *more))
-        work.future.add_done_callback(lambda _: tell())
+        work.future.add_done_callback(partial(self._bell.ring_from_thread, self))
 
     def _cancel(self) -> None:
         work, self._work = self._work, None
@@ -297,7 +296,7 @@ class Deferred:
         work, use = self._next.pop(kind)
         future = self._pool.submit(work)
         self._begun[kind] = future, use
-        future.add_done_callback(lambda _: self._bell.ring_from_thread(self))
+        future.add_done_callback(partial(self._bell.ring_from_thread, self))
 
 
 def _use(future: "Future[Answer]", use: Callable[[Answer], object]) -> None:

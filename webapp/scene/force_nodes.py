@@ -1,0 +1,148 @@
+"""Forces of all actuators as arrows, and the fans that blades sweep: unit meshes that are moved and scaled.
+
+Both are one node for the whole robot, so a page is sent a few numbers for each step, and no mesh.
+"""
+
+import math
+
+import numpy as np
+import viser
+
+from finlab.arrays import Array
+from finlab.hull.mesh_file import Mesh
+from finlab.layout import Layout
+from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
+from webapp.theme import Rgb, fin_color
+
+SHAFT, HEAD_RADIUS, HEAD_LENGTH = 1.0, 2.6, 5.0
+"""Sizes of an arrow, in radii of its shaft."""
+THICKNESS = 0.007
+"""Radius of the shafts of forces, for arrows of size 1 [m]."""
+DIGITS = 4
+"""Places and lengths are sent in tenths of a millimetre, so that rounding errors are not."""
+WEDGES = 10
+"""A fan is so many wedges beside each other."""
+WEDGE = 0.05
+"""Half the angle of the unit wedge [rad]."""
+
+
+class Arrows:
+    """Some arrows, each with its colour; viser moves and scales a unit shaft and a unit head."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, thickness: float) -> None:
+        """No arrow yet; `thickness` is the radius of their shafts, for size 1 [m]."""
+        self.node = scene.add_arrows(
+            name,
+            np.zeros((1, 2, 3)),
+            np.zeros((1, 3), dtype=np.uint8),
+            shaft_radius=SHAFT * thickness,
+            head_radius=HEAD_RADIUS * thickness,
+            head_length=HEAD_LENGTH * thickness,
+            visible=False,
+        )
+
+    def show(self, starts: Array, ways: Array, colors: list[Rgb], size: float) -> None:
+        """Show arrows from `starts` (n, 3) along `ways` (n, 3) [m]; those of no length are left out."""
+        drawn = np.linalg.norm(ways, axis=1) > SHORTEST * size
+        self.node.visible = bool(drawn.any())
+        if not drawn.any():
+            return
+        points = np.stack([starts, starts + ways], axis=1)[drawn] / size
+        self.node.scale = size
+        self.node.colors = np.array(colors, dtype=np.uint8)[drawn]
+        self.node.points = points.round(DIGITS).astype(np.float32)
+
+
+class ForceNodes:
+    """Arrows at the roots of actuators, and the fans of their blades."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Nothing is shown yet."""
+        self._arrows = Arrows(scene, "/robot/forces", THICKNESS)
+        wedge = unit_wedge()
+        self._fans = scene.add_batched_meshes_simple(
+            "/robot/fans",
+            wedge.vertices,
+            wedge.faces,
+            np.array([[1.0, 0.0, 0.0, 0.0]]),
+            np.zeros((1, 3)),
+            batched_scales=np.ones((1, 3)),
+            batched_colors=np.zeros((1, 3), dtype=np.uint8),
+            lod="off",
+            opacity=0.3,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self._colors: list[Rgb] = []
+        self._middles = self._turns = self._starts = np.zeros((0, 3))
+        self._sizes = (1.0, 1.0)
+
+    def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
+        """Where actuators stand; `sizes` are of them and of arrows."""
+        size, _ = self._sizes = sizes
+        self._colors = [fin_color(k) for k in range(layout.n)]
+        shafts = layout.frames[:, 0] * layout.is_fin[:, None]
+        self._starts = layout.position + size * (ROOT + SPAN / 2) * shafts
+        self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
+
+    def command(self, forces: Array, amplitudes: Array, angles: Array) -> None:
+        """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,) [rad]."""
+        self._arrows.show(self._starts, forces, self._colors, self._sizes[1])
+        beats = amplitudes > 0.0
+        fans = self._fans
+        fans.visible = bool(beats.any())
+        if not beats.any():
+            return
+        half = amplitudes[beats, None] / WEDGES
+        across = half * (2.0 * np.arange(WEDGES) + 1.0 - WEDGES) + angles[beats, None]
+        size = self._sizes[0]
+        scales = np.full((*across.shape, 3), size)
+        scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
+        turns = turned_about_x(self._turns[beats, None], across)
+        fans.batched_colors = np.repeat(np.array(self._colors, dtype=np.uint8)[beats], WEDGES, axis=0)
+        fans.batched_positions = _rows(np.broadcast_to(self._starts[beats, None], (*across.shape, 3)))
+        fans.batched_scales = _rows(scales)
+        fans.batched_wxyzs = _rows(turns)
+
+
+def _rows(values: Array) -> Array:
+    """Values of all wedges, one a row."""
+    return np.asarray(values.reshape(-1, values.shape[-1]).round(DIGITS).astype(np.float32))
+
+
+def unit_wedge() -> Mesh:
+    """A narrow piece of the ring that a blade sweeps about its shaft, in the middle of its width."""
+    inner, outer = 0.035, CHORD - 0.004
+    ends = np.array([[inner, -1.0], [outer, -1.0], [outer, 1.0], [inner, 1.0]])
+    radius, side = ends.T
+    vertices = np.stack([0.0 * radius, -radius, radius * side * math.tan(WEDGE)], axis=1)
+    return Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+
+
+def quaternion(rotation: Array) -> Array:
+    """The unit quaternion (4,) of a rotation matrix (3, 3), by its largest component (Shepperd, 1978)."""
+    trace = float(np.trace(rotation))
+    k = int(np.argmax([trace, *np.diag(rotation)]))
+    if k == 0:
+        wxyz = np.array([1.0 + trace, *_skew(rotation)])
+    else:
+        wxyz = np.zeros(4)
+        wxyz[0] = _skew(rotation)[k - 1]
+        wxyz[1:] = rotation[:, k - 1] + rotation[k - 1]
+        wxyz[k] = 1.0 + 2.0 * rotation[k - 1, k - 1] - trace
+    return np.asarray(wxyz / np.linalg.norm(wxyz))
+
+
+def _skew(rotation: Array) -> Array:
+    """The vector (3,) of a matrix less its transpose."""
+    difference = rotation - rotation.T
+    return np.array([difference[2, 1], difference[0, 2], difference[1, 0]])
+
+
+def turned_about_x(wxyz: Array, angle: Array) -> Array:
+    """Quaternions (..., 4) that turn by angles (...) [rad] about x before they turn by others (..., 4)."""
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    w, x, y, z = np.moveaxis(wxyz, -1, 0)
+    return np.stack([w * c - x * s, w * s + x * c, y * c + z * s, z * c - y * s], axis=-1)
