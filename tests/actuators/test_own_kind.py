@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from webapp.tasks.background import Workers
 
 from finlab.actuators.kind_check import Kinds
 from finlab.actuators.kinds import KINDS, import_kinds
@@ -21,7 +22,6 @@ from finlab.errors import FinlabError
 from finlab.layout import Damage, Layout, load_layout, save_layout
 from finlab.physics import plant_of
 from tests.webapp.test_faults import Tab
-from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -24,6 +24,12 @@ VERTICES = """name => {
   window.__viserMutable.nodeRefFromName[name].traverse(o => { geometry = geometry ?? o.geometry ?? null; });
   return Array.from(geometry.attributes.position.array.slice(0, 6000));
 }"""
+INSTANCES = """name => {
+  let mesh = null;
+  const find = o => { mesh = mesh ?? (o.matricesTexture ? o : null); };
+  window.__viserMutable.nodeRefFromName[name].traverse(find);
+  return Array.from(mesh?.matricesTexture.image.data.slice(0, 16 * mesh.instancesCount) ?? []);
+}"""
 PROJECT = """([name, point]) => {
   const node = window.__viserMutable.nodeRefFromName[name];
   node.updateWorldMatrix(true, false);
@@ -257,6 +263,11 @@ class Page:
     def vertices(self, node: str) -> list[float]:
         """First coordinates of a mesh as the browser holds it."""
         return [float(v) for v in self.page.evaluate(VERTICES, node)]
+
+    def instances(self, node: str) -> list[list[float]]:
+        """Matrices of the arrows, or other instances, of a node as the browser holds them."""
+        numbers = [float(v) for v in self.page.evaluate(INSTANCES, node)]
+        return [numbers[k : k + 16] for k in range(0, len(numbers), 16)]
 
     def _pause(self) -> None:
         self.page.wait_for_timeout(1000 * PAUSE_S)

@@ -3,10 +3,13 @@
 import math
 import re
 from importlib.resources import files
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
@@ -15,8 +18,9 @@ from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
 from webapp.markup.reach import reach_marks
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion
-from webapp.scene.actuator_shapes import NOTHING, force_arrow, torque_ring
-from webapp.scene.wrench_nodes import on_sphere, snapped
+from webapp.scene.actuator_shapes import CHORD, NOTHING, TURN, force_arrow, unit_arrow, unit_ring
+from webapp.scene.force_nodes import WEDGES, ForceNodes, quaternion, turned_about_x, unit_wedge
+from webapp.scene.wrench_nodes import about_z, along_x, on_sphere, snapped
 from webapp.theme import ASKED, DELIVERED, FIN_COLORS, MISSING, Rgb, ink
 
 
@@ -30,9 +34,10 @@ def solid(mesh: Mesh) -> trimesh.Trimesh:
         shapes.blade(),
         shapes.shaft(),
         force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
-        torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
+        unit_arrow(0.01),
+        unit_ring(0.07),
     ],
-    ids=["blade", "shaft", "arrow", "ring"],
+    ids=["blade", "shaft", "arrow", "unit arrow", "ring"],
 )
 def test_closed_and_outward(mesh: Mesh) -> None:
     body = solid(mesh)
@@ -83,7 +88,75 @@ def test_arrows_scale_and_vanish() -> None:
     way = np.array([0.3, 0.0, 0.0])
     assert force_arrow(way, np.zeros(3), 0.01).vertices[:, 0].max() == pytest.approx(0.3)
     assert force_arrow(0 * way, np.zeros(3), 0.01) is NOTHING
-    assert torque_ring(np.zeros(3), np.zeros(3), 0.01) is NOTHING
+
+
+def test_unit_meshes_are_of_length_and_radius_one() -> None:
+    arrow = unit_arrow(0.01).vertices
+    assert (arrow[:, 0].min(), arrow[:, 0].max()) == pytest.approx((0.0, 1.0))
+    assert np.hypot(arrow[:, 1], arrow[:, 2]).max() == pytest.approx(0.026)
+    ring = unit_ring(0.05).vertices
+    middle = ring[-2:]  # of both ends
+    assert np.hypot(*middle[:, :2].T) == pytest.approx(1.0) and middle[:, 2] == pytest.approx(0.0)
+    assert middle[0] == pytest.approx([1.0, 0.0, 0.0])
+    assert middle[1] == pytest.approx([math.cos(TURN), math.sin(TURN), 0.0]), "the head is at its end"
+
+
+def test_quaternions_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(4)
+    halves = [Rotation.from_rotvec(math.pi * axis) for axis in np.eye(3)]
+    for rotation in (*Rotation.random(50, random_state=4), *halves):
+        known = rotation.as_quat()[[3, 0, 1, 2]]
+        found = quaternion(rotation.as_matrix())
+        assert abs(found @ known) == pytest.approx(1.0)
+        angle = rng.uniform(-3.0, 3.0)
+        both = (rotation * Rotation.from_euler("x", angle)).as_quat()[[3, 0, 1, 2]]
+        assert abs(turned_about_x(found, np.array(angle)) @ both) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("turn", [along_x, about_z])
+def test_directions_become_rotations(turn: Any) -> None:
+    axis = 0 if turn is along_x else 2
+    ways = [*np.random.default_rng(5).normal(size=(40, 3)), *np.eye(3), *-np.eye(3)]
+    for way in ways:
+        direction = way / np.linalg.norm(way)
+        rotation = turn(direction)
+        np.testing.assert_allclose(rotation[:, axis], direction, atol=1e-12)
+        np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+class Recorded:
+    """A scene whose nodes keep what they are told."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **options: SimpleNamespace(**options)
+
+
+def test_forces_start_at_blades_and_fans_reach_as_far_as_they_beat() -> None:
+    layout, scene = load_layout("ucat"), Recorded()
+    nodes: Any = ForceNodes(scene)  # type: ignore[arg-type]
+    nodes.place(layout, (1.0, 1.0))
+    forces = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 1e-6]])
+    amplitude = np.array([0.5, 0.0, 0.0, 0.0])
+    nodes.command(forces, amplitude, np.array([0.3, 0.0, 0.0, 0.0]))
+    arrows, fans = nodes._arrows.node, nodes._fans
+    assert arrows.points.shape == (2, 2, 3) and arrows.visible and fans.visible
+    np.testing.assert_allclose(arrows.points[:, 1] - arrows.points[:, 0], forces[[0, 2]], atol=1e-4)
+    light = [255.0 * linear(FIN_COLORS[k]) for k in (0, 2)]
+    np.testing.assert_allclose(arrows.colors, light, atol=0.5)
+    wedge, angles = unit_wedge().vertices, []
+    assert fans.batched_wxyzs.shape == (WEDGES, 4)
+    for wxyz, place, scale in zip(
+        fans.batched_wxyzs, fans.batched_positions, fans.batched_scales, strict=True
+    ):
+        turned = Rotation.from_quat(wxyz[[1, 2, 3, 0]]).apply(wedge * scale) + place
+        own = (turned - arrows.points[0, 0]) @ layout.frames[0].T
+        assert own[:, 0] == pytest.approx(0.0, abs=1e-3), "all of it lies across the shaft"
+        assert np.hypot(own[:, 1], own[:, 2]).max() == pytest.approx(CHORD, rel=0.05)
+        angles += np.arctan2(-own[:, 2], -own[:, 1]).tolist()
+    assert (min(angles), max(angles)) == pytest.approx((0.3 - 0.5, 0.3 + 0.5), abs=2e-3)
+    nodes.command(0.0 * forces, 0.0 * amplitude, amplitude)
+    assert not arrows.visible and not fans.visible
 
 
 def test_a_direction_follows_the_hand_on_a_sphere_and_jumps_to_axes() -> None:

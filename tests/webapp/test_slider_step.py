@@ -142,8 +142,8 @@ def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytes
     words = "own calls, those of the app, files, times that the page is written, messages, bytes"
     print(f"{drawer}: {steps[1:]} {words} in a step")
     if os.environ.get("FINLAB_CALLS"):
-        for code, calls in count.of.most_common(90):
-            print(f"{calls:6} {code.co_filename.split('/')[-1]} {code.co_name}")
+        for code, calls in count.of.most_common():
+            print(f"{calls:6} {'/'.join(code.co_filename.split('/')[-3:])} {code.co_name}")
     calls, of_app, files, _, _, size = map(max, zip(*steps[1:], strict=True))
     # On a busy machine an answer may be later than the page waits.
     times, sent = min(step[3] for step in steps[1:]), min(step[4] for step in steps[1:])

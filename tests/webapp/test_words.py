@@ -34,7 +34,7 @@ from webapp.markup.verdict import (
 from webapp.markup.words import SPEED, authority_sentence, in_app, trim_sentence
 from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
-from webapp.scene.wrench_nodes import LENGTH, LONGEST, NEWTONS, SHORTEST, fitting
+from webapp.scene.wrench_nodes import ARROWS, LENGTH, NEWTONS, fitting
 from webapp.session import Session, files
 from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
@@ -164,11 +164,11 @@ def test_reach_is_a_bound_that_is_met_on_heave() -> None:
 
 def test_arrow_scale_fits_and_rests() -> None:
     def newtons_for(largest: float, current: float) -> float:
-        return fitting(NEWTONS, largest, current, LENGTH, (SHORTEST, LONGEST))
+        return fitting(NEWTONS, largest, current, LENGTH, ARROWS)
 
     for largest in (0.01, 0.3, 1.2, 9.0, 60.0):
         newtons = newtons_for(largest, 1.0)
-        assert LENGTH * largest / newtons <= LONGEST
+        assert LENGTH * largest / newtons <= ARROWS[1]
     assert newtons_for(1.3, newtons_for(1.2, 1.0)) == newtons_for(1.2, 1.0)
 
 

@@ -76,7 +76,8 @@ def _rings(places: list[Point], shown: int) -> list[str]:
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
         color = css(MODE_COLORS[k])
         fill = color if k == shown else "transparent"
-        radius = RING + APART * sum(math.dist((x, y), place) < RING for place in places[:k])
+        under = [place for place in places[:k] if math.dist((x, y), place) < RING]
+        radius = RING + APART * len(under)
         parts.append(html(ring, press("mode", str(k)), x, y, radius, color, fill, u, v + 3.8, k + 1))
     return parts
 
@@ -105,7 +106,8 @@ def _dots(kind: str, now: Array, ends: list[int], alpha: float, before: Array | 
 def _trails(places: Array, ends: list[int]) -> str:
     if len(places) == 1:
         return Markup()
-    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1)
+    steps = [k for k in TRAIL if k < len(places) - 1]
+    kept = places[[*steps, -1]].swapaxes(0, 1).round(1)
     way = "L".join(["%g %g"] * kept.shape[1])
     lines = [
         f"<path d='M{way % tuple(row)}' stroke='{_color(end, 0.3)}'/>"
@@ -120,7 +122,7 @@ def _labels(places: list[Point]) -> list[Point]:
     (width, height) = LABEL
     for x, y in places:
         level = y - LIFT
-        while any(abs(x - u) < width and abs(level - v) < height for u, v in labels):
+        while [1 for u, v in labels if abs(x - u) < width and abs(level - v) < height]:
             level -= 0.5 * height
         labels.append((x, level))
     return labels

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.arrays import Array
 from webapp.markup.words import html
@@ -98,21 +99,25 @@ class Plot(NamedTuple):
 
     def grid(self, upright: bool) -> str:
         """Lines and labels; upright lines or none."""
-        parts, floor, left = [], self.floor, self.left
-        for value, label in self.up.ticks:
-            at = self.place(0.0, value)[1]
-            parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, self.width - RIGHT))
-            parts.append(html("<text x='{}' y='{:.1f}' text-anchor='end'>{}</text>", left - 5, at + 4, label))
-        middle = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
-        for value, label in self.across.ticks:
-            at = self.place(value, 0.0)[0]
+        floor, left, end = self.floor, self.left, self.width - RIGHT
+        across = np.array([value for value, _ in self.across.ticks])
+        up = np.array([value for value, _ in self.up.ticks])
+        right = self.place(across, 0.0)[0]
+        down = self.place(0.0, up)[1]
+        parts = []
+        # Labels of ticks are rounded numbers, or markup of ours: they need no escaping.
+        for at, (_, label) in zip(down.tolist(), self.up.ticks, strict=True):
+            parts.append(f"<path d='M{left} {at:.1f}H{end}' class='grid'/>")
+            parts.append(f"<text x='{left - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
+        for at, (_, label) in zip(right.tolist(), self.across.ticks, strict=True):
             if upright:
-                parts.append(html("<path d='M{:.1f} {}V{}' class='grid'/>", at, TOP, floor))
-            parts.append(html(middle, at, floor + 14, label))
-        parts.append(html(middle, (left + self.width) / 2, self.height - 5, self.across.word))
-        turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
-        parts.append(html("<text transform='{}' text-anchor='middle'>{}</text>", turned, self.up.word))
-        return html("{}", parts)
+                parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
+            parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
+        middle = (left + self.width) / 2
+        word = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
+        turned = f"<text transform='translate(10 {(TOP + floor) / 2}) rotate(-90)' text-anchor='middle'>"
+        words = html(word + turned + "{}</text>", middle, self.height - 5, self.across.word, self.up.word)
+        return Markup("".join(parts)) + words
 
     def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
         """The whole plot, `parts` over its grid."""

@@ -31,6 +31,12 @@ BESIDE = {
     "dual": " The answer, number 1, keeps watts least, and needs no network.",
     "mdn": " The answer, number 1, is the cheapest of them.",
 }
+ROW = (
+    "<tr class='{} pick' {} tabindex='0'><td><span class='swatch mode' style='border-color:{}'>{}</span></td>"
+    "<td class='words'>{}<div><span class='badge {}'>{}</span> <span class='dim'>{}</span></div></td>"
+    "<td class='{}'>{}</td><td>{}</td>"
+)
+EFFORT = "<td>{}</td>"
 PLOT_PX = 152
 """Height of the plot [px]."""
 
@@ -135,22 +141,21 @@ def mode_table(modes: Modes, mode: int) -> str:
         return ""
     of_fins, rows = any(not math.isnan(way.effort) for way, _, _ in modes.shown), []
     for k, (way, name, badge) in enumerate(modes.shown):
-        kind = "chosen" if k == mode else ""
-        mark = html("<span class='badge {}'>{}</span>", badge, badge)
-        origin = html("<div>{} <span class='dim'>{}</span></div>", mark, source_words(way.sources))
         rows.append(
             html(
-                "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td class='{}'>{}"
-                "</td><td>{}</td>{}<td>{:.0f} %</td></tr>",
-                kind,
+                ROW + (EFFORT if of_fins else "") + "<td>{:.0f} %</td></tr>",
+                "chosen" if k == mode else "",
                 press("mode", str(k)),
-                _swatch(k),
+                css(MODE_COLORS[k]),
+                k + 1,
                 name,
-                origin,
+                badge,
+                badge,
+                source_words(way.sources),
                 "missing" if way.err_norm > REACHED else "",
                 error_digits(way.err_norm),
                 three_digits(way.power),
-                html("<td>{}</td>", three_digits(way.effort)) if of_fins else "",
+                *([three_digits(way.effort)] if of_fins else []),
                 100 * way.saturation,
             )
         )
@@ -163,10 +168,6 @@ def mode_table(modes: Modes, mode: int) -> str:
     remark = f"{left} more are known; they come after these."
     more = html("<div class='said dim'>{}</div>", remark) if left > 0 else ""
     return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
-
-
-def _swatch(k: int) -> str:
-    return html("<span class='swatch mode' style='border-color:{}'>{}</span>", css(MODE_COLORS[k]), k + 1)
 
 
 KINDS = {Verdict.EXACT: "given", Verdict.APPROXIMATE: "near", Verdict.OUT_OF_REACH: "missing"}

@@ -4,9 +4,11 @@ Both are one node for the whole robot, so a page is sent a few numbers for each 
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.hull.mesh_file import Mesh
@@ -14,7 +16,7 @@ from finlab.layout import Layout
 from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
 from webapp.theme import Rgb, fin_color
 
-SHAFT, HEAD_RADIUS, HEAD_LENGTH = 1.0, 2.6, 5.0
+SHAFT, HEAD_RADIUS, HEAD_LENGTH = 1.0, 2.5, 4.2
 """Sizes of an arrow, in radii of its shaft."""
 THICKNESS = 0.007
 """Radius of the shafts of forces, for arrows of size 1 [m]."""
@@ -49,7 +51,7 @@ class Arrows:
             return
         points = np.stack([starts, starts + ways], axis=1)[drawn] / size
         self.node.scale = size
-        self.node.colors = np.array(colors, dtype=np.uint8)[drawn]
+        self.node.colors = linear(colors)[drawn]
         self.node.points = points.round(DIGITS).astype(np.float32)
 
 
@@ -101,7 +103,7 @@ class ForceNodes:
         scales = np.full((*across.shape, 3), size)
         scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
         turns = turned_about_x(self._turns[beats, None], across)
-        fans.batched_colors = np.repeat(np.array(self._colors, dtype=np.uint8)[beats], WEDGES, axis=0)
+        fans.batched_colors = np.repeat(linear(self._colors)[beats], WEDGES, axis=0)
         fans.batched_positions = _rows(np.broadcast_to(self._starts[beats, None], (*across.shape, 3)))
         fans.batched_scales = _rows(scales)
         fans.batched_wxyzs = _rows(turns)
@@ -110,6 +112,14 @@ class ForceNodes:
 def _rows(values: Array) -> Array:
     """Values of all wedges, one a row."""
     return np.asarray(values.reshape(-1, values.shape[-1]).round(DIGITS).astype(np.float32))
+
+
+def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
+    """Colours (n, 3) in linear light (IEC 61966-2-1): viser takes those of instances for that, and those of
+    other meshes for sRGB (its `BatchedMeshBase.tsx`, `setRGB` without a colour space)."""
+    share = np.array(colors) / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.asarray((255.0 * light).round().astype(np.uint8))
 
 
 def unit_wedge() -> Mesh:
