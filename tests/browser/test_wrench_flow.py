@@ -67,7 +67,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
 def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     session, answering = page.session, page.view.jobs.answering
     page.tab("Candidates")
-    rows = page.page.locator("table.modes tr.pick")
+    rows = page.page.locator("table.modes tr.pick >> visible=true")  # another drawer has one, too
     # The table is drawn again when the network's rows come.
     page.until(lambda: not answering.searching and "component" in rows.last.inner_text())
     assert "optimum" in rows.first.inner_text()

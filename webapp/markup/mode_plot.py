@@ -107,7 +107,7 @@ def _trails(places: Array, ends: list[int]) -> str:
     if len(places) == 1:
         return Markup()
     steps = [k for k in TRAIL if k < len(places) - 1]
-    kept = places[[*steps, -1]].swapaxes(0, 1).round(1)
+    kept = places[[*steps, -1]].swapaxes(0, 1).round()
     way = "L".join(["%g %g"] * kept.shape[1])
     lines = [
         f"<path d='M{way % tuple(row)}' stroke='{_color(end, 0.3)}'/>"
