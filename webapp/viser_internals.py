@@ -1,4 +1,18 @@
-"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is upgraded."""
+"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is upgraded.
+
+Each function says why; what would make it needless upstream:
+
+| here | upstream |
+|---|---|
+| `start_server`, `_guarded` | a hook for requests, headers, logger and sizes in `infra/_infra.py`, `WebsockServer.start` |
+| `_name_page` | title, icon and first page as arguments of `ViserServer` (`_viser.py`) |
+| `stored` | an awaitable `get_item` of `client.local_storage` (`_viser.py`) |
+| `_quicken` | the archive of icons kept open (`_icons.py`), hints per class (`_assignable_props_api.py`) |
+| `uuid_of` | a public name of a widget's element in the page (`_gui_handles.py`) |
+| `run_script`, `run_file` | a public way to run a script, as its plots do (`_gui_api.py`, `add_plotly`) |
+| `hold_uploads` | sizes and parts checked as they come (`_gui_api.py`, `_handle_file_transfer_part`) |
+| `disable_sharing` | an argument that closes the share tunnel (`_viser.py`, `ShareUrlRequest`) |
+"""
 
 import asyncio
 import contextlib

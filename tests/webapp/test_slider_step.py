@@ -30,8 +30,8 @@ OURS = (f"{Path(finlab.__file__).parent}/", APP)
 SETTLED_S = 1.6
 """Longer than the page lets anything wait that belongs to a step [s]."""
 MOST_CALLS = {"Candidates": 1850, "folded": 760}
-"""Of the library's and the app's functions together; most are the library's: what is proved of the answer takes
-230, and the candidates of a network 1,000."""
+"""Of the library's and the app's functions together; most are the library's: what is proved of the answer
+takes 230, and the candidates of a network 1,000."""
 MOST_OF_APP = {"Candidates": 590, "folded": 325}
 MOST_MESSAGES, MOST_BYTES = 12, 6000
 MOST_FILES, MOST_WRITTEN = 62, 2

@@ -49,7 +49,8 @@ def add_target(page: Page) -> None:
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
-    sliders, ends = [_add_slider(page, k) for k in range(6)], [1.0] * 6
+    sliders: list[Any] = [_add_slider(page, k) for k in range(6)]
+    ends = [1.0] * 6
 
     def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         ends[:] = [slider_end(size) for size in axis_reach(able, failed, flow).tolist()]
@@ -76,16 +77,18 @@ def add_target(page: Page) -> None:
 
     def hint(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Say what the marks are; they change more often than that."""
-        known = None if ranges is None else (able, failed, flow, *np.isfinite(ranges.low).tolist())
-        if known is None or known == said.get("hints"):
+        if ranges is None:
             return
-        said["hints"] = known
+        known = able, failed, flow, np.isfinite(ranges.low).tolist()
+        if known == said.get("hints"):
+            return
         most = axis_reach(able, failed, flow)  # with the others free
         for k, slider in enumerate(sliders):
             if able.commanded[k]:
                 slider.hint = _hint(k, ranges.low[k], most[k])
             else:
                 slider.hint = AXIS_WORDS[k].capitalize()
+        said["hints"] = known
 
     page.add_html(mark)
     board.act(hint)

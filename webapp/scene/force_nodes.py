@@ -109,9 +109,9 @@ class ForceNodes:
         fans.batched_wxyzs = _rows(turns)
 
 
-def _rows(values: Array) -> Array:
+def _rows(values: Array) -> NDArray[np.float32]:
     """Values of all wedges, one a row."""
-    return np.asarray(values.reshape(-1, values.shape[-1]).round(DIGITS).astype(np.float32))
+    return values.reshape(-1, values.shape[-1]).round(DIGITS).astype(np.float32)
 
 
 def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
