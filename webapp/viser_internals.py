@@ -4,7 +4,7 @@ Each function says why; what would make it needless upstream:
 
 | here | upstream |
 |---|---|
-| `start_server`, `_guarded` | a hook for requests, headers, logger and sizes in `infra/_infra.py`, `WebsockServer.start` |
+| `start_server`, `_guarded` | hooks for requests, headers and sizes (`infra/_infra.py`, `WebsockServer`) |
 | `_name_page` | title, icon and first page as arguments of `ViserServer` (`_viser.py`) |
 | `stored` | an awaitable `get_item` of `client.local_storage` (`_viser.py`) |
 | `_quicken` | the archive of icons kept open (`_icons.py`), hints per class (`_assignable_props_api.py`) |
