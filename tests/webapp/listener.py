@@ -1,6 +1,7 @@
 """A browser's ear: connects to a viser server as its page does, and keeps the messages that come."""
 
 import threading
+import time
 from typing import Any, NamedTuple
 
 import msgspec
@@ -9,6 +10,8 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+QUIET_S = 1.0
+"""After so long without a message nothing more is on its way [s]."""
 HEAD = 16
 """Bytes before what is compressed: its size as plain and as compressed bytes, eight each."""
 
@@ -45,6 +48,14 @@ class Listener:
             window = msgspec.msgpack.decode(plain)
             arrays = window["binaryBufferLengths"]
             self.heard += [_heard(message, arrays) for message in window["messages"]]
+
+    def wait(self) -> None:
+        """Let all come that a page is told first, and forget it."""
+        before = -1
+        while before != len(self.heard) or not self.heard:
+            before = len(self.heard)
+            time.sleep(QUIET_S)
+        self.forget()
 
     def forget(self) -> None:
         """Begin anew."""

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -18,6 +19,7 @@ from viser import _messages
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.listener import Listener
 from tests.webapp.stand_in import SilentClient, load_stand_in, until
 from webapp.app import App, SessionStore, _session_keys
 from webapp.serving import serve
@@ -67,6 +69,35 @@ def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> N
     assert view.shown is not None
     assert view.shown.target[0] == pytest.approx(1.18)
     assert len(view.client.notes) == 0
+
+
+def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
+    server: viser.ViserServer, view: View
+) -> None:
+    session, jobs = view.session, view.jobs
+
+    def do(act: Callable[[], object]) -> None:
+        on_loop(server, lambda: view.do(act))
+        until(lambda: on_loop(server, lambda: view.is_settled))
+
+    do(session.fold_drawer)
+    do(lambda: session.set_target(0, 0.9))
+    ranges, search = jobs.ranging.question, jobs.answering.search.question
+    assert ranges is not None and ranges.target[0] == 0.9 and jobs.analyst.question is None
+    assert search is not None and search.kind == "", "the answer is proved, its modes are not looked for"
+    do(lambda: session.show_task("Design"))
+    do(lambda: session.set_target(0, 0.8))
+    assert jobs.ranging.question is ranges and jobs.answering.search.question is search
+    assert view.shown is not None and view.shown.target[0] == 0.8 and jobs.analyst.question is None
+    do(session.fold_drawer)
+    assert jobs.analyst.answer is not None, "an opened drawer asks at once"
+    listener = Listener(server)
+    listener.wait()
+    do(lambda: None)
+    do(lambda: session.set_target(0, 0.8))
+    time.sleep(0.3)
+    assert listener.heard == []
+    listener.close()
 
 
 def test_refusals_become_notes_and_lose_nothing(server: viser.ViserServer, view: View) -> None:
