@@ -32,7 +32,7 @@ SETTLED_S = 1.6
 MOST_CALLS = {"Candidates": 1850, "folded": 760}
 """Of the library's and the app's functions together; most are the library's: what is proved of the answer
 takes 230, and the candidates of a network 1,000."""
-MOST_OF_APP = {"Candidates": 590, "folded": 325}
+MOST_OF_APP = {"Candidates": 620, "folded": 340}
 MOST_MESSAGES, MOST_BYTES = 12, 6000
 MOST_FILES, MOST_WRITTEN = 66, 2
 
@@ -145,7 +145,8 @@ def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytes
     if os.environ.get("FINLAB_CALLS"):
         for code, calls in count.of.most_common():
             print(f"{calls:6} {'/'.join(code.co_filename.split('/')[-3:])} {code.co_name}")
+    calls, of_app, files, _, _, size = map(max, zip(*steps[1:], strict=True))
     # On a busy machine an answer may be later than the page waits, and the page is written once more.
-    calls, of_app, files, times, sent, size = map(min, zip(*steps[1:], strict=True))
+    times, sent = min(step[3] for step in steps[1:]), min(step[4] for step in steps[1:])
     assert 100 < calls <= MOST_CALLS[drawer] and 50 < of_app <= MOST_OF_APP[drawer] and files <= MOST_FILES
     assert 1 < times <= MOST_WRITTEN and 3 < sent <= MOST_MESSAGES and size <= MOST_BYTES
