@@ -39,7 +39,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     force = page.instances("/robot/forces")[0]
     page.press("2")
     page.until(lambda: session.state.failed == ("front_left",))
-    page.until(lambda: "failed" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
+    page.until(lambda: "lost" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
     page.until(
         lambda: len(page.instances("/robot/forces")) == 3 and page.instances("/robot/forces")[0] != force
     )

@@ -48,7 +48,7 @@ def find(question: Question) -> Findings:
     kind = DRAWN[question.drawn]
     now = reference = None
     if kind is not None:
-        now = attainable_set(layout, kind, failed=failed, flow=flow)
+        now = attainable_set(layout, kind, lost=failed, flow=flow)
         if failed or other:
             reference = attainable_set(layout if failed else saved, kind, flow=flow)
     card = score_card(layout, failed, flow)
