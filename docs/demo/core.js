@@ -55,7 +55,7 @@ export function prepare(core, block, n) {
     const command = rows("command", 3);
     const power = force.map(([first, second], i) => {
       const size = second === 0 ? first : Math.hypot(first, second);
-      return core.cost_at(robot, i, size);
+      return core.fl_power_of_force(robot, i, size);
     });
     if (lost >= 0) for (const each of [force, command, power]) each[lost] = null;
     const [within] = answered("within");
