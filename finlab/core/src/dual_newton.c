@@ -1,15 +1,37 @@
 /* Newton's method on the dual, for one target.
 
-       max over l of  g(l) = l.w - sum c*(B'l),   with gradient  w - sum B y(B'l)
+       max over lambda of  g(lambda) = lambda.w - sum c*(B'lambda)
+       with gradient       r = w - sum B y(B'lambda)
 
-   g is concave, its Hessian is -G with G = sum B (dy/ds) B'. Where actuators are at their limits G loses rank:
-   a ridge mu (S + c tr(G) M) keeps the step finite and is adapted to what a step brought (Levenberg, Marquardt).
-   S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as they are, and M the Hessian
-   of quadratic costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have 6 numbers,
-   those behind its range are 0. */
+   g is concave, its Hessian is -G with G = sum B (dy/ds) B'. Where actuators are at their
+   limits G loses rank: a ridge mu (S + c tr(G) M) keeps the step finite and is adapted to
+   what a step brought (Levenberg, Marquardt). S = sum B (|y|/|s|) B' is the same as G, but
+   of forces over prices, which limits leave as they are, and M the Hessian of quadratic
+   costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have
+   6 numbers, those behind its range are 0.
+
+       lambda  multipliers of the wrench, in the basis of driven directions [W]    Eq. 3
+       s       price of one actuator's force, s = B' lambda [W/N]                  Eq. 4
+       y       force with which it responds, y = grad c*(s) [N]                    Eq. 5
+       r       residual, r = w - sum B y = grad g(lambda)                          Eq. 6
+       G       sum B (dy/ds) B', minus the Hessian of g                            Eq. 7
+       mu, nu  damping of the step; its growth after a refused one                 Eq. 8
+       S       secants of the responses                                            Eq. 9
+       l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-#define SATURATED R(1e-1) /* share c of M, and ridge to begin with where an actuator may be at its limit; NEARLY elsewhere */
+/* Share c of M, and first mu where an actuator may be at its limit; NEARLY elsewhere. */
+#define SATURATED R(1e-1)
+#define NEAR_LIMIT R(0.8)     /* share of the largest force from which an actuator may be there */
+#define FELL R(0.9)           /* a residual above this share of the last one has not improved */
+#define JUMPS 4               /* trials with a jump after which Newton's method stands still */
+#define JUMP_STEP R(1e-3)     /* squared step, over squared multipliers, too long to judge */
+#define SHORT_STEP R(1e-7)    /* the same, in which any large change of a force is a jump */
+#define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
+#define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
+#define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
+#define SHARE_LEAST R(1e-3)   /* of a refused step, the least share that is tried next */
+#define SHARE_MOST R(0.7)     /* the largest one */
 
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
@@ -20,50 +42,70 @@ void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
   }
 }
 
-/* Prices in the basis of those of the wrench. */
-void fl_reduce_lambda(const fl_work *work, const real *price, real *inner) {
+/* Multipliers in the basis [W] of those of the wrench [W/N, W/(N m)]. */
+void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
-    inner[j] = 0;
-    for (int k = 0; k < 6; k++) inner[j] += span->basis[k][j] * span->scale[k] * price[k];
+    lambda_reduced[j] = 0;
+    for (int k = 0; k < 6; k++) {
+      lambda_reduced[j] += span->basis[k][j] * span->scale[k] * lambda[k];
+    }
   }
 }
 
-/* Whether a wrench lies in the range but for rounding. */
+/* Whether a wrench lies in the range of the effectiveness but for rounding. */
 int fl_is_in_range(const fl_work *work, const real *wrench, const real *target) {
   const fl_span *span = &work->span;
-  real rest = 0, all = 0;
+  real outside_squared = 0;
+  real size_squared = 0;
   for (int k = 0; k < 6; k++) {
-    real scaled = wrench[k] / span->scale[k], left = scaled - dot(span->basis[k], target, 6);
-    rest += left * left, all += scaled * scaled;
+    const real scaled = wrench[k] / span->scale[k];
+    const real outside = scaled - dot(span->basis[k], target, 6);
+    outside_squared += outside * outside;
+    size_squared += scaled * scaled;
   }
-  return SQRT(rest) <= MAX(NEARLY, 10 * ROUNDING) * (R(1e-3) + SQRT(all));
+  const real rounding = fl_larger(NEARLY, 10 * ROUNDING);
+  return SQRT(outside_squared) <= rounding * (R(1e-3) + SQRT(size_squared));
 }
 
-/* The wrench [N, N m] of forces. */
+/* The wrench [N, N m] of forces, sum B y. */
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench) {
   const fl_span *span = &work->span;
-  real given[6] = {0};
-  for (int i = 0; i < COUNT(block); i++)
-    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++)
-      for (int j = 0; j < span->range; j++) given[j] += force[i][q] * span->matrix[i][q][j];
-  for (int k = 0; k < 6; k++) wrench[k] = span->scale[k] * dot(span->basis[k], given, 6);
+  real reduced[6] = {0};
+  for (int i = 0; i < COUNT(block); i++) {
+    for (int row = 0; row < (int)ACTUATOR(block, i)->rows; row++) {
+      for (int j = 0; j < span->range; j++) reduced[j] += force[i][row] * span->matrix[i][row][j];
+    }
+  }
+  for (int k = 0; k < 6; k++) wrench[k] = span->scale[k] * dot(span->basis[k], reduced, 6);
 }
 
-/* What follows from all sets. */
+/* The largest cost [W] within a set: C of Eq. 13 is the sum of all. */
+static real largest_cost(const fl_set *set) {
+  real reverse_cost = 0;
+  if (set->reverse > 0) reverse_cost = set->reverse_cost;
+  return fl_larger(fl_larger(set->low_cost, set->high_cost), reverse_cost);
+}
+
+/* Sets what follows from all sets: the largest cost, and which kinds of sets there are. */
 void fl_prepare_sets(const real *block, fl_work *work) {
-  work->most_cost = 0, work->quick = 1, work->torn = work->drags = work->turns = 0;
+  work->most_cost = 0;
+  work->quick = 1;
+  work->torn = 0;
+  work->drags = 0;
+  work->turns = 0;
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_set *s = work->set + i;
-    work->most_cost += MAX(MAX(s->low_cost, s->high_cost), s->reverse > 0 ? s->reverse_cost : 0);
-    if (s->turn > 0) {
-      const real farthest = MIN(FABS(s->middle - s->at) + s->half, PI);
-      work->most_cost += s->turn / 2 * farthest * farthest;
+    const fl_actuator *a = ACTUATOR(block, i);
+    const fl_set *set = work->set + i;
+    work->most_cost += largest_cost(set);
+    if (set->turn > 0) {
+      const real farthest = fl_smaller(FABS(set->middle - set->at) + set->half, PI);
+      work->most_cost += set->turn / 2 * farthest * farthest;
       work->turns = 1;
     }
-    work->torn |= s->forked || s->reverse > 0;
-    work->drags |= ACTUATOR(block, i)->speed > 0 && !work->span.lost[i];
-    if (work->torn || work->drags || work->turns || ACTUATOR(block, i)->band > 0) work->quick = 0;
+    work->torn |= set->forked || set->reverse > 0;
+    work->drags |= a->speed > 0 && !work->span.lost[i];
+    if (work->torn || work->drags || work->turns || a->band > 0) work->quick = 0;
   }
 }
 
@@ -72,147 +114,272 @@ void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
   fl_prepare_sets(block, work);
 }
 
-/* What prices give for a target in the basis. */
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price, fl_state *state) {
-  real given[6] = {0}, conjugate = 0;
+/* Size of a force, or of a price, along one direction or in a plane. */
+static real length(const fl_actuator *a, const real *vector) {
+  if (a->rows == 1) return FABS(vector[0]);
+  return size_of(vector);
+}
+
+/* Evaluates the dual at multipliers, for a target in the basis: its value, its gradient and
+   the responses. */
+void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
+                fl_state *state) {
+  real wrench[6] = {0}; /* sum B y */
+  real conjugate = 0;   /* sum c*(s) */
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real own[2], *slope = state->slope[i];
-    own_price(work, i, price, own);
-    response o = fl_response(block, i, work->set + i, own);
-    state->force[i][0] = o.force[0], state->force[i][1] = o.force[1];
-    slope[0] = o.xx, slope[1] = o.xy, slope[2] = o.yy;
-    state->angle[i] = o.angle;
-    int line = a->rows == 1;
-    real paid = line ? FABS(own[0]) : size_of(own), size = line ? FABS(o.force[0]) : size_of(o.force);
-    slope[3] = work->drags ? 0 : size / MAX(paid, a->most[0] / a->gain[0]);
-    conjugate += o.conjugate;
-    const real(*matrix)[6] = work->span.matrix[i];
-    for (int j = 0; j < 6; j++) given[j] += o.force[0] * matrix[0][j] + o.force[1] * matrix[1][j];
+    real s[2];
+    own_price(work, i, lambda, s);
+    const response answer = fl_response(block, i, work->set + i, s); /* y, dy/ds, c*(s): Eq. 4, 5 */
+    const real *y = answer.force;
+
+    state->force[i][0] = y[0];
+    state->force[i][1] = y[1];
+    state->slope[i][0] = answer.xx;
+    state->slope[i][1] = answer.xy;
+    state->slope[i][2] = answer.yy;
+    state->angle[i] = answer.angle;
+    const real size_s = length(a, s);
+    const real size_y = length(a, y);
+    state->slope[i][3] = 0;
+    if (!work->drags) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
+      const real price_of_gain = a->most[0] / a->gain[0];
+      state->slope[i][3] = size_y / fl_larger(size_s, price_of_gain);
+    }
+    conjugate += answer.conjugate;
+    const real(*B)[6] = work->span.matrix[i];
+    for (int j = 0; j < 6; j++) wrench[j] += y[0] * B[0][j] + y[1] * B[1][j];
   }
-  for (int j = 0; j < 6; j++) state->price[j] = price[j], state->residual[j] = target[j] - given[j];
-  state->value = dot(price, target, 6) - conjugate;
+  for (int j = 0; j < 6; j++) {
+    state->price[j] = lambda[j];
+    state->residual[j] = target[j] - wrench[j]; /* Eq. 6 */
+  }
+  state->value = dot(lambda, target, 6) - conjugate; /* Eq. 3 */
   state->size = SQRT(dot(state->residual, state->residual, 6));
 }
 
-/* Has Newton's method be at prices. */
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *price) {
+/* Has Newton's method be at multipliers. */
+void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda) {
   work->now = work->state;
-  fl_dual_at(block, work, target, price, work->state);
+  fl_dual_at(block, work, target, lambda, work->state);
 }
 
-/* Prices to begin with: those at which actuators whose costs are ~ T^1.5 give a target, each with its force over price
-   at what it gives where costs are quadratic. */
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price, real *ridge) {
-  real even[6], h[6][6] = {{0}}, trace;
-  fl_solve((real(*)[6])work->factor, target, even);
-  *ridge = NEARLY;
+/* Largest force [N] of a line at prices of this sign, and its force over price there [N^2/W]. */
+static void gain_of_line(const real *block, const fl_actuator *a, real s, real *most, real *gain) {
+  const real *table = block + (int)a->ahead;
+  if (s < 0 && a->back > 0) table = block + (int)a->back;
+  const real largest_price = table[0];
+  const int cells = (int)table[1];
+  const real largest_force = table[3 + 3 * cells];
+  *most = a->share * largest_force;
+  *gain = *most * a->share / (largest_price * a->worth);
+}
+
+/* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
+   each with its force over price at what it gives where costs are quadratic. Also the first
+   mu. */
+void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
+                     real *mu) {
+  /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
+     is only read. */
+  real lambda_quadratic[6];
+  fl_solve((real(*)[6])work->factor, target, lambda_quadratic);
+  real H[6][6] = {{0}};
+  *mu = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    real own[2], most = a->most[0], gain[2] = {a->gain[0], a->gain[1]};
-    own_price(work, i, even, own);
-    real size = a->gain[0] * (is_plane(a) ? size_of(own) : FABS(own[0]));
-    if (a->rows == 1) {
-      const real *table = block + (int)(own[0] < 0 && a->back > 0 ? a->back : a->ahead);
-      most = a->share * table[3 + 3 * (int)table[1]];
-      gain[0] = most * a->share / (table[0] * a->worth);
+    real s[2];
+    own_price(work, i, lambda_quadratic, s);
+    real size_s = FABS(s[0]); /* of a foil its lift alone counts */
+    if (is_plane(a)) size_s = size_of(s);
+    const real size_y = a->gain[0] * size_s;
+    real most = a->most[0];
+    real gain[2] = {a->gain[0], a->gain[1]};
+    if (a->rows == 1) gain_of_line(block, a, s[0], &most, &gain[0]);
+
+    const real share = size_y / most;
+    if (share > NEAR_LIMIT) *mu = SATURATED;
+    /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
+    real weight = SQRT(fl_clipped(share, CLOSE, 1));
+    if (share > 1 && !work->drags) weight = 1 / share;
+    for (int row = 0; row < (int)a->rows; row++) {
+      fl_add_square(H, work->span.matrix[i][row], weight * gain[row]);
     }
-    real share = size / most;
-    if (share > R(0.8)) *ridge = SATURATED;
-    real weight = share > 1 && !work->drags ? 1 / share : SQRT(CLIP(share, CLOSE, 1));
-    for (int q = 0; q < (int)a->rows; q++) fl_add_square(h, work->span.matrix[i][q], weight * gain[q]);
   }
-  trace = fl_trace(h);
-  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
-  if (fl_factor(h))
-    fl_solve(h, target, price);
-  else
-    for (int j = 0; j < 6; j++) price[j] = target[j] / trace;
+  const real trace = fl_trace(H);
+  for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace; /* regular behind the range, too */
+  if (fl_factor(H)) {
+    fl_solve(H, target, lambda);
+    return;
+  }
+  for (int j = 0; j < 6; j++) lambda[j] = target[j] / trace;
 }
 
-/* The step of the prices at a ridge; 0 where there is none. */
-static int step_of(const real *block, const fl_work *work, const fl_state *s, real ridge, real *step) {
-  real h[6][6] = {{0}};
-  for (int i = 0; i < COUNT(block); i++) {
-    const real *b = work->span.matrix[i][0], *c = work->span.matrix[i][1], *slope = s->slope[i];
-    real xx = slope[0] + ridge * slope[3], xy = slope[1], yy = slope[2] + ridge * slope[3];
-    if (ACTUATOR(block, i)->rows == 1) {
-      if (xx > 0) fl_add_square(h, b, xx);
-      continue;
-    }
-    for (int j = 0; j < 6; j++) {
-      real u = xx * b[j] + xy * c[j], v = xy * b[j] + yy * c[j];
-      for (int k = 0; k <= j; k++) h[j][k] += u * b[k] + v * c[k];
-    }
+/* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
+static void add_plane(real H[6][6], const real *bx, const real *by, real xx, real xy, real yy) {
+  for (int row = 0; row < 6; row++) {
+    const real DBx = xx * bx[row] + xy * by[row];
+    const real DBy = xy * bx[row] + yy * by[row];
+    for (int col = 0; col <= row; col++) H[row][col] += DBx * bx[col] + DBy * by[col];
   }
-  real added = (work->drags ? 1 : SATURATED) * ridge * MAX(fl_trace(h), work->least_trace);
-  for (int j = 0; j < 6; j++)
-    for (int k = 0; k <= j; k++) h[j][k] += added * work->metric[j][k];
-  if (!fl_factor(h)) return 0;
-  fl_solve(h, s->residual, step);
+}
+
+/* Solves (G + mu (S + c tr(G + mu S) M)) step = r, Eq. 8; 0 where that is singular to rounding. */
+static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
+                       real *step) {
+  real H[6][6] = {{0}};
+  for (int i = 0; i < COUNT(block); i++) {
+    const real(*B)[6] = work->span.matrix[i];
+    const real *slope = at->slope[i];
+    const real xx = slope[0] + mu * slope[3];
+    const real xy = slope[1];
+    const real yy = slope[2] + mu * slope[3];
+    if (ACTUATOR(block, i)->rows != 1)
+      add_plane(H, B[0], B[1], xx, xy, yy);
+    else if (xx > 0)
+      fl_add_square(H, B[0], xx);
+  }
+  real c = SATURATED;
+  if (work->drags) c = 1; /* S is left out there */
+  const real weight = c * mu * fl_larger(fl_trace(H), work->least_trace);
+  for (int row = 0; row < 6; row++) {
+    for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
+  }
+  if (!fl_factor(H)) return 0;
+  fl_solve(H, at->residual, step);
   return 1;
 }
 
-#define JUMPS 4 /* looks at which an answer jumps, after which Newton's method stands still */
-
-/* How many answers jump between two states a step apart; where wanted they are marked as what is to be cut. */
-static int jumps_between(const real *block, fl_work *work, const fl_state *one, const fl_state *other,
-                         const real *step, int marked) {
-  const real full = NOTHING * work->most_cost; /* in a hole around rest prices go to 0 */
-  const real square = dot(step, step, 6);
-  const real all = dot(one->price, one->price, 6) + 100 * work->most_cost * full;
+/* How many responses jump between two states a step apart; where wanted they are marked as
+   what is to be cut. */
+static int jumps_between(const real *block, fl_work *work, const fl_state *one,
+                         const fl_state *other, const real *step, int marked) {
+  const real full = NOTHING * work->most_cost; /* in a hole around rest multipliers go to 0 */
+  const real step_squared = dot(step, step, 6);
+  const real lambda_squared = dot(one->price, one->price, 6) + 100 * work->most_cost * full;
+  if (!(step_squared < JUMP_STEP * lambda_squared)) return 0;
+  const int is_short = step_squared < SHORT_STEP * lambda_squared;
   int jumps = 0;
-  if (!(square < R(1e-3) * all)) return 0;
   for (int i = 0; i < COUNT(block); i++) {
     fl_set *set = work->set + i;
-    real own[2];
     if (!(set->turn > 0)) continue;
-    own_price(work, i, step, own);
-    if (!fl_has_jumped(block, i, set, one, other, own, square < R(1e-7) * all)) continue;
+    real s[2];
+    own_price(work, i, step, s);
+    if (!fl_has_jumped(block, i, set, one, other, s, is_short)) continue;
     jumps++;
     if (marked) fl_mark_jump(set, one->angle[i], other->angle[i]);
   }
   return jumps;
 }
 
-/* Newton's method from prices on; work->now is what it comes to. */
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price, int most_steps) {
-  fl_state *s = work->state, *trial = work->state + 1;
-  real first[6], step[6], next[6], ridge = NEARLY, growth = 2, most = work->most_cost * (1 + NOTHING) + NOTHING;
-  if (!price) fl_first_lambda(block, work, target, first, &ridge);
-  fl_dual_start(block, work, target, price ? price : first);
-  real value = s->value, size = s->size; /* when it last got better by more than rounding */
+/* What a trial step brought: slopes of the dual value along it at both of its ends, and its
+   rise [W]. */
+typedef struct {
+  real slope_begin, slope_end, rise;
+  real slope_left; /* l, Eq. 10 */
+} step_result;
+
+static step_result judged_step(const real *step, const fl_state *from, const fl_state *to) {
+  step_result result;
+  result.slope_begin = dot(step, from->residual, 6);
+  result.slope_end = dot(step, to->residual, 6);
+  result.slope_left = result.slope_end / fl_larger(result.slope_begin, TINY);
+  result.rise = to->value - from->value;
+  return result;
+}
+
+/* A step is kept that ends uphill, or where the value rose, or is the same and the residual
+   fell: with saturated actuators the residual may fall while the value does, too. */
+static int is_kept(const step_result *result, const fl_state *from, const fl_state *to) {
+  const real slack = ROUNDING * FABS(from->value);
+  if (result->slope_left >= 0 || result->rise > 0) return 1;
+  return result->rise > -slack && to->size < FELL * from->size;
+}
+
+static real mu_after_kept(real mu, const step_result *result) {
+  real factor = fl_clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
+  if (result->slope_left > R(0.5)) factor = MU_KEPT_EARLY;
+  return fl_larger(mu * factor, ROUNDING);
+}
+
+/* Divides mu by the share of the step where the cubic along it, of both values and slopes,
+   is largest. */
+static real mu_after_refused(real mu, real nu, const step_result *result) {
+  const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
+  const real b = result->slope_end - result->slope_begin - a;
+  const real discriminant = b * b - 4 * a * result->slope_begin;
+  real share = R(0.5);
+  if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
+  const real factor = fl_larger(nu, 1 / fl_clipped(share, SHARE_LEAST, SHARE_MOST));
+  return fl_larger(mu * factor, ROUNDING);
+}
+
+/* Newton's method from multipliers on, or from its own first ones where there are none;
+   work->now is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
+int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+                   int most_steps) {
+  /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
+  const real beyond = work->most_cost * (1 + NOTHING) + NOTHING;
+  real mu = NEARLY;
+  real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
+  real lambda_first[6];
+  if (!lambda) {
+    fl_first_lambda(block, work, target, lambda_first, &mu);
+    lambda = lambda_first;
+  }
+  fl_dual_start(block, work, target, lambda);
+  fl_state *at = work->state;
+  fl_state *trial = work->state + 1;
+  real best_value = at->value; /* when it last got better by more than rounding */
+  real best_size = at->size;
+  int idle = 0;
+  int jumps = 0;
   for (int i = 0; work->turns && i < COUNT(block); i++) work->set[i].jumps = 0;
-  for (int k = 0, idle = 0, jumps = 0;; k++) {
-    if (s->size <= TOLERANCE) return FL_MET;
-    if (s->value > most) return FL_BEYOND;
-    if (s->value > value + ROUNDING * FABS(value) || s->size < R(0.9) * size)
-      value = s->value, size = s->size, idle = 0;
-    if (k >= most_steps || idle++ > IDLE || !(ridge <= 1 / ROUNDING)) return s->size <= ENOUGH ? FL_MET : FL_STUCK;
-    work->steps++;
-    if (!step_of(block, work, s, ridge, step)) {
-      ridge *= 10;
-      continue;
+  for (int k = 0;; k++) {
+    if (at->size <= TOLERANCE) return FL_MET;
+    if (at->value > beyond) return FL_BEYOND;
+    const int has_risen = at->value > best_value + ROUNDING * FABS(best_value);
+    if (has_risen || at->size < FELL * best_size) {
+      best_value = at->value;
+      best_size = at->size;
+      idle = 0;
     }
-    for (int j = 0; j < 6; j++) next[j] = s->price[j] + step[j];
-    fl_dual_at(block, work, target, next, trial);
-    if (work->turns && jumps_between(block, work, s, trial, step, 0) && ++jumps >= JUMPS) {
-      jumps_between(block, work, s, trial, step, 1);
+    const int has_diverged = !(mu <= 1 / ROUNDING); /* or is NaN */
+    if (k >= most_steps || idle > IDLE || has_diverged) {
+      if (at->size <= ENOUGH) return FL_MET;
       return FL_STUCK;
     }
-    /* A step is kept that ends uphill, or where the value rose, or is the same and the residual fell. */
-    real slope = dot(step, s->residual, 6), end = dot(step, trial->residual, 6), change = end / MAX(slope, TINY);
-    real rose = trial->value - s->value, slack = ROUNDING * FABS(s->value);
-    if (change >= 0 || rose > 0 || (rose > -slack && trial->size < R(0.9) * s->size)) {
-      real left = FABS(change);
-      ridge = MAX(ridge * (change > R(0.5) ? R(0.3) : CLIP(left / 2, R(0.05), 1)), ROUNDING), growth = 2;
-      work->now = trial, trial = s, s = work->now;
+    idle++;
+    work->steps++;
+
+    real step[6];
+    if (!newton_step(block, work, at, mu, step)) {
+      mu *= MU_SINGULAR;
+      continue;
+    }
+    real lambda_next[6];
+    for (int j = 0; j < 6; j++) lambda_next[j] = at->price[j] + step[j];
+    fl_dual_at(block, work, target, lambda_next, trial);
+    if (work->turns && jumps_between(block, work, at, trial, step, 0)) {
+      jumps++;
+      if (jumps >= JUMPS) {
+        jumps_between(block, work, at, trial, step, 1);
+        return FL_STUCK;
+      }
+    }
+    const step_result result = judged_step(step, at, trial);
+    if (is_kept(&result, at, trial)) {
+      mu = mu_after_kept(mu, &result);
+      nu = 2;
+      work->now = trial;
+      trial = at;
+      at = work->now;
     } else {
-      /* Where the cubic along the step, of both values and slopes, is largest. */
-      real square = 3 * (slope + end - 2 * rose), line = end - slope - square, root = line * line - 4 * square * slope;
-      real share = root > 0 ? 2 * slope / (SQRT(root) - line) : R(0.5);
-      ridge = MAX(ridge * MAX(growth, 1 / CLIP(share, R(1e-3), R(0.7))), ROUNDING), growth *= 2;
-      idle--; /* refused steps are not those that gain nothing but rounding: their ridge grows to an end of its own */
+      mu = mu_after_refused(mu, nu, &result);
+      nu *= 2;
+      /* refused steps are not those that gain nothing but rounding: their mu grows to an end
+         of its own */
+      idle--;
     }
   }
 }

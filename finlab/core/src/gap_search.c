@@ -1,129 +1,205 @@
-/* The search for least power where sets have gaps: depth first, by the bounds that the dual gives on each side of a cut. */
+/* The search for least power where sets have gaps: depth first, by the bounds that the dual
+   gives on each side of a cut. */
 #include "internal.h"
 
-/* Whether the smoothed answer of an arc has a force that is smaller than any in it. */
+#define NONE R(1e30)        /* cost where no part meets the target */
+/* an answer below this share of the least force is no answer of an arc */
+#define HOLLOW_FORCE R(0.9)
+
+/* Whether the smoothed response of an arc has a force that is smaller than any in it. */
 static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
-  return is_plane(ACTUATOR(block, i)) && set->turn == 0 && set->half <= NARROW && size_of(force) < R(0.9) * set->low;
+  const int is_narrow = is_plane(ACTUATOR(block, i)) && set->turn == 0 && set->half <= NARROW;
+  return is_narrow && size_of(force) < HOLLOW_FORCE * set->low;
 }
 
 static int any_hollow(const real *block, const fl_work *work) {
-  for (int i = 0; i < COUNT(block); i++)
+  for (int i = 0; i < COUNT(block); i++) {
     if (is_hollow(block, i, work->set + i, work->now->force[i])) return 1;
+  }
   return 0;
 }
 
-/* Remembers an answer without a gap; whether one with a gap could still be cheaper. */
-static int keep(const real *block, fl_work *work, const real *target, int status, int gap, real *best) {
-  real value = work->now->value;
-  if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
-    if (work->drags)
-      fl_improve_commands(block, work, target, best);
-    else if (value < *best)
-      *best = value, memcpy(work->best, work->now->force, sizeof work->best);
-    return 0;
+/* Remembers an answer without a gap, where it is the cheapest so far. */
+static void keep_answer(const real *block, fl_work *work, const real *target, real *best_cost) {
+  if (work->drags) {
+    fl_improve_commands(block, work, target, best_cost);
+    return;
   }
-  return (status == FL_MET || (status == FL_STUCK && gap >= 0)) && value < *best * (1 - CLOSE);
+  if (!(work->now->value < *best_cost)) return;
+  *best_cost = work->now->value;
+  memcpy(work->best, work->now->force, sizeof work->best);
 }
 
-/* All gaps left on their nearer sides; forces that cannot rest keep their direction. */
-static void dive(const real *block, fl_work *work, const real *target, int status, real *best) {
-  real price[6];
+/* Remembers an answer without a gap; whether one with a gap (of actuator `gap`, or -1) could
+   still be cheaper. */
+static int is_open(const real *block, fl_work *work, const real *target, int status, int gap,
+                   real *best_cost) {
+  const real dual_value = work->now->value;
+  if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
+    keep_answer(block, work, target, best_cost);
+    return 0;
+  }
+  const int is_bound = status == FL_MET || (status == FL_STUCK && gap >= 0);
+  return is_bound && dual_value < *best_cost * (1 - CLOSE);
+}
+
+/* Whether a force is so small that its actuator is frozen at its least one, where it is in a
+   gap. */
+static int is_restless(const real *block, int i, const fl_set *set, const real *force) {
+  const int turns_free = is_plane(ACTUATOR(block, i)) && set->turn == 0;
+  return turns_free && size_of(force) < SHORTER * set->low;
+}
+
+/* Leaves all gaps on their nearer sides, round after round, until there are none; forces
+   that cannot rest keep their direction. */
+static void dive(const real *block, fl_work *work, const real *target, int status,
+                 real *best_cost) {
   for (int round = 0; round < ROUNDS; round++) {
-    const fl_state *s = work->now;
-    real largest = fl_largest_force(block, (real(*)[2])s->force);
-    int gap = fl_worst_gap(block, work, (real(*)[2])s->force, s->price);
-    if (!keep(block, work, target, status, gap, best)) return;
+    fl_state *state = work->now;
+    const real largest = fl_largest_force(block, state->force);
+    const int gap = fl_worst_gap(block, work, state->force, state->price);
+    if (!is_open(block, work, target, status, gap, best_cost)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
-      const real *force = s->force[i];
-      int hollow = is_hollow(block, i, set, force);
-      if (!hollow && !(fl_gap_of(block, work, i, force, largest, s->price) > 0)) continue;
-      if (hollow || (is_plane(ACTUATOR(block, i)) && set->turn == 0 && size_of(force) < R(0.98) * set->low)) {
+      const real *force = state->force[i];
+      const int hollow = is_hollow(block, i, set, force);
+      const int is_cut = hollow || fl_gap_of(block, work, i, force, largest, state->price) > 0;
+      if (!is_cut) continue;
+      if (hollow || is_restless(block, i, set, force))
         fl_fix_at_least_force(block, i, set, force);
-      } else
+      else
         fl_narrow_set(block, i, set, force, fl_nearer_side(block, i, set, force));
     }
     fl_prepare_sets(block, work);
-    memcpy(price, s->price, sizeof price);
-    status = fl_dual_newton(block, work, target, price, STEPS_AT_KINK);
+    real lambda[6];
+    memcpy(lambda, state->price, sizeof lambda);
+    status = fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK);
   }
 }
 
-/* Solves both sides of a cut from the prices so far and stays at the cheaper one. */
+/* Solves both sides of a cut from the multipliers so far and stays at the cheaper one. */
 static int cheaper_side(const real *block, fl_work *work, const real *target, fl_node *node) {
-  real begin[6], price[2][6], value[2];
-  int status[2], side = fl_nearer_side(block, node->cut, &node->before, node->force);
-  memcpy(begin, work->now->price, sizeof begin);
-  for (int k = 0; k < 2; k++, side = -side) {
-    fl_take_side(block, work, node, side);
-    status[k] = fl_dual_newton(block, work, target, begin, STEPS_AT_KINK);
-    value[k] = status[k] == FL_BEYOND ? R(1e30) : work->now->value;
-    memcpy(price[k], work->now->price, sizeof price[k]);
+  const int nearer = fl_nearer_side(block, node->cut, &node->before, node->force);
+  const int side[2] = {nearer, -nearer};
+  real lambda_begin[6];
+  real lambda[2][6];
+  real cost[2];
+  int status[2];
+  memcpy(lambda_begin, work->now->price, sizeof lambda_begin);
+  for (int k = 0; k < 2; k++) {
+    fl_take_side(block, work, node, side[k]);
+    status[k] = fl_dual_newton(block, work, target, lambda_begin, STEPS_AT_KINK);
+    cost[k] = work->now->value;
+    if (status[k] == FL_BEYOND) cost[k] = NONE;
+    memcpy(lambda[k], work->now->price, sizeof lambda[k]);
   }
-  int first = value[1] < value[0]; /* the side is the first one's again */
-  node->first = first ? -side : side;
-  node->score[0] = value[!first];
-  memcpy(node->price, price[!first], sizeof node->price);
-  if (first) return status[1];
-  fl_take_side(block, work, node, side);
-  return fl_dual_newton(block, work, target, price[0], STEPS_AT_KINK);
+  const int cheaper = cost[1] < cost[0];
+  const int other = !cheaper;
+  node->first = side[cheaper];
+  node->score[0] = cost[other];
+  memcpy(node->price, lambda[other], sizeof node->price);
+  if (cheaper == 1) return status[1];
+  fl_take_side(block, work, node, side[0]);
+  return fl_dual_newton(block, work, target, lambda[0], STEPS_AT_KINK);
 }
 
-/* Least power for a target at whose prices some force is in a gap: forces in work->best, and the power [W] that
-   no forces in the sets undercut; 0 where no part meets the target. */
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *value) {
-  real best = R(1e30), bound = R(1e30), price[6];
-  int depth = 0, parts = 0, root = status;
-  const int most_parts = work->turns ? MIN(work->settings.tick_parts, work->settings.most_parts) : work->settings.most_parts;
-  fl_node *node;
-  memcpy(work->kept, work->set, sizeof work->kept);
-  memcpy(price, work->now->price, sizeof price);
-  if (work->drags) {
-    fl_improve_from_starts(block, work, target, &best);
-    fl_dual_start(block, work, target, price);
+/* How many parts a search may look at. */
+static int most_parts_of(const fl_work *work) {
+  const fl_settings *settings = &work->settings;
+  if (work->turns && settings->tick_parts < settings->most_parts) return settings->tick_parts;
+  return settings->most_parts;
+}
+
+/* Dives with the sets as they are, and leaves these as they were. */
+static void dive_and_return(const real *block, fl_work *work, const real *target, int status,
+                            real *best_cost) {
+  fl_set before[FL_MOST];
+  memcpy(before, work->set, sizeof before);
+  dive(block, work, target, status, best_cost);
+  memcpy(work->set, before, sizeof before);
+}
+
+/* Goes back to the last cut whose other side may be cheaper than the best so far, and makes
+   the bound no larger than those of the sides that are left out; 0 where there is none. */
+static fl_node *last_cheaper_cut(const real *block, fl_work *work, int *depth, real best_cost,
+                                 real *bound) {
+  for (;;) {
+    fl_node *node = fl_last_open_cut(block, work, depth);
+    if (!node) return 0;
+    if (node->score[0] < best_cost * (1 - CLOSE)) return node;
+    *bound = fl_smaller(*bound, node->score[0]);
   }
-  dive(block, work, target, status, &best);
+}
+
+/* Least power for a target at whose multipliers some force is in a gap: forces in
+   work->best, and the power [W] that no forces in the sets undercut; 0 where no part meets
+   the target. */
+int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *bound) {
+  const int most_parts = most_parts_of(work);
+  const int status_begin = status;
+  real best_cost = NONE;
+  real least_bound = NONE;
+  real lambda_begin[6];
+  int depth = 0;
+  int parts = 0;
+  memcpy(work->kept, work->set, sizeof work->kept);
+  memcpy(lambda_begin, work->now->price, sizeof lambda_begin);
+  if (work->drags) {
+    fl_improve_from_starts(block, work, target, &best_cost);
+    fl_dual_start(block, work, target, lambda_begin);
+  }
+  dive(block, work, target, status, &best_cost);
   fl_restore_sets(block, work, work->kept);
-  fl_dual_start(block, work, target, price);
-  for (status = root;;) {
-    fl_state *s = work->now;
-    real own = s->value;
-    int gap = fl_worst_gap(block, work, s->force, s->price), open = keep(block, work, target, status, gap, &best);
+  fl_dual_start(block, work, target, lambda_begin);
+  status = status_begin;
+  for (;;) {
+    fl_state *state = work->now;
+    const real dual_value = state->value;
+    const int gap = fl_worst_gap(block, work, state->force, state->price);
+    int open = is_open(block, work, target, status, gap, &best_cost);
     if (open && gap < 0) { /* hollow: at their least forces */
-      fl_set before[FL_MOST];
-      memcpy(before, work->set, sizeof before);
-      dive(block, work, target, status, &best);
-      memcpy(work->set, before, sizeof before);
-      bound = MIN(bound, own), status = FL_BEYOND, open = 0;
+      dive_and_return(block, work, target, status, &best_cost);
+      least_bound = fl_smaller(least_bound, dual_value);
+      status = FL_BEYOND;
+      open = 0;
     }
-    if (open && ACTUATOR(block, gap)->speed == 0 && parts < most_parts && (node = fl_cut_set(block, work, &depth, gap, s->force[gap]))) {
-      status = cheaper_side(block, work, target, node), parts += 2;
+    const int can_cut = open && ACTUATOR(block, gap)->speed == 0;
+    fl_node *node = 0;
+    if (can_cut && parts < most_parts) {
+      node = fl_cut_set(block, work, &depth, gap, state->force[gap]);
+    }
+    if (node) {
+      status = cheaper_side(block, work, target, node);
+      parts += 2;
       continue;
     }
-    work->ended |= open && ACTUATOR(block, gap)->speed == 0;
-    if (status != FL_BEYOND) bound = MIN(bound, own);
-    while ((node = fl_last_open_cut(block, work, &depth)) && !(node->score[0] < best * (1 - CLOSE)))
-      bound = MIN(bound, node->score[0]);
+    work->ended |= can_cut;
+    if (status != FL_BEYOND) least_bound = fl_smaller(least_bound, dual_value);
+    node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
     if (!node) break;
     fl_take_side(block, work, node, -node->first);
     status = fl_dual_newton(block, work, target, node->price, STEPS_AT_KINK);
   }
   fl_restore_sets(block, work, work->kept);
-  *value = bound;
-  return best < R(1e30);
+  *bound = least_bound;
+  return best_cost < NONE;
 }
 
 /* Commands that give work->aim, from what Newton's method came to; 0 where none are found. */
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status, fl_answer *out) {
-  real value = work->now->value, bound;
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
+                        fl_answer *out) {
+  const real dual_value = work->now->value;
   memcpy(out->inner, work->now->price, sizeof out->inner);
-  if (!(status == FL_MET && fl_are_forces_sure(block, work))) {
+  const int is_sure = status == FL_MET && fl_are_forces_sure(block, work);
+  if (!is_sure) {
+    real bound;
     if (!fl_search_gaps(block, work, target, status, &bound)) return 0;
-    if (status != FL_MET) { /* prices at the commands may prove more */
+    if (status != FL_MET) { /* multipliers at the commands may prove more */
       fl_dual_start(block, work, target, work->near);
-      if (work->state->value > value) memcpy(out->inner, work->near, sizeof out->inner);
+      if (work->state->value > dual_value) memcpy(out->inner, work->near, sizeof out->inner);
     }
   }
   memcpy(out->command, work->placed, (size_t)COUNT(block) * sizeof out->command[0]);
-  return out->placed = 1;
+  out->placed = 1;
+  return 1;
 }

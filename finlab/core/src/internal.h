@@ -57,6 +57,20 @@ typedef fl_wide wide;
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
 #define COUNT(block) ((int)HEAD(block)->n)
 
+static inline real fl_larger(real a, real b) {
+  if (a > b) return a;
+  return b;
+}
+
+static inline real fl_smaller(real a, real b) {
+  if (a < b) return a;
+  return b;
+}
+
+static inline real fl_clipped(real x, real low, real high) {
+  return fl_smaller(fl_larger(x, low), high);
+}
+
 /* linear_algebra.c: linear algebra of 6 x 6 matrices */
 static inline real dot(const real *a, const real *b, int n) {
   real sum = 0;
@@ -73,10 +87,10 @@ static inline void own_price(const fl_work *work, int i, const real *price, real
   own[1] = dot(work->span.matrix[i][1], price, 6);
 }
 real fl_wrap_angle(real angle);
-void fl_add_square(real h[6][6], const real *b, real weight);
-real fl_trace(real h[6][6]);
-int fl_factor(real a[6][6]);
-void fl_solve(real a[6][6], const real *right, real *x);
+void fl_add_square(real H[6][6], const real *b, real weight);
+real fl_trace(real H[6][6]);
+int fl_factor(real A[6][6]);
+void fl_solve(real factor[6][6], const real *right, real *x);
 
 /* force_table.c: tables of force over price, gauges of directions */
 typedef struct { real force, slope, conjugate; } line_response;
@@ -152,26 +166,27 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 #define MOST_STEPS 200
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *price);
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *price,
+void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda);
+void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
                 fl_state *state);
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *price,
-                     real *ridge);
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *price,
-                   int most);
+void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
+                     real *mu);
+int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+                   int most_steps);
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target);
-void fl_reduce_lambda(const fl_work *work, const real *price, real *inner);
+void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced);
 int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* set_gaps.c: sets with gaps */
 #define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
+#define SHORTER R(0.98) /* a force below this share of the least one lies in the gap at rest */
 #define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
-int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *price);
+int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *lambda);
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force);
 int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]);
 real fl_gap_of(const real *block, const fl_work *work, int i, const real *force, real largest,
-               const real *price);
+               const real *lambda);
 real fl_largest_force(const real *block, real force[][2]);
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force);
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side);
@@ -180,7 +195,7 @@ void fl_take_side(const real *block, fl_work *work, const fl_node *node, int sid
 fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *value);
+int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *bound);
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
                         fl_answer *out);
 
