@@ -1,107 +1,163 @@
-/* Commands of all actuators: for forces, and made exact by Levenberg-Marquardt steps within a box. */
+/* Levenberg-Marquardt steps that make commands exact by the laws, Eq. 11.
+
+       step = J' (J J' + (mu + ..) tr(J J'))^-1 r
+
+   r is the residual of the wrench on the yardstick, J its slopes by the commands over the
+   widths of their limits. What a step would take out of the limits is held, and the step
+   found anew without it. */
 #include "internal.h"
 
-/* The miss (6,) of commands from an aim, on the yardstick. Returns its square. */
-static real miss_of(const real *block, const fl_work *work, const real *aim, real command[][3], real *miss) {
-  const fl_head *h = HEAD(block);
+#define HOLDS 3         /* how often a step is found anew without commands that leave the box */
+#define MU_KEPT R(0.3)  /* damping after a kept step, over that before */
+#define MU_REFUSED 10   /* the same after a refused step */
+#define REGULAR R(0.01) /* damping at least, over the rounding of numbers */
+
+/* The residual (6,) of commands, on the yardstick. Returns its square. */
+static real residual_of(const real *block, const fl_work *work, const real *wrench_wanted,
+                        real command[][3], real *residual) {
+  const real *scale = HEAD(block)->yard;
   const fl_span *span = &work->span;
-  for (int k = 0; k < 6; k++) miss[k] = (aim[k] - span->beside[k]) / h->yard[k];
+  for (int k = 0; k < 6; k++) residual[k] = (wrench_wanted[k] - span->beside[k]) / scale[k];
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    if (span->lost[i]) continue;
+    real force[3];
+    fl_force_of_command(block, i, command[i], force, 0);
+    if (fl_is_in_dead_band(a, command[i])) memset(force, 0, sizeof force);
+    for (int k = 0; k < 6; k++) {
+      residual[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
+    }
+  }
+  for (int k = 0; k < 6; k++) {
+    if (!span->counts[k]) residual[k] = 0;
+  }
+  return dot(residual, residual, 6);
+}
+
+/* The Jacobian J of the wrench on the yardstick by the commands over the widths of their
+   limits, into the work area. */
+static void find_jacobian(const real *block, fl_work *work, const fl_box *box,
+                          real command[][3]) {
+  const unsigned char *counts = work->span.counts;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3];
-    if (span->lost[i]) continue;
-    fl_force_of_command(block, i, command[i], force, 0);
-    if (fl_is_in_dead_band(a, command[i])) memset(force, 0, sizeof force);
-    for (int k = 0; k < 6; k++)
-      miss[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
-  }
-  for (int k = 0; k < 6; k++)
-    if (!span->counts[k]) miss[k] = 0;
-  return dot(miss, miss, 6);
-}
-
-/* The slopes of the wrench, into the work area. */
-static void slopes_of(const real *block, fl_work *work, const fl_box *box, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real force[3], by[3][3];
+    real by[3][3]; /* of the force (second index) by each command */
     fl_force_of_command(block, i, command[i], force, by);
     if (work->span.lost[i] || fl_is_in_dead_band(a, command[i])) memset(by, 0, sizeof by);
     for (int c = 0; c < 3; c++) {
-      real width = box->high[i][c] - box->low[i][c];
-      for (int k = 0; k < 6; k++)
-        work->slope[i][c][k] = !work->span.counts[k] ? 0 :
-            width * (by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k]);
+      const real width = box->high[i][c] - box->low[i][c];
+      real *row = work->slope[i][c];
+      for (int k = 0; k < 6; k++) {
+        row[k] = 0;
+        if (!counts[k]) continue;
+        const real slope =
+            by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k];
+        row[k] = width * slope;
+      }
     }
   }
 }
 
-static int leaves(const real *block, const fl_box *box, int i, int c, const real *command, real step) {
+/* Whether a step takes number c of a command out of its limits. */
+static int leaves_box(const real *block, const fl_box *box, int i, int c, const real *command,
+                      real step) {
   if (c == fl_angle_number(ACTUATOR(block, i)) && box->free[i]) return 0;
-  return (command[c] <= box->low[i][c] + NOTHING && step < 0) || (command[c] >= box->high[i][c] - NOTHING && step > 0);
+  if (step < 0) return command[c] <= box->low[i][c] + NOTHING;
+  if (step > 0) return command[c] >= box->high[i][c] - NOTHING;
+  return 0;
 }
 
-/* The damped smallest change of commands, over the widths of their limits, that gives a miss; those of `held` not. The
-   damping is a share of the trace: in a tick widths, and with them slopes, are small. */
-static void change_for(const real *block, fl_work *work, const real *miss, real damping,
-                       const unsigned char held[][3], real step[][3]) {
-  int n = COUNT(block);
-  real gram[6][6] = {{0}}, x[6] = {0}, trace = 0;
-  for (int i = 0; i < n; i++)
+/* The damped least step of commands, over the widths of their limits, that gives a residual;
+   those of `held` not. The damping is a share of the trace: in a tick widths, and with them
+   J, are small. */
+static void damped_step(const real *block, fl_work *work, const real *residual, real mu,
+                        unsigned char held[][3], real step[][3]) {
+  const int n = COUNT(block);
+  real gram[6][6] = {{0}}; /* J J' */
+  for (int i = 0; i < n; i++) {
     for (int c = 0; c < 3; c++) {
-      const real *row = work->slope[i][c];
-      if (held[i][c]) continue;
-      for (int j = 0; j < 6; j++)
-        for (int k = 0; k <= j; k++) gram[j][k] += row[j] * row[k];
+      if (!held[i][c]) fl_add_square(gram, work->slope[i][c], 1);
     }
-  for (int j = 0; j < 6; j++) trace += gram[j][j];
-  for (int j = 0; j < 6; j++) gram[j][j] += (damping + ROUNDING * R(0.01)) * trace + TINY;
-  if (fl_factor(gram)) fl_solve(gram, miss, x);
-  for (int i = 0; i < n; i++)
-    for (int c = 0; c < 3; c++) step[i][c] = held[i][c] ? 0 : dot(work->slope[i][c], x, 6);
+  }
+  const real ridge = (mu + ROUNDING * REGULAR) * fl_trace(gram) + TINY;
+  for (int j = 0; j < 6; j++) gram[j][j] += ridge;
+  real multiplier[6] = {0};
+  if (fl_factor(gram)) fl_solve(gram, residual, multiplier);
+  for (int i = 0; i < n; i++) {
+    for (int c = 0; c < 3; c++) {
+      step[i][c] = 0;
+      if (!held[i][c]) step[i][c] = dot(work->slope[i][c], multiplier, 6);
+    }
+  }
 }
 
-/* Holds the commands (n, 3) that a step would take out of the box, beside those that are held; whether there are any. */
+/* Holds the commands (n, 3) that a step would take out of the box, beside those that are
+   held; whether there are any. */
 static int hold_leaving(const real *block, const fl_box *box, real command[][3], real step[][3],
                         unsigned char held[][3]) {
   int any = 0;
-  for (int i = 0; i < COUNT(block); i++)
+  for (int i = 0; i < COUNT(block); i++) {
     for (int c = 0; c < 3; c++) {
-      if (held[i][c] || !leaves(block, box, i, c, command[i], step[i][c])) continue;
+      if (held[i][c] || !leaves_box(block, box, i, c, command[i], step[i][c])) continue;
       held[i][c] = 1;
       any = 1;
     }
+  }
   return any;
 }
 
-#define HOLDS 3 /* how often a step is found anew without the commands that would leave the box */
-
-/* Levenberg-Marquardt steps on commands within a box towards an aim [N, N m]; the error that is left. */
-real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim, real command[][3], int steps) {
-  int n = COUNT(block);
-  real miss[6], cost = miss_of(block, work, aim, command, miss), damping = NEARLY;
-  int moved = 1;
-  for (int k = 0; k < steps && cost > EXACT * EXACT && damping <= 1; k++) {
-    unsigned char held[FL_MOST][3] = {{0}};
-    real step[FL_MOST][3], tried[FL_MOST][3], other[6], new_cost;
-    work->refined++;
-    if (moved) slopes_of(block, work, box, command);
-    change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
-    for (int again = 0; again < HOLDS && hold_leaving(block, box, command, step, held); again++)
-      change_for(block, work, miss, damping, (const unsigned char(*)[3])held, step);
-    for (int i = 0; i < n; i++)
-      for (int c = 0; c < 3; c++) {
-        real own = leaves(block, box, i, c, command[i], step[i][c]) ? 0 : step[i][c];
-        own = command[i][c] + own * (box->high[i][c] - box->low[i][c]);
-        tried[i][c] = fl_clip_number(box, i, c, fl_angle_number(ACTUATOR(block, i)), own);
-      }
-    new_cost = miss_of(block, work, aim, tried, other);
-    if ((moved = new_cost <= cost)) {
-      memcpy(command, tried, (size_t)n * sizeof *tried);
-      memcpy(miss, other, sizeof miss);
-      cost = new_cost, damping *= R(0.3);
-    } else
-      damping = damping * 10 + NEARLY;
+/* A damped step that leaves the box in no number but for a handful. */
+static void step_within(const real *block, fl_work *work, const fl_box *box, real command[][3],
+                        const real *residual, real mu, real step[][3]) {
+  unsigned char held[FL_MOST][3] = {{0}};
+  damped_step(block, work, residual, mu, held, step);
+  for (int k = 0; k < HOLDS && hold_leaving(block, box, command, step, held); k++) {
+    damped_step(block, work, residual, mu, held, step);
   }
-  return SQRT(cost);
+}
+
+/* Commands after a step, within the box. */
+static void take_step(const real *block, const fl_box *box, real command[][3], real step[][3],
+                      real stepped[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    const int angle = fl_angle_number(ACTUATOR(block, i));
+    for (int c = 0; c < 3; c++) {
+      real change = 0;
+      if (!leaves_box(block, box, i, c, command[i], step[i][c])) change = step[i][c];
+      const real width = box->high[i][c] - box->low[i][c];
+      stepped[i][c] = fl_clip_number(box, i, c, angle, command[i][c] + change * width);
+    }
+  }
+}
+
+/* Levenberg-Marquardt steps on commands within a box towards a wrench [N, N m]; the error on
+   the yardstick that is left. */
+real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,
+                        real command[][3], int steps) {
+  const size_t size = (size_t)COUNT(block) * sizeof *command;
+  real residual[6];
+  real error_squared = residual_of(block, work, wrench, command, residual);
+  real mu = NEARLY;
+  int has_moved = 1;
+  for (int k = 0; k < steps && error_squared > EXACT * EXACT && mu <= 1; k++) {
+    real step[FL_MOST][3];
+    real stepped[FL_MOST][3];
+    real residual_stepped[6];
+    work->refined++;
+    if (has_moved) find_jacobian(block, work, box, command);
+    step_within(block, work, box, command, residual, mu, step);
+    take_step(block, box, command, step, stepped);
+    const real error_stepped = residual_of(block, work, wrench, stepped, residual_stepped);
+    has_moved = error_stepped <= error_squared;
+    if (!has_moved) {
+      mu = mu * MU_REFUSED + NEARLY;
+      continue;
+    }
+    memcpy(command, stepped, size);
+    memcpy(residual, residual_stepped, sizeof residual);
+    error_squared = error_stepped;
+    mu *= MU_KEPT;
+  }
+  return SQRT(error_squared);
 }

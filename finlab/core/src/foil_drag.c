@@ -1,192 +1,285 @@
-/* Commands of robots whose foils drag. A foil gives a lift and with it a drag, a curve; the dual takes what lies
-   between the curve and its chord for it, too. Steps on the angles of the foils lead from its forces to commands that
-   give a wrench by the curves. A step is the dual's answer where each curve is its tangent, curved as much as the cost
-   less the worth of the force, whatever the sign (sequential quadratic programming); all other sets are whole.
-   Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper.
+/* Commands of robots whose foils drag. A foil gives a lift and with it a drag, a curve; the
+   dual takes what lies between the curve and its chord for it, too. Steps on the angles of
+   the foils lead from its forces to commands that give a wrench by the curves. A step is the
+   dual's answer where each curve is its tangent, curved as much as the cost less the worth
+   of the force, whatever the sign (sequential quadratic programming); all other sets are
+   whole. Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper.
 
-   Steps lead to what is near. With few actuators what foils give is a curved sheet, which turns back where they stall:
-   a wrench on it is met at few commands, far from each other, and from elsewhere steps end at a least miss. Where the
-   starts that the dual has come to no cost that it proves, others are taken from a lattice over the angles of all
-   foils, each kept within the branches of the lifts on which it lies. */
+   Steps lead to what is near. With few actuators what foils give is a curved sheet, which
+   turns back where they stall: a wrench on it is met at few commands, far from each other,
+   and from elsewhere steps end at a least miss. Where the starts that the dual has come to
+   no cost that it proves, others are taken from a lattice over the angles of all foils, each
+   kept within the branches of the lifts on which it lies. */
 #include "internal.h"
 
-#define TRUST (R(3.0) / ROUNDS)      /* of its range that a foil turns in a step: all together may cross it thrice */
+/* of its range that a foil turns in a step: in all thrice, if need be */
+#define TRUST (R(3.0) / ROUNDS)
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
+#define SHORTEN R(0.25)           /* a step that is no cheaper is shortened to this share */
+/* commands that cost more than this times the best are left alone */
+#define WITHIN_BEST R(1.5)
+/* share of a ray that stalled foils may add to what tables give */
+#define STALLED_MORE R(0.1)
 
-/* A foil at an angle: all of the tangent but its curvature. */
-static void foil_at(const real *block, int i, real angle, fl_tangent *t) {
+/* Whether an actuator is a foil in a flow, whose drag counts. */
+static int is_foil(const fl_actuator *a) { return a->speed > 0; }
+
+/* A foil at an angle: force, cost and their slopes; all of the tangent but its curvature. */
+static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real command[3] = {angle, 0, 0}, own[3], by[3][3];
-  fl_force_of_command(block, i, command, own, by);
-  real all = own[1] + a->pressure * a->rest;
-  memcpy(t->force, own, sizeof t->force);
-  memcpy(t->slope, by[0], sizeof t->slope);
-  t->cost = a->speed * all + a->doubt * (own[0] * own[0] + all * all);
-  t->pay = a->speed * by[0][1] + 2 * a->doubt * (own[0] * by[0][0] + all * by[0][1]);
+  const real command[3] = {angle, 0, 0};
+  real force[3];
+  real by[3][3];
+  fl_force_of_command(block, i, command, force, by);
+  const real lift = force[0];
+  const real d_lift = by[0][0];
+  const real drag = force[1] + a->pressure * a->rest;
+  const real d_drag = by[0][1];
+  memcpy(tangent->force, force, sizeof tangent->force);
+  memcpy(tangent->slope, by[0], sizeof tangent->slope);
+  tangent->cost = a->speed * drag + a->doubt * (lift * lift + drag * drag);
+  tangent->pay = a->speed * d_drag + 2 * a->doubt * (lift * d_lift + drag * d_drag);
 }
 
-/* Its tangent at prices of lift and drag, as the set of a step. */
-static void draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *price, fl_tangent *t,
-                         fl_set *set) {
+/* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less
+   the worth of its force at prices s of lift and drag. */
+static void draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
+                         fl_tangent *tangent, fl_set *set) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real low = box->low[i][0], high = box->high[i][0], most = TRUST * (high - low), apart = CLOSE * (high - low) + TINY;
+  const real low = box->low[i][0];
+  const real high = box->high[i][0];
+  const real most_turn = TRUST * (high - low);
+  const real apart = CLOSE * (high - low) + TINY;
   fl_tangent other;
   foil_at(block, i, angle + apart, &other);
-  foil_at(block, i, angle, t);
-  real bend = other.pay - t->pay - dot(price, other.slope, 2) + dot(price, t->slope, 2);
-  t->bend = MAX(FABS(bend) / apart, CLOSE * a->speed * a->pressure + TINY);
-  set->low = MAX(low - angle, -most), set->high = MIN(high - angle, most), set->tangent = t;
-  set->low_cost = set->high_cost = t->cost + FABS(t->pay) * most + t->bend * most * most;
+  foil_at(block, i, angle, tangent);
+  /* Change of the slope of cost - s.force over `apart`. */
+  const real change = other.pay - tangent->pay - dot(s, other.slope, 2) + dot(s, tangent->slope, 2);
+  tangent->bend = fl_larger(FABS(change) / apart, CLOSE * a->speed * a->pressure + TINY);
+  const real most_cost =
+      tangent->cost + FABS(tangent->pay) * most_turn + tangent->bend * most_turn * most_turn;
+  set->low = fl_larger(low - angle, -most_turn);
+  set->high = fl_smaller(high - angle, most_turn);
+  set->tangent = tangent;
+  set->low_cost = most_cost;
+  set->high_cost = most_cost;
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3], real force[][2]) {
-  real cost = 0, own[3];
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
+                          real force[][2]) {
+  real cost = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    int plane = is_plane(a);
-    force[i][0] = force[i][1] = 0;
+    force[i][0] = 0;
+    force[i][1] = 0;
     if (work->span.lost[i]) continue;
-    fl_force_of_command(block, i, command[i], own, 0);
-    force[i][0] = plane ? own[1] : a->sign * own[0], force[i][1] = plane ? own[2] : 0;
-    real size = plane ? size_of(force[i]) : force[i][0];
-    if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(own[2], own[1]));
-    if (a->speed > 0) {
-      fl_tangent t;
-      foil_at(block, i, command[i][0], &t);
-      force[i][1] = t.force[1], cost += t.cost;
-    } else
-      cost += fl_power_of_force(block, i, a->form == FL_POD && command[i][1] < 0 ? -size : size);
+    real along[3];
+    fl_force_of_command(block, i, command[i], along, 0);
+    real size;
+    if (is_plane(a)) {
+      force[i][0] = along[1];
+      force[i][1] = along[2];
+      size = size_of(force[i]);
+    } else {
+      force[i][0] = a->sign * along[0];
+      size = force[i][0];
+    }
+    if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(along[2], along[1]));
+    if (is_foil(a)) {
+      fl_tangent tangent;
+      foil_at(block, i, command[i][0], &tangent);
+      force[i][1] = tangent.force[1];
+      cost += tangent.cost;
+      continue;
+    }
+    if (a->form == FL_POD && command[i][1] < 0) size = -size;
+    cost += fl_power_of_force(block, i, size);
   }
   return cost;
 }
 
-/* Sets and limits of other actuators on the side of a gap on which their forces are. */
-static void take_sides(const real *block, fl_work *work, fl_box *box, real command[][3], real force[][2]) {
+static int has_gap(const fl_actuator *a, const fl_set *set) {
+  if (is_plane(a)) return set->forked || set->reverse > 0;
+  return a->band > 0;
+}
+
+/* Narrows sets and limits of other actuators to the side of a gap on which their forces are. */
+static void take_sides(const real *block, fl_work *work, fl_box *box, real command[][3],
+                       real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     fl_set *set = work->set + i;
-    if (is_plane(a) ? set->forked || set->reverse > 0 : a->band > 0)
+    if (has_gap(a, set)) {
       fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
+    }
     if (a->form != FL_THRUSTER || !(a->band > 0)) continue;
-    box->low[i][0] = MAX(box->low[i][0], a->sign > 0 ? set->low : -set->high);
-    box->high[i][0] = MIN(box->high[i][0], a->sign > 0 ? set->high : -set->low);
+    real low = set->low;
+    real high = set->high;
+    if (!(a->sign > 0)) {
+      low = -set->high;
+      high = -set->low;
+    }
+    box->low[i][0] = fl_larger(box->low[i][0], low);
+    box->high[i][0] = fl_smaller(box->high[i][0], high);
     command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
   }
 }
 
-/* Commands that a step of a size leads to from forces. */
-static void stepped(const real *block, const fl_work *work, const fl_box *box, real force[][2], real size,
-                    real command[][3]) {
+/* Makes commands those that a share of the step from forces to the dual's answer leads to. */
+static void take_step(const real *block, const fl_work *work, const fl_box *box, real force[][2],
+                      real share, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    const real *t = work->tangent[i].slope, *there = work->now->force[i];
-    real way[2] = {size * (there[0] - force[i][0]), size * (there[1] - force[i][1])};
-    real wanted[2] = {force[i][0] + way[0], force[i][1] + way[1]};
     if (work->span.lost[i]) continue;
-    if (ACTUATOR(block, i)->speed > 0)
-      command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + dot(way, t, 2) / MAX(dot(t, t, 2), TINY));
-    else
-      fl_command_for_force(block, i, box, wanted, command[i], command[i]);
+    const real *answer = work->now->force[i];
+    const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
+    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
+      const real *slope = work->tangent[i].slope;
+      const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
+      command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
+      continue;
+    }
+    const real wanted[2] = {force[i][0] + change[0], force[i][1] + change[1]};
+    fl_command_for_force(block, i, box, wanted, command[i], command[i]);
   }
 }
 
-/* Whether commands within a box are fewer than the directions in which the robot drives: what they give is a sheet,
-   and that of the tables lies beside that of the laws, by FINE at most. A wrench on the one is then met by no commands
-   of the other. */
+/* Whether commands within a box are fewer than the directions in which the robot drives:
+   what they give is a sheet, and that of the tables lies beside that of the laws, by FINE at
+   most. A wrench on the one is then met by no commands of the other. */
 static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   int free = 0;
-  for (int i = 0; i < COUNT(block); i++)
-    for (int c = 0; c < 3; c++) free += !work->span.lost[i] && box->high[i][c] > box->low[i][c];
+  for (int i = 0; i < COUNT(block); i++) {
+    if (work->span.lost[i]) continue;
+    for (int c = 0; c < 3; c++) free += box->high[i][c] > box->low[i][c];
+  }
   return free < work->span.range;
 }
 
-/* Steps towards work->aim, of which so many in a row have to halve the miss: most starts end soon. */
-static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps) {
-  real before, miss = NONE;
+/* Steps towards work->aim, of which so many in a row have to halve the error: most starts
+   end soon. */
+static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
+                     int steps) {
+  real error = NONE;
   for (int k = 0; k < 2 * ROUNDS; k += steps) {
-    before = miss;
-    miss = fl_refine_commands(block, work, box, work->aim, command, steps);
-    if (miss <= EXACT || miss > before / 2) return;
+    const real before = error;
+    error = fl_refine_commands(block, work, box, work->aim, command, steps);
+    if (error <= EXACT || error > before / 2) return;
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->aim, to a part of the yardstick and
-   to rounding. Where that is what tables leave, steps on their miss end soon. */
-static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3], int steps, real part) {
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->aim, to an
+   error on the yardstick and to rounding. Where that is what tables leave, steps on their
+   error end soon. */
+static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
+                        int steps, real most_error) {
   real size = 0;
   for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
-  if (part > EXACT) {
+  if (most_error > EXACT) {
     approach(block, work, box, command, ROUNDS / 2);
     steps = 0;
   }
-  return fl_refine_commands(block, work, box, work->aim, command, steps) <= part + ROUNDING * size;
+  const real error = fl_refine_commands(block, work, box, work->aim, command, steps);
+  return error <= most_error + ROUNDING * size;
 }
 
-/* How far off the yardstick commands may be that are said to give a wrench: what tables leave where these are few. */
-static real allowed(const real *block, const fl_work *work, const fl_box *box) {
-  return are_few(block, work, box) ? FINE : EXACT;
+/* Largest error on the yardstick of commands that are said to give a wrench: what tables
+   leave where these are few. */
+static real error_allowed(const real *block, const fl_work *work, const fl_box *box) {
+  if (are_few(block, work, box)) return FINE;
+  return EXACT;
 }
 
-/* Makes commands give work->aim, in the basis `target`, to a part of the yardstick, and then cheaper; `price` becomes
-   that of the last step. Their forces along the rows, and their cost [W]; NONE where they do not come to give it. */
-static real settle(const real *block, fl_work *work, const real *target, real part, real *price, real command[][3],
-                   real force[][2]) {
+/* Sets of a step: of each foil its tangent at its command. */
+static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
+                          real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
+    real s[2];
+    own_price(work, i, lambda, s);
+    draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
+  }
+}
+
+/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential
+   quadratic programming that keep giving work->aim; `lambda` becomes that of the last step.
+   Their cost. */
+static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
+                    real most_error, real cost, real *lambda, real command[][3],
+                    real force[][2]) {
+  real share = 1;
+  int has_moved = 1;
+  for (int k = 0; k < ROUNDS; k++) {
+    if (has_moved) draw_tangents(block, work, box, lambda, command);
+    fl_prepare_sets(block, work);
+    if (has_moved && fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK) == FL_MET) {
+      memcpy(lambda, work->now->price, sizeof work->now->price);
+    }
+    real stepped[FL_MOST][3];
+    real force_stepped[FL_MOST][2];
+    memcpy(stepped, command, sizeof stepped);
+    take_step(block, work, box, force, share, stepped);
+    real gain = -NONE;
+    if (come_to_give(block, work, box, stepped, 2 * ROUNDS, most_error)) {
+      gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
+    }
+    has_moved = gain > 0;
+    if (has_moved) {
+      memcpy(command, stepped, sizeof stepped);
+      memcpy(force, force_stepped, sizeof force_stepped);
+      cost -= gain;
+    } else {
+      share *= SHORTEN;
+    }
+    if (FABS(gain) <= CHEAPER * cost) break;
+  }
+  return cost;
+}
+
+/* Makes commands give work->aim, in the basis `target`, to an error on the yardstick, and
+   then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
+   their cost [W]; NONE where they do not come to give it. */
+static real settle(const real *block, fl_work *work, const real *target, real most_error,
+                   real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
-  real size = 1, tried[FL_MOST][3], other[FL_MOST][2];
   memcpy(before, work->set, sizeof before);
   fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
-  int met = come_to_give(block, work, &box, command, 2 * ROUNDS, part), moved = 1;
-  real cost = met ? fl_power_of_commands(block, work, command, force) : NONE;
-  for (int k = 0; met && k < ROUNDS; k++) {
-    for (int i = 0; moved && i < COUNT(block); i++) {
-      real own[2];
-      own_price(work, i, price, own);
-      if (ACTUATOR(block, i)->speed > 0 && !work->span.lost[i])
-        draw_tangent(block, i, &box, command[i][0], own, work->tangent + i, work->set + i);
-    }
-    fl_prepare_sets(block, work);
-    if (moved && fl_dual_newton(block, work, target, price, STEPS_AT_KINK) == FL_MET)
-      memcpy(price, work->now->price, sizeof work->now->price);
-    memcpy(tried, command, sizeof tried);
-    stepped(block, work, &box, force, size, tried);
-    int meets = come_to_give(block, work, &box, tried, 2 * ROUNDS, part);
-    real gain = meets ? cost - fl_power_of_commands(block, work, tried, other) : -NONE;
-    if ((moved = gain > 0)) {
-      memcpy(command, tried, sizeof tried);
-      memcpy(force, other, sizeof other);
-      cost -= gain;
-    } else
-      size *= R(0.25);
-    if (FABS(gain) <= CHEAPER * cost) break;
+  real cost = NONE;
+  if (come_to_give(block, work, &box, command, 2 * ROUNDS, most_error)) {
+    cost = fl_power_of_commands(block, work, command, force);
+    cost = cheapen(block, work, &box, target, most_error, cost, lambda, command, force);
   }
   fl_restore_sets(block, work, before);
   return cost;
 }
 
-/* Remembers what commands and prices lead to, where it costs less than the best so far. */
-static void place_from(const real *block, fl_work *work, const real *target, const real *price, real command[][3],
-                       real *best) {
-  real own[FL_MOST][2], near[6];
-  memcpy(near, price, sizeof near);
-  real cost = settle(block, work, target, allowed(block, work, &work->box), near, command, own);
-  if (!(cost < *best)) return;
-  *best = cost;
+/* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
+static void improve_from(const real *block, fl_work *work, const real *target, const real *lambda,
+                         real command[][3], real *best_cost) {
+  const real most_error = error_allowed(block, work, &work->box);
+  real force[FL_MOST][2];
+  real lambda_near[6];
+  memcpy(lambda_near, lambda, sizeof lambda_near);
+  const real cost = settle(block, work, target, most_error, lambda_near, command, force);
+  if (!(cost < *best_cost)) return;
+  *best_cost = cost;
   memcpy(work->placed, command, sizeof work->placed);
-  memcpy(work->best, own, sizeof own);
-  memcpy(work->near, near, sizeof near);
+  memcpy(work->best, force, sizeof force);
+  memcpy(work->near, lambda_near, sizeof lambda_near);
 }
 
-/* The same of the forces and prices that Newton's method came to. */
-void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best) {
+/* The same of the forces and multipliers that Newton's method came to. */
+void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best_cost) {
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->now->force, work->previous, command);
-  place_from(block, work, target, work->now->price, command, best);
+  improve_from(block, work, target, work->now->price, command, best_cost);
 }
 
-/* The last lift coefficient of a foil's table and its angle [rad]: beyond, it stalls and drags more. */
+/* The last lift coefficient of a foil's table and its angle [rad]: beyond, it stalls and
+   drags more. */
 static const real *end_of(const real *block, const fl_actuator *a) {
   const real *curve = block + (int)a->beat;
   return curve + 2 * (int)curve[0] - 1;
@@ -195,307 +288,451 @@ static const real *end_of(const real *block, const fl_actuator *a) {
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
 static int may_stall(const real *block, const fl_work *work, int i, int end, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  *command = (end ? work->box.high : work->box.low)[i][0];
-  return a->speed > 0 && !work->span.lost[i] && FABS(*command - a->turned) > end_of(block, a)[1];
+  *command = work->box.low[i][0];
+  if (end) *command = work->box.high[i][0];
+  if (!is_foil(a) || work->span.lost[i]) return 0;
+  const real stall_angle = end_of(block, a)[1];
+  return FABS(*command - a->turned) > stall_angle;
 }
 
-/* The dual's value at its prices, less what foils would be worth more there where they stall, which its sets leave out:
-   no commands give the target for less, as near as so many angles tell. `most` is what none cost more than. */
-static real proved_value(const real *block, const fl_work *work, real *most) {
+/* How much more than its conjugate in the dual a foil is worth, at the multipliers so far,
+   where it stalls on the way to a limit of its angle, as near as so many angles tell; at
+   least 0 [W]. */
+static real worth_of_stall(const real *block, const fl_work *work, int i, int end, real limit) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real s[2];
+  own_price(work, i, work->now->price, s);
+  const response known = fl_response(block, i, work->set + i, s);
+  real stall_angle = end_of(block, a)[1];
+  if (!end) stall_angle = -stall_angle;
+  const real begin = a->turned + stall_angle;
+  real more = 0;
+  for (int k = 1; k <= ROUNDS; k++) {
+    fl_tangent tangent;
+    foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
+    const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
+    more = fl_larger(more, conjugate - known.conjugate);
+  }
+  return more;
+}
+
+/* The dual value at its multipliers, less what foils would be worth more there where they
+   stall, which its sets leave out: no commands give the target for less. `most_cost` is what
+   none cost more than. */
+static real proved_value(const real *block, const fl_work *work, real *most_cost) {
   real value = work->now->value;
-  *most = work->most_cost * (1 + CLOSE) + NOTHING;
-  for (int i = 0; i < COUNT(block); i++)
+  *most_cost = work->most_cost * (1 + CLOSE) + NOTHING;
+  for (int i = 0; i < COUNT(block); i++) {
     for (int end = 0; end < 2; end++) {
-      const fl_actuator *a = ACTUATOR(block, i);
-      real limit, own[2], more = 0;
+      real limit;
       if (!may_stall(block, work, i, end, &limit)) continue;
-      own_price(work, i, work->now->price, own);
-      response known = fl_response(block, i, work->set + i, own);
-      real last = end_of(block, a)[1];
-      real begin = a->turned + (end ? last : -last);
-      for (int k = 1; k <= ROUNDS; k++) {
-        fl_tangent t;
-        foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &t);
-        real worth = dot(own, t.force, 2) - t.cost;
-        more = MAX(more, worth - known.conjugate);
-      }
+      value -= worth_of_stall(block, work, i, end, limit);
       fl_tangent stalled;
       foil_at(block, i, limit, &stalled);
-      value -= more;
-      *most += stalled.cost;
+      *most_cost += stalled.cost;
     }
+  }
   return value;
 }
 
-/* A lattice over the angles of foils. Each has some on every branch of its lift within the limits: stalled one way,
-   lift one way, lift the other way, stalled the other way. */
-enum { BRANCHES = 4, LAID = 6 }; /* branches of a foil; foils on the lattice, others begin at rest */
+/* A lattice over the angles of foils. Each has some on every branch of its lift within the
+   limits: stalled one way, lift one way, lift the other way, stalled the other way. */
+/* branches of a foil; foils on the lattice, others begin at rest */
+enum { BRANCHES = 4, LAID = 6 };
 #define LATTICE (1 << 2 * LAID)  /* points at most: one on each branch of so many foils */
 #define EACH_MOST (ROUNDS / 2)   /* angles on a branch */
-#define NODES (4 * ROUNDS)       /* angles of all foils at most: of 4 branches 24 of one foil, 16 of 3 foils, 8 of 4 */
+#define NODES (4 * ROUNDS)       /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
 #define SPREAD (5 * ROUNDS)      /* points at which steps on the commands begin */
 #define FOLLOWED (ROUNDS / 2)    /* how many of these are made cheaper; FL_STARTS counts them */
 
 typedef struct {
-  int foils, foil[LAID];                            /* how many there are, and which actuators these are */
-  int branches[LAID], first[LAID];                  /* of each: branches, and its first node */
+  int foils;                                        /* how many there are */
+  int foil[LAID];                                   /* which actuators these are */
+  int branches[LAID];                               /* of each foil */
+  int first[LAID];                                  /* its first node */
   int each;                                         /* nodes on a branch */
   real edge[LAID][BRANCHES + 1];                    /* ends of the branches [rad] */
   real angle[NODES], cost[NODES], wrench[NODES][6]; /* of each node; the wrench in the basis */
-  real row[FL_MOST][2][6];                          /* forces of all other actuators by a wrench in the basis */
+  /* other actuators: force by a wrench in the basis */
+  real row[FL_MOST][2][6];
 } lattice;
 
 typedef struct {
   unsigned char node[LAID]; /* of each foil */
   real cost;                /* [W], with the price of a miss */
-} point;
+} lattice_point;
+
+/* Ends of the branches of a foil's lift within its limits; how many branches there are. */
+static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real low = work->box.low[i][0];
+  const real high = work->box.high[i][0];
+  const real stall_angle = end_of(block, a)[1];
+  const real turn[BRANCHES - 1] = {a->turned - stall_angle, a->turned, a->turned + stall_angle};
+  int branches = 0;
+  edge[0] = low;
+  for (int k = 0; k < BRANCHES - 1; k++) {
+    if (!(turn[k] > low && turn[k] < high)) continue;
+    branches++;
+    edge[branches] = turn[k];
+  }
+  branches++;
+  edge[branches] = high;
+  return branches;
+}
+
+/* How many nodes each branch has: as many as the lattice has room for. */
+static int nodes_of_branch(const lattice *grid) {
+  int choices = 1;
+  int branches = 0;
+  for (int f = 0; f < grid->foils; f++) {
+    choices *= grid->branches[f];
+    branches += grid->branches[f];
+  }
+  for (int each = EACH_MOST; each > 1; each--) {
+    int points = choices;
+    for (int f = 0; f < grid->foils; f++) points *= each;
+    if (points <= LATTICE && branches * each <= NODES) return each;
+  }
+  return 1;
+}
 
 /* Foils, their branches, and how many nodes each branch has. */
-static void find_branches(const real *block, const fl_work *work, lattice *l) {
-  int all = 1, together = 0;
-  l->foils = 0;
-  for (int i = 0; i < COUNT(block) && l->foils < LAID; i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    if (!(a->speed > 0) || work->span.lost[i]) continue;
-    real low = work->box.low[i][0], high = work->box.high[i][0], last = end_of(block, a)[1];
-    real turn[BRANCHES - 1] = {a->turned - last, a->turned, a->turned + last};
-    real *edge = l->edge[l->foils];
-    int branches = 0;
-    edge[0] = low;
-    for (int k = 0; k < BRANCHES - 1; k++)
-      if (turn[k] > low && turn[k] < high) edge[++branches] = turn[k];
-    edge[++branches] = high;
-    l->branches[l->foils] = branches;
-    l->foil[l->foils++] = i;
-    all *= branches;
-    together += branches;
+static void find_branches(const real *block, const fl_work *work, lattice *grid) {
+  grid->foils = 0;
+  for (int i = 0; i < COUNT(block) && grid->foils < LAID; i++) {
+    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
+    const int f = grid->foils;
+    grid->branches[f] = edges_of(block, work, i, grid->edge[f]);
+    grid->foil[f] = i;
+    grid->foils++;
   }
-  for (l->each = EACH_MOST; l->each > 1; l->each--) {
-    int points = all;
-    for (int f = 0; f < l->foils; f++) points *= l->each;
-    if (points <= LATTICE && together * l->each <= NODES) return;
-  }
+  grid->each = nodes_of_branch(grid);
 }
 
-/* The nodes of all foils. */
-static void lay_nodes(const real *block, const fl_work *work, lattice *l) {
+/* The nodes of all foils: angles in the middle of equal parts of each branch. */
+static void lay_nodes(const real *block, const fl_work *work, lattice *grid) {
   int node = 0;
-  for (int f = 0; f < l->foils; f++) {
-    const real(*matrix)[6] = work->span.matrix[l->foil[f]];
-    l->first[f] = node;
-    for (int k = 0; k < l->branches[f] * l->each; k++, node++) {
-      const real *edge = l->edge[f] + k / l->each;
-      real share = ((real)(k % l->each) + R(0.5)) / (real)l->each;
-      fl_tangent t;
-      l->angle[node] = edge[0] + share * (edge[1] - edge[0]);
-      foil_at(block, l->foil[f], l->angle[node], &t);
-      l->cost[node] = t.cost;
-      for (int j = 0; j < 6; j++) l->wrench[node][j] = t.force[0] * matrix[0][j] + t.force[1] * matrix[1][j];
+  for (int f = 0; f < grid->foils; f++) {
+    const real(*B)[6] = work->span.matrix[grid->foil[f]];
+    grid->first[f] = node;
+    for (int k = 0; k < grid->branches[f] * grid->each; k++) {
+      const real *edge = grid->edge[f] + k / grid->each;
+      const real share = ((real)(k % grid->each) + R(0.5)) / (real)grid->each;
+      grid->angle[node] = edge[0] + share * (edge[1] - edge[0]);
+      fl_tangent tangent;
+      foil_at(block, grid->foil[f], grid->angle[node], &tangent);
+      const real *y = tangent.force;
+      grid->cost[node] = tangent.cost;
+      for (int j = 0; j < 6; j++) grid->wrench[node][j] = y[0] * B[0][j] + y[1] * B[1][j];
+      node++;
     }
   }
 }
 
-/* The other actuators by G^-1 of G = sum B g B', with their gains g: y = g B' G^-1 r are the forces for a wrench r that
-   are cheapest where power is quadratic and nothing has limits. */
-static void lay_rows(const real *block, const fl_work *work, lattice *l) {
-  real gram[6][6] = {{0}}, trace = 0;
-  memset(l->row, 0, sizeof l->row);
+/* The other actuators by H^-1 of H = sum B g B', with their gains g: y = g B' H^-1 r are the
+   forces for a wrench r that are cheapest where power is quadratic and nothing has limits. */
+static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
+  real H[6][6] = {{0}};
+  memset(grid->row, 0, sizeof grid->row);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    for (int q = 0; q < (int)a->rows && !(a->speed > 0); q++)
-      for (int j = 0; j < 6; j++) {
-        const real *row = work->span.matrix[i][q];
-        const real own = a->gain[q] * row[j];
-        for (int k = 0; k <= j; k++) gram[j][k] += own * row[k];
-      }
+    if (is_foil(a)) continue;
+    for (int q = 0; q < (int)a->rows; q++) fl_add_square(H, work->span.matrix[i][q], a->gain[q]);
   }
-  for (int j = 0; j < 6; j++) trace += gram[j][j];
-  for (int j = 0; j < 6; j++) gram[j][j] += MAX(NOTHING, ROUNDING) * trace + TINY;
-  if (!fl_factor(gram)) return;
+  const real ridge = fl_larger(NOTHING, ROUNDING) * fl_trace(H) + TINY;
+  for (int j = 0; j < 6; j++) H[j][j] += ridge;
+  if (!fl_factor(H)) return;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    for (int q = 0; q < (int)a->rows && !(a->speed > 0); q++) {
-      fl_solve(gram, work->span.matrix[i][q], l->row[i][q]);
-      for (int j = 0; j < 6; j++) l->row[i][q][j] *= a->gain[q];
+    if (is_foil(a)) continue;
+    for (int q = 0; q < (int)a->rows; q++) {
+      fl_solve(H, work->span.matrix[i][q], grid->row[i][q]);
+      for (int j = 0; j < 6; j++) grid->row[i][q][j] *= a->gain[q];
     }
   }
 }
 
-/* Forces of the other actuators at a point for a target, held within their limits, and what all cost there: watts as
-   force^1.5, and ROUNDS times those of all actuators for a miss of one scaled wrench. */
-static real cost_at_point(const real *block, const fl_work *work, const lattice *l, const real *target,
-                          const unsigned char *node, real force[][2]) {
-  real left[6], miss[6], cost = 0;
+/* Holds a force within the limits of a set but for its direction; its size. */
+static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
+  if (!is_plane(a)) {
+    force[0] = fl_clipped(force[0], set->low, set->high);
+    return FABS(force[0]);
+  }
+  const real wanted = size_of(force);
+  const real size = fl_smaller(wanted, fl_larger(set->high, set->reverse));
+  for (int q = 0; q < 2; q++) force[q] *= size / fl_larger(wanted, TINY);
+  return size;
+}
+
+/* Forces of the other actuators at a point for a target, held within their limits, and what
+   all cost there: watts as force^1.5, and ROUNDS times those of all actuators for a miss of
+   one scaled wrench. */
+static real cost_at_point(const real *block, const fl_work *work, const lattice *grid,
+                          const real *target, const unsigned char *node, real force[][2]) {
+  real cost = 0;
+  real left[6]; /* of the target, by the other actuators */
   memcpy(left, target, sizeof left);
-  for (int f = 0; f < l->foils; f++) {
-    cost += l->cost[node[f]];
-    for (int j = 0; j < 6; j++) left[j] -= l->wrench[node[f]][j];
+  for (int f = 0; f < grid->foils; f++) {
+    cost += grid->cost[node[f]];
+    for (int j = 0; j < 6; j++) left[j] -= grid->wrench[node[f]][j];
   }
-  memcpy(miss, left, sizeof miss);
+  real residual[6];
+  memcpy(residual, left, sizeof residual);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const fl_set *set = work->set + i;
-    real *own = force[i], size;
-    own[0] = own[1] = 0;
-    if (a->speed > 0) continue;
-    for (int q = 0; q < (int)a->rows; q++) own[q] = dot(l->row[i][q], left, 6);
-    if (is_plane(a)) {
-      real most = MAX(set->high, set->reverse), wanted = size_of(own);
-      size = MIN(wanted, most);
-      for (int q = 0; q < 2; q++) own[q] *= size / MAX(wanted, TINY);
-    } else {
-      own[0] = CLIP(own[0], set->low, set->high);
-      size = FABS(own[0]);
+    real *y = force[i];
+    y[0] = 0;
+    y[1] = 0;
+    if (is_foil(a)) continue;
+    for (int q = 0; q < (int)a->rows; q++) y[q] = dot(grid->row[i][q], left, 6);
+    const real size = held_force(a, set, y);
+    const real share = size / a->most[0];
+    cost += fl_larger(set->high_cost, set->low_cost) * share * SQRT(share);
+    for (int q = 0; q < (int)a->rows; q++) {
+      for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.matrix[i][q][j];
     }
-    real share = size / a->most[0];
-    cost += MAX(set->high_cost, set->low_cost) * share * SQRT(share);
-    for (int q = 0; q < (int)a->rows; q++)
-      for (int j = 0; j < 6; j++) miss[j] -= own[q] * work->span.matrix[i][q][j];
   }
-  return cost + ROUNDS * work->most_cost * SQRT(dot(miss, miss, 6));
+  return cost + ROUNDS * work->most_cost * SQRT(dot(residual, residual, 6));
 }
 
-/* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there are then. */
-static int put_in_order(point *points, int count, const point *own) {
-  int at = MIN(count, SPREAD - 1);
-  if (count == SPREAD && !(own->cost < points[at].cost)) return count;
-  for (; at > 0 && own->cost < points[at - 1].cost; at--) points[at] = points[at - 1];
-  points[at] = *own;
-  return MIN(count + 1, SPREAD);
+/* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there
+   are then. */
+static int put_in_order(lattice_point *points, int count, const lattice_point *added) {
+  int index = count;
+  if (count == SPREAD) {
+    index = SPREAD - 1;
+    if (!(added->cost < points[index].cost)) return count;
+  }
+  while (index > 0 && added->cost < points[index - 1].cost) {
+    points[index] = points[index - 1];
+    index--;
+  }
+  points[index] = *added;
+  if (count == SPREAD) return count;
+  return count + 1;
 }
 
-/* The cheapest point of each choice of branches, and of these the cheapest ones (SPREAD,); how many there are. */
-static int cheapest_points(const real *block, const fl_work *work, const lattice *l, const real *target,
-                           point *points) {
-  int choices = 1, within = 1, count = 0;
-  real force[FL_MOST][2];
-  for (int f = 0; f < l->foils; f++) {
-    choices *= l->branches[f];
-    within *= l->each;
+/* The cheapest point of the lattice on one choice of branches, numbered in mixed radix. */
+static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
+                                        const lattice *grid, const real *target, int choice,
+                                        int points) {
+  lattice_point best = {{0}, NONE};
+  lattice_point tried = {{0}, 0};
+  for (int k = 0; k < points; k++) {
+    int branch_digits = choice;
+    int node_digits = k;
+    for (int f = 0; f < grid->foils; f++) {
+      const int branch = branch_digits % grid->branches[f];
+      const int node = node_digits % grid->each;
+      tried.node[f] = (unsigned char)(grid->first[f] + branch * grid->each + node);
+      branch_digits /= grid->branches[f];
+      node_digits /= grid->each;
+    }
+    real unused[FL_MOST][2];
+    tried.cost = cost_at_point(block, work, grid, target, tried.node, unused);
+    if (k == 0 || tried.cost < best.cost) best = tried;
   }
+  return best;
+}
+
+/* The cheapest point of each choice of branches, and of these the cheapest ones (SPREAD,);
+   how many there are. */
+static int cheapest_points(const real *block, const fl_work *work, const lattice *grid,
+                           const real *target, lattice_point *points) {
+  int choices = 1;
+  int points_of_choice = 1;
+  for (int f = 0; f < grid->foils; f++) {
+    choices *= grid->branches[f];
+    points_of_choice *= grid->each;
+  }
+  int count = 0;
   for (int choice = 0; choice < choices; choice++) {
-    point best = {{0}, NONE}, own = {{0}, 0};
-    for (int k = 0; k < within; k++) {
-      int branches = choice, places = k;
-      for (int f = 0; f < l->foils; f++) {
-        int branch = branches % l->branches[f], place = places % l->each;
-        own.node[f] = (unsigned char)(l->first[f] + branch * l->each + place);
-        branches /= l->branches[f];
-        places /= l->each;
-      }
-      own.cost = cost_at_point(block, work, l, target, own.node, force);
-      if (k == 0 || own.cost < best.cost) best = own;
-    }
+    const lattice_point best =
+        cheapest_of_choice(block, work, grid, target, choice, points_of_choice);
     count = put_in_order(points, count, &best);
   }
   return count;
 }
 
-/* Commands at a point, after steps towards work->aim: first some that leave the foils on their branches. */
-static void begin_at(const real *block, fl_work *work, const lattice *l, const real *target, const point *own,
-                     real command[][3]) {
+/* Commands at a point, after steps towards work->aim: first some that leave the foils on
+   their branches. */
+static void begin_at(const real *block, fl_work *work, const lattice *grid, const real *target,
+                     const lattice_point *begin, real command[][3]) {
   real force[FL_MOST][2];
   fl_box box = work->box;
-  cost_at_point(block, work, l, target, own->node, force);
+  cost_at_point(block, work, grid, target, begin->node, force);
   fl_commands_for_forces(block, &work->box, force, work->previous, command);
-  for (int f = 0; f < l->foils; f++) {
-    int node = own->node[f], i = l->foil[f], branch = (node - l->first[f]) / l->each;
-    command[i][0] = l->angle[node];
-    box.low[i][0] = l->edge[f][branch];
-    box.high[i][0] = l->edge[f][branch + 1];
+  for (int f = 0; f < grid->foils; f++) {
+    const int node = begin->node[f];
+    const int branch = (node - grid->first[f]) / grid->each;
+    const int i = grid->foil[f];
+    command[i][0] = grid->angle[node];
+    box.low[i][0] = grid->edge[f][branch];
+    box.high[i][0] = grid->edge[f][branch + 1];
   }
   approach(block, work, &box, command, ROUNDS / 2);
   approach(block, work, &work->box, command, ROUNDS / 2);
 }
 
-/* Places what steps from a lattice come to: first exact commands from many points, then the cheapest of these are made
-   cheaper, but for those that cost half as much again as the best so far. */
-static void place_spread(const real *block, fl_work *work, const real *target, const real *price, real enough,
-                         real *best) {
-  lattice l;
-  point points[SPREAD];
-  real command[FL_MOST][3], force[FL_MOST][2], part = allowed(block, work, &work->box), last = 0;
-  find_branches(block, work, &l);
-  lay_nodes(block, work, &l);
-  lay_rows(block, work, &l);
-  int count = cheapest_points(block, work, &l, target, points);
+/* The cheapest point that costs more than the last one followed: commands that cost the same
+   are the same; 0 for none. */
+static const lattice_point *next_point(const lattice_point *points, int count, real last_cost) {
+  const lattice_point *next = 0;
   for (int k = 0; k < count; k++) {
-    begin_at(block, work, &l, target, points + k, command);
-    int met = come_to_give(block, work, &work->box, command, 0, part);
-    points[k].cost = met ? fl_power_of_commands(block, work, command, force) : NONE;
+    const int is_new = points[k].cost > last_cost * (1 + NEARLY);
+    if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
   }
-  for (int tried = 0; tried < FOLLOWED && *best > enough; tried++) {
-    const point *next = 0;
-    for (int k = 0; k < count; k++) { /* commands that cost the same are the same */
-      int is_new = points[k].cost > last * (1 + NEARLY);
-      if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
+  return next;
+}
+
+/* Improves on the best commands by what steps from a lattice come to: first exact commands
+   from many points, then the cheapest of these are made cheaper, but for those that cost
+   half as much again as the best so far. */
+static void improve_from_lattice(const real *block, fl_work *work, const real *target,
+                                 const real *lambda, real enough, real *best_cost) {
+  const real most_error = error_allowed(block, work, &work->box);
+  lattice grid;
+  lattice_point points[SPREAD];
+  real command[FL_MOST][3];
+  find_branches(block, work, &grid);
+  lay_nodes(block, work, &grid);
+  lay_rows(block, work, &grid);
+  const int count = cheapest_points(block, work, &grid, target, points);
+  for (int k = 0; k < count; k++) {
+    real unused[FL_MOST][2];
+    begin_at(block, work, &grid, target, points + k, command);
+    points[k].cost = NONE;
+    if (come_to_give(block, work, &work->box, command, 0, most_error)) {
+      points[k].cost = fl_power_of_commands(block, work, command, unused);
     }
-    if (!next || !(next->cost < MIN(*best * R(1.5), NONE))) return;
-    last = next->cost;
-    begin_at(block, work, &l, target, next, command);
-    place_from(block, work, target, price, command, best);
+  }
+  real last_cost = 0;
+  for (int tried = 0; tried < FOLLOWED && *best_cost > enough; tried++) {
+    const lattice_point *next = next_point(points, count, last_cost);
+    if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
+    last_cost = next->cost;
+    begin_at(block, work, &grid, target, next, command);
+    improve_from(block, work, target, lambda, command, best_cost);
   }
 }
 
-/* The same of several starts, as steps from a cheap one may end early: each has its own valley. */
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best) {
-  real start[FL_MOST][3], command[FL_MOST][3], price[6], angle, ridge, most;
-  real proved = proved_value(block, work, &most), enough = proved * (1 + CLOSE);
-  memcpy(price, work->now->price, sizeof price);
-  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, start);
-  fl_improve_commands(block, work, target, best);
-  if (*best <= enough) return;
-  for (int i = 0; i < COUNT(block); i++)
+/* Improves on the best commands from those with one foil at a limit where it stalls. */
+static void improve_from_stalls(const real *block, fl_work *work, const real *target,
+                                const real *lambda, real start[][3], real *best_cost) {
+  real command[FL_MOST][3];
+  for (int i = 0; i < COUNT(block); i++) {
     for (int end = 0; end < 2; end++) {
+      real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
-      memcpy(command, *best < NONE ? work->placed : start, sizeof command);
+      if (*best_cost < NONE)
+        memcpy(command, work->placed, sizeof command);
+      else
+        memcpy(command, start, sizeof command);
       command[i][0] = angle;
-      place_from(block, work, target, price, command, best);
+      improve_from(block, work, target, lambda, command, best_cost);
     }
-  if (*best <= enough) return;
-  fl_first_lambda(block, work, target, price, &ridge);
-  fl_dual_start(block, work, target, price);
-  fl_improve_commands(block, work, target, best);
-  if (*best > enough && proved <= most) place_spread(block, work, target, price, enough, best);
+  }
 }
 
-/* Commands for forces that the dual is sure of: no foil drags more than its lift does, and none is in doubt. */
+/* The same as fl_improve_commands of several starts, as steps from a cheap one may end
+   early: each has its own valley. */
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target,
+                            real *best_cost) {
+  real most_cost;
+  const real proved = proved_value(block, work, &most_cost);
+  const real enough = proved * (1 + CLOSE);
+  real start[FL_MOST][3];
+  real lambda[6];
+  memcpy(lambda, work->now->price, sizeof lambda);
+  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, start);
+  fl_improve_commands(block, work, target, best_cost);
+  if (*best_cost <= enough) return;
+  improve_from_stalls(block, work, target, lambda, start, best_cost);
+  if (*best_cost <= enough) return;
+  real unused;
+  fl_first_lambda(block, work, target, lambda, &unused);
+  fl_dual_start(block, work, target, lambda);
+  fl_improve_commands(block, work, target, best_cost);
+  if (*best_cost > enough && proved <= most_cost) {
+    improve_from_lattice(block, work, target, lambda, enough, best_cost);
+  }
+}
+
+/* Commands for forces that the dual is sure of: no foil drags more than its lift does, and
+   none is in doubt. */
 int fl_are_forces_sure(const real *block, fl_work *work) {
+  fl_state *state = work->now;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->doubt > 0) return 0;
-    if (a->speed > 0 && FABS(work->now->force[i][0]) >= a->pressure * (1 - NOTHING) * end_of(block, a)[0]) return 0;
+    if (!is_foil(a)) continue;
+    const real largest_lift = a->pressure * (1 - NOTHING) * end_of(block, a)[0];
+    if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
-  if (fl_worst_gap(block, work, work->now->force, work->now->price) >= 0) return 0;
-  memcpy(work->best, work->now->force, sizeof work->best);
+  if (fl_worst_gap(block, work, state->force, state->price) >= 0) return 0;
+  memcpy(work->best, state->force, sizeof work->best);
   fl_commands_for_forces(block, &work->box, work->best, work->previous, work->placed);
-  return come_to_give(block, work, &work->box, work->placed, ROUNDS, allowed(block, work, &work->box));
+  const real most_error = error_allowed(block, work, &work->box);
+  return come_to_give(block, work, &work->box, work->placed, ROUNDS, most_error);
 }
 
-/* Commands that give the largest share of a wrench that steps come to, between that which commands are `found` for, 0
-   without any, and the `most` that the dual allows. `out` has forces near to it. */
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found, real most, fl_answer *out) {
-  real part[6], target[6], inner[6], own[FL_MOST][2], start[FL_MOST][3], command[FL_MOST][3], less = NEARLY, all = most;
-  for (int i = 0; i < 2 * COUNT(block); i++) /* a stalled foil gives more than its table */
-    if (may_stall(block, work, i / 2, i % 2, part)) most = MIN(all * (1 + R(0.1)), 1);
+/* Whether some foil may stall within its limits: it then gives more than its table. */
+static int may_any_stall(const real *block, const fl_work *work) {
+  real unused;
+  for (int i = 0; i < COUNT(block); i++) {
+    if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
+  }
+  return 0;
+}
+
+/* Commands that give the largest share of a wrench that steps come to, Eq. 14: between the
+   share that commands are `found` for, 0 without any, and the `most` that the dual allows.
+   `out` has forces near to it. */
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
+                          real most, fl_answer *out) {
+  const real most_by_dual = most;
+  /* how far below the most a share is tried, over it, until one is found */
+  real below_most = NEARLY;
+  real start[FL_MOST][3];
+  if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
   fl_commands_for_forces(block, &work->box, out->force, work->previous, start);
-  for (int k = 0; k < 2 * ROUNDS && less < 1 && most - found > NEARLY / 4 * all; k++) {
-    real share = found > 0 ? (found + most) / 2 : all * (1 - less);
-    int met = 0;
-    for (int j = 0; j < 6; j++) work->aim[j] = share * (wrench[j] + work->span.beside[j]), part[j] = work->aim[j] - work->span.beside[j];
-    fl_reduce_wrench(work, part, target);
-    for (int way = found > 0 ? 0 : 1; way < 2 && !met; way++) {
-      memcpy(command, way ? start : out->command, sizeof command);
-      memcpy(inner, out->inner, sizeof inner);
-      met = settle(block, work, target, EXACT, inner, command, own) < NONE;
+  for (int k = 0; k < 2 * ROUNDS; k++) {
+    if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
+    const int has_found = found > 0;
+    real ray_share = most_by_dual * (1 - below_most);
+    if (has_found) ray_share = (found + most) / 2;
+    real wrench_served[6]; /* by forces */
+    real target[6];
+    for (int j = 0; j < 6; j++) {
+      work->aim[j] = ray_share * (wrench[j] + work->span.beside[j]);
+      wrench_served[j] = work->aim[j] - work->span.beside[j];
     }
-    if (!met)
-      most = share, less *= found > 0 ? 1 : 10;
-    else {
-      found = share, out->placed = 1;
-      memcpy(out->command, command, sizeof command);
-      memcpy(out->inner, inner, sizeof inner);
-      memcpy(out->aim, part, sizeof part);
+    fl_reduce_wrench(work, wrench_served, target);
+    real command[FL_MOST][3];
+    real lambda[6];
+    int is_met = 0;
+    /* the last ones found, then the start */
+    for (int attempt = 0; attempt < 2 && !is_met; attempt++) {
+      if (attempt == 0 && !has_found) continue;
+      if (attempt == 0)
+        memcpy(command, out->command, sizeof command);
+      else
+        memcpy(command, start, sizeof command);
+      memcpy(lambda, out->inner, sizeof lambda);
+      real force[FL_MOST][2];
+      is_met = settle(block, work, target, EXACT, lambda, command, force) < NONE;
     }
+    if (!is_met) {
+      most = ray_share;
+      if (!has_found) below_most *= 10;
+      continue;
+    }
+    found = ray_share;
+    out->placed = 1;
+    memcpy(out->command, command, sizeof command);
+    memcpy(out->inner, lambda, sizeof lambda);
+    memcpy(out->aim, wrench_served, sizeof wrench_served);
   }
 }

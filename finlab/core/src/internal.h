@@ -154,7 +154,7 @@ void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2
                             const real *previous, real command[][3]);
 
 /* command_refine.c: steps on the commands, Eq. 11 */
-real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *aim,
+real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,
                         real command[][3], int steps);
 
 /* feasible_set.c: what may be given now */
