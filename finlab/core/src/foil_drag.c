@@ -16,7 +16,7 @@
 #define TRUST (R(3.0) / ROUNDS)
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
-#define SHORTEN R(0.25)           /* a step that is no cheaper is shortened to this share */
+#define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
 /* share of a ray that stalled foils may add to what tables give */
@@ -230,7 +230,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
       memcpy(force, force_stepped, sizeof force_stepped);
       cost -= gain;
     } else {
-      share *= SHORTEN;
+      share *= STEP_SHORTER;
     }
     if (FABS(gain) <= CHEAPER * cost) break;
   }
