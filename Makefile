@@ -22,11 +22,13 @@ export PYTHONDONTWRITEBYTECODE :=
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: docs schemas figures help setup core app board-tools test fuzz test-all test-near test-durations mutate test-fast check format checkpoint wheel wheels sdist wheel-check clean
+.PHONY: docs schemas figures help setup core core-test golden app board-tools test fuzz test-all test-near test-durations mutate test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
 	@echo "make setup        make .venv with all that developers need, pinned in constraints.txt (gigabytes, with torch)"
 	@echo "make core         compile the C files of finlab/core, a second; setup does it where they changed"
+	@echo "make core-test    the core's own tests, in C, by cmake and ctest"
+	@echo "make golden       write the golden robots of these tests, with the answers of oracles"
 	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT); installs what it needs and no more"
 	@echo "make test         every test, browser tests included; of long tables of cases a share"
 	@echo "make test-all     every test and every case"
@@ -57,6 +59,14 @@ core $(LIBRARY): $(STAMP) hatch_build.py $(wildcard finlab/core/*.h finlab/core/
 
 app: setup
 	$(BIN)/finlab app --port $(HOST_PORT)
+
+core-test:
+	cmake -S finlab/core -B build/core
+	cmake --build build/core
+	cd build/core && ctest --output-on-failure
+
+golden: setup
+	$(THREADS) $(BIN)/python -m tests.golden_robots
 
 # What compiles and runs the C export, and where it stands in Debian.
 BOARD_TOOLS := gcc g++ clang cmake aarch64-linux-gnu-gcc qemu-aarch64 arm-none-eabi-gcc qemu-system-arm
