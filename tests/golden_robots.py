@@ -1,4 +1,6 @@
-"""Golden robots of the core's tests in C: `python -m tests.golden_robots` writes finlab/core/tests/golden_*.h.
+"""Golden robots of the core's tests in C.
+
+`python -m tests.golden_robots` writes finlab/core/tests/golden_*.h.
 
 Each has a robot's block with few knots, and questions with what an oracle says that has no part of the core:
 least power by Clarabel on power cones or by BFGS on the dual, how far a wrench goes by a linear program, the

@@ -1,8 +1,15 @@
-/* Commands within their limits: which number is an angle or a force, limits of angles that turn freely, dead bands. */
+/* Commands within their limits: which number is an angle or a force, limits of angles that
+   turn freely, dead bands. */
 #include "internal.h"
 
+#define AT_EDGE R(0.9) /* of a dead band: forces above this share of it are put at its edge */
+
 /* Which number of a command is an angle; -1 where none is. */
-int fl_angle_number(const fl_actuator *a) { return a->form == FL_FIN ? 2 : a->form == FL_POD ? 0 : -1; }
+int fl_angle_number(const fl_actuator *a) {
+  if (a->form == FL_FIN) return 2;
+  if (a->form == FL_POD) return 0;
+  return -1;
+}
 
 /* Which number of a command is a force; -1 where none is. */
 int fl_force_number(const fl_actuator *a) {
@@ -13,46 +20,59 @@ int fl_force_number(const fl_actuator *a) {
 
 /* A number of a command in a box, an angle wrapped first. */
 real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
-  real low = box->low[i][k], high = box->high[i][k], middle = (low + high) / 2;
+  const real low = box->low[i][k];
+  const real high = box->high[i][k];
+  const real middle = (low + high) / 2;
   if (k == angle) value = middle + fl_wrap_angle(value - middle);
-  return CLIP(value, low, high);
+  return fl_clipped(value, low, high);
 }
 
-/* Whether a command lies in the dead band of its actuator, where it gives no force; on its edge but for rounding it
-   does not. */
+/* Whether a command lies in the dead band of its actuator, where it gives no force; on its
+   edge but for rounding it does not. */
 int fl_is_in_dead_band(const fl_actuator *a, const real *command) {
   const int k = fl_force_number(a);
   return k >= 0 && FABS(command[k]) < a->band * (1 - NEARLY);
 }
 
-/* Puts commands that gaps left a little inside their dead band at its edge: forces nearer to it than to rest. */
+/* The edge of a dead band on the side of a command. */
+static real edge_of_band(const fl_actuator *a, real command) {
+  if (command < 0) return -a->band;
+  return a->band;
+}
+
+/* Puts commands that gaps left a little inside their dead band at its edge: forces nearer to
+   it than to rest. */
 void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
-    if (k < 0 || !fl_is_in_dead_band(a, command[i]) || size_of(force[i]) < R(0.9) * a->band) continue;
-    command[i][k] = command[i][k] < 0 ? -a->band : a->band;
+    if (k < 0 || !fl_is_in_dead_band(a, command[i])) continue;
+    if (size_of(force[i]) < AT_EDGE * a->band) continue;
+    command[i][k] = edge_of_band(a, command[i][k]);
   }
 }
 
-/* Has commands inside a dead band rest, where the box allows, and puts those that rounding took from the edge there. */
+/* Has commands inside a dead band rest, where the box allows, and puts those that rounding
+   took from the edge there. */
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
     if (k < 0 || !(FABS(command[i][k]) < a->band)) continue;
     if (!fl_is_in_dead_band(a, command[i]))
-      command[i][k] = command[i][k] < 0 ? -a->band : a->band;
+      command[i][k] = edge_of_band(a, command[i][k]);
     else if (box->low[i][k] <= 0 && box->high[i][k] >= 0)
       command[i][k] = 0;
   }
 }
 
+/* Whether no number of a command is NaN. */
 int fl_is_known_command(const real *command) {
   return command[0] == command[0] && command[1] == command[1] && command[2] == command[2];
 }
 
-/* Commands in the box of a tick, their angles within the limits of the actuators: the last look at all that leaves. */
+/* Commands in the box of a tick, their angles within the limits of the actuators: the last
+   look at all that leaves. */
 void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -64,7 +84,7 @@ void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
         const real middle = (a->lower[k] + a->upper[k]) / 2;
         value = middle + fl_wrap_angle(value - middle);
       }
-      command[i][k] = CLIP(value, a->lower[k], a->upper[k]);
+      command[i][k] = fl_clipped(value, a->lower[k], a->upper[k]);
     }
   }
 }

@@ -18,7 +18,8 @@ typedef fl_wide wide;
 #define FLOOR floorf
 #define FABS fabsf
 #define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
-#define ENOUGH R(1e-4) /* the same where Newton's method stands still for IDLE steps; commands make up for it */
+/* The same where Newton's method stands still for IDLE steps; commands make up for it. */
+#define ENOUGH R(1e-4)
 #define IDLE 6
 #define ROUNDING R(1e-6)
 #define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
@@ -77,14 +78,16 @@ static inline real dot(const real *a, const real *b, int n) {
   for (int i = 0; i < n; i++) sum += a[i] * b[i];
   return sum;
 }
-static inline real size_of(const real *force) { return SQRT(force[0] * force[0] + force[1] * force[1]); }
+static inline real size_of(const real *force) {
+  return SQRT(force[0] * force[0] + force[1] * force[1]);
+}
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
-/* Prices of an actuator's rows at prices of the wrench in the basis. */
-static inline void own_price(const fl_work *work, int i, const real *price, real *own) {
-  own[0] = dot(work->span.matrix[i][0], price, 6);
-  own[1] = dot(work->span.matrix[i][1], price, 6);
+/* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
+static inline void own_price(const fl_work *work, int i, const real *lambda, real *s) {
+  s[0] = dot(work->span.matrix[i][0], lambda, 6);
+  s[1] = dot(work->span.matrix[i][1], lambda, 6);
 }
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
@@ -115,7 +118,12 @@ real fl_largest_slope(const real *block, int i);
 fl_set fl_reversed_set(const fl_set *set);
 
 /* actuator_response.c: forces that are worth most at multipliers, Eq. 5 */
-typedef struct { real force[2], xx, xy, yy, conjugate, angle; } response; /* angle: where turning costs */
+typedef struct {
+  real force[2];   /* y [N] */
+  real xx, xy, yy; /* dy/ds [N^2/W] */
+  real conjugate;  /* c*(s) [W] */
+  real angle;      /* at which it pushes, where turning costs [rad] */
+} response;
 response fl_response(const real *block, int i, const fl_set *set, const real *price);
 real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force);
 real fl_drag_of_lift(const real *block, int i, real force);
@@ -179,7 +187,7 @@ int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* set_gaps.c: sets with gaps */
-#define NARROW R(0.2) /* half of an arc up to which the chord stands for the arc of the least forces */
+#define NARROW R(0.2) /* half of an arc up to which its chord stands for its least forces */
 #define SHORTER R(0.98) /* a force below this share of the least one lies in the gap at rest */
 #define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
 int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *lambda);
@@ -236,9 +244,10 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
                      fl_answer *out);
 
 /* sequential_convex.c, jets.c: actuators that act on each other */
-/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6); see fl_jets. */
-typedef void (*fl_effect)(const real *known, const real *force, int count, const real *inflow, real *change, real *wrench,
-                       real *slope);
+/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6);
+   see fl_jets. */
+typedef void (*fl_effect)(const real *known, const real *force, int count, const real *inflow,
+                          real *change, real *wrench, real *slope);
 typedef struct {
   fl_effect effect;
   const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
