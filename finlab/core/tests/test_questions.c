@@ -169,7 +169,8 @@ int main(void) {
     test_damaged_blocks_are_refused(robot);
     test_numbers_that_are_none_are_refused(robot);
     test_limits_and_rates_hold(robot);
-#ifndef FL_SINGLE /* there rounding is taken for a direction, where fewer are driven: FL_BAD_NUMBER */
+/* In single precision rounding is taken for a direction where fewer are driven: FL_BAD_NUMBER. */
+#ifndef FL_SINGLE
     test_lost_actuators_give_nothing(robot);
     test_free_axes_cost_no_more(robot);
 #endif
