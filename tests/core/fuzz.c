@@ -30,6 +30,7 @@ static fl_real wild(fl_real old) {
 static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *previous, unsigned char *flags,
                 const fl_actuator *actuators) {
   double size = exp(12 * (uniform() - 0.5));
+  memset(q, 0, sizeof *q);
   for (int k = 0; k < 6; k++) {
     q->wrench[k] = below(4) ? (fl_real)(size * (2 * uniform() - 1)) : 0;
     if (!below(50)) q->wrench[k] = wild(q->wrench[k]);
@@ -51,6 +52,7 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
   q->previous = below(2) ? previous : 0;
   q->lost = below(3) ? 0 : flags;
   q->free = below(3) ? 0 : flags + ROBOT_COUNT;
+  q->ticks = below(20) ? below(10) : below(100) - 50;
   q->calm = below(20) ? (fl_real)below(11) : wild(1);
 }
 

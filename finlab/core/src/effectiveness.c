@@ -1,18 +1,20 @@
 /* What the actuators that work span in the axes that count.
 
-   Scaled wrenches are w / scale; their range is spanned by the columns of an orthonormal basis Q (6 x r), in which an
-   actuator's effectiveness is the matrix Q' B. An axis that does not count has no row in B, so its price is held at 0; an
-   actuator that is lost has no column. Python has prepared all of it for a whole robot; any other state follows here, in
+   Scaled wrenches are w / scale; their range is spanned by the columns of an orthonormal
+   basis Q (6 x r), in which an actuator's effectiveness is the matrix Q' B. An axis that
+   does not count has no row in B, so its price is held at 0; an actuator that is lost has no
+   column. Python has prepared all of it for a whole robot; any other state follows here, in
    a few microseconds, and is kept until the next question asks for another one. */
 #include "internal.h"
 
 /* Squared length, over that of the longest column, below which nothing is left of the columns. */
 #define DEPENDENT (NOTHING * NOTHING)
 
-/* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be commanded against their force. */
+/* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be
+   commanded against their force. */
 static const real *law_axis(const fl_actuator *a, int row) {
-  const int first = is_plane(a) ? 1 : 0;
-  return a->own[first + row];
+  if (is_plane(a)) return a->own[1 + row];
+  return a->own[row];
 }
 
 /* Wrench [N, N m] per newton of a row of an actuator, 0 in axes that do not count. */
@@ -44,7 +46,7 @@ static void scale_of(const real *block, fl_span *span) {
       }
     }
   }
-  for (int k = 0; k < 6; k++) most = MAX(most, size[k]);
+  for (int k = 0; k < 6; k++) most = fl_larger(most, size[k]);
   for (int k = 0; k < 6; k++) {
     span->scale[k] = 1;
     if (size[k] > DEPENDENT * most) span->scale[k] = SQRT(size[k]);
@@ -54,29 +56,30 @@ static void scale_of(const real *block, fl_span *span) {
 /* The orthonormal basis of all columns, by Gram and Schmidt, the longest first. */
 static void basis_of(const real *block, fl_span *span) {
   const int n = COUNT(block);
-  real rest[2 * FL_MOST][6];
+  real left[2 * FL_MOST][6];
   real longest = 0;
   for (int p = 0; p < 2 * n; p++) {
-    column_of(block, span, p / 2, p % 2, rest[p]);
-    for (int k = 0; k < 6; k++) rest[p][k] *= ACTUATOR(block, p / 2)->most[p % 2] / span->scale[k];
+    column_of(block, span, p / 2, p % 2, left[p]);
+    for (int k = 0; k < 6; k++) left[p][k] *= ACTUATOR(block, p / 2)->most[p % 2] / span->scale[k];
   }
   memset(span->basis, 0, sizeof span->basis);
   span->range = 0;
   while (span->range < 6) {
     int best = 0;
-    for (int p = 1; p < 2 * n; p++)
-      if (dot(rest[p], rest[p], 6) > dot(rest[best], rest[best], 6)) best = p;
-    const real square = dot(rest[best], rest[best], 6);
+    for (int p = 1; p < 2 * n; p++) {
+      if (dot(left[p], left[p], 6) > dot(left[best], left[best], 6)) best = p;
+    }
+    const real square = dot(left[best], left[best], 6);
     if (span->range == 0) longest = square;
     if (!(square > DEPENDENT * longest)) return;
     real q[6];
     for (int k = 0; k < 6; k++) {
-      q[k] = rest[best][k] / SQRT(square);
+      q[k] = left[best][k] / SQRT(square);
       span->basis[k][span->range] = q[k];
     }
     for (int p = 0; p < 2 * n; p++) {
-      const real projection = dot(rest[p], q, 6);
-      for (int k = 0; k < 6; k++) rest[p][k] -= projection * q[k];
+      const real projection = dot(left[p], q, 6);
+      for (int k = 0; k < 6; k++) left[p][k] -= projection * q[k];
     }
     span->range++;
   }
@@ -101,7 +104,9 @@ static void take_prepared(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
   memcpy(span->scale, h->scale, sizeof span->scale);
   memcpy(span->basis, h->basis, sizeof span->basis);
-  for (int i = 0; i < COUNT(block); i++) memcpy(span->matrix[i], ACTUATOR(block, i)->matrix, sizeof span->matrix[i]);
+  for (int i = 0; i < COUNT(block); i++) {
+    memcpy(span->matrix[i], ACTUATOR(block, i)->matrix, sizeof span->matrix[i]);
+  }
   span->range = (int)h->range;
 }
 
@@ -112,27 +117,36 @@ void fl_offset_wrench(const real *block, fl_span *span) {
     real sum = h->beside[k];
     for (int i = 0; i < COUNT(block); i++) {
       const fl_actuator *a = ACTUATOR(block, i);
-      if (span->lost[i] && a->form == FL_FOIL) sum -= a->pressure * a->rest * a->own[1][k] * h->yard[k];
+      const int has_no_drag = span->lost[i] && a->form == FL_FOIL;
+      if (has_no_drag) sum -= a->pressure * a->rest * a->own[1][k] * h->yard[k];
     }
-    span->beside[k] = span->counts[k] ? sum : 0;
+    span->beside[k] = 0;
+    if (span->counts[k]) span->beside[k] = sum;
   }
 }
 
-/* What follows from the matrices for Newton's method: the Hessian of quadratic costs, and its factor. */
+/* What follows from the matrices for Newton's method: the Hessian of quadratic costs, and
+   its factor. */
 static int prepare_newton(const real *block, fl_work *work) {
   const fl_span *span = &work->span;
-  real(*h)[6] = work->factor;
+  real(*H)[6] = work->factor;
   memset(work->factor, 0, sizeof work->factor);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    for (int row = 0; row < (int)a->rows; row++) fl_add_square(h, span->matrix[i][row], a->gain[row]);
+    for (int row = 0; row < (int)a->rows; row++) {
+      fl_add_square(H, span->matrix[i][row], a->gain[row]);
+    }
   }
-  const real trace = fl_trace(h);
-  for (int j = 0; j < 6; j++)
-    for (int k = 0; k <= j; k++) work->metric[j][k] = h[j][k] * (real)span->range / MAX(trace, TINY) + (j == k ? NEARLY : 0);
-  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace;
+  const real trace = fl_trace(H);
+  for (int j = 0; j < 6; j++) {
+    for (int k = 0; k <= j; k++) {
+      work->metric[j][k] = H[j][k] * (real)span->range / fl_larger(trace, TINY);
+    }
+    work->metric[j][j] += NEARLY;
+  }
+  for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace;
   work->least_trace = NEARLY * trace;
-  return span->range == 0 || fl_factor(h);
+  return span->range == 0 || fl_factor(H);
 }
 
 /* Prepares the state of a robot anew; 0 where its numbers are out of range. */
@@ -152,9 +166,10 @@ int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared) {
   return 0;
 }
 
-/* Prepares the state in which some actuators (n,) are lost and some axes (6,) free, each 0 for none, unless the last
-   question had the same; 0 where its numbers are out of range. */
-int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost, const unsigned char *free) {
+/* Prepares the state in which some actuators (n,) are lost and some axes (6,) free, each 0
+   for none, unless the last question had the same; 0 where its numbers are out of range. */
+int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
+                        const unsigned char *free) {
   fl_span *span = &work->span;
   int is_same = 1;
   int is_as_prepared = 1;
