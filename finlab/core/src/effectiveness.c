@@ -7,8 +7,10 @@
    a few microseconds, and is kept until the next question asks for another one. */
 #include "internal.h"
 
-/* Squared length, over that of the longest column, below which nothing is left of the columns. */
-#define DEPENDENT (NOTHING * NOTHING)
+/* Length of a column, over that of the longest one, below which nothing is left of the columns: ten times their rounding
+   in single precision, where a lost actuator would else leave a direction that is rounding. */
+#define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
+#define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
 /* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be
    commanded against their force. */

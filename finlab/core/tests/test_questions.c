@@ -108,7 +108,6 @@ static void test_limits_and_rates_hold(const golden_robot *robot) {
   CHECK(moved > 10, robot->name, moved);
 }
 
-#ifndef FL_SINGLE
 static void test_lost_actuators_give_nothing(const golden_robot *robot) {
   const fl_policy closest = {FL_CLOSEST, 0, {1, 1, 1, 1, 1, 1}, {{0}}};
   for (int i = 0; i < (int)head_of(robot->block)->n; i++) {
@@ -137,7 +136,6 @@ static void test_free_axes_cost_no_more(const golden_robot *robot) {
     CHECK(bound <= robot->questions[k].power * (1 + optimal), robot->name, k);
   }
 }
-#endif
 
 static void test_settings_bound_the_search(const golden_robot *robot) {
   fl_settings settings;
@@ -169,11 +167,8 @@ int main(void) {
     test_damaged_blocks_are_refused(robot);
     test_numbers_that_are_none_are_refused(robot);
     test_limits_and_rates_hold(robot);
-/* In single precision rounding is taken for a direction where fewer are driven: FL_BAD_NUMBER. */
-#ifndef FL_SINGLE
     test_lost_actuators_give_nothing(robot);
     test_free_axes_cost_no_more(robot);
-#endif
     test_settings_bound_the_search(robot);
   }
   printf("%d failures\n", failures);
