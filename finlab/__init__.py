@@ -9,7 +9,7 @@ both into one command per actuator:
 Names are imported on first use, so that `import finlab` needs neither torch nor the time to load it.
 """
 
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ _HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
 def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'finlab' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
-    return getattr(import_module(_HOME[name]), name)
+    return resolve_name(f"{_HOME[name]}:{name}")
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""Types of arrays, one formula for numpy, torch and CasADi, and many small linear systems at once."""
+"""Types of arrays, shares that stand for nothing, one formula for numpy, torch and CasADi, small systems."""
 
 import sys
 from typing import Any
@@ -12,6 +12,19 @@ AnyArray = NDArray[Any]
 """Numbers of a type that is given elsewhere: of single precision, complex, whole or truth values, too."""
 Values = Any
 """A numpy array, a tensor or a symbol."""
+
+ROUNDING = 1e-12
+"""Share of a value that the rounding of sums may take."""
+NOTHING = 1e-9
+"""Share from which on a thing counts as there: far above rounding, far below what anybody can feel."""
+NEARLY = 1e-6
+"""Share of a thing that may be missing where it counts as whole."""
+FINE = 1e-5
+"""Share by which a compiled table may be off between its points."""
+CLOSE = 1e-4
+"""Share that is not worth another search."""
+ROUNDS = 12
+"""Most times that something is repeated that mostly settles after a few."""
 
 
 def library_of(value: Any) -> Any:

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 
 from finlab.errors import DataError, FinlabError
+from finlab.files import parse_json
 from finlab.files.guarded import is_regular, read_file, unpacked
-from finlab.files.plain_values import parse_json
 
 FORMAT = "finlab-bundle"
 VERSION = 9
@@ -72,6 +72,17 @@ def archive_around(path: str | os.PathLike[str]) -> str | None:
     archive = os.path.dirname(tables)
     within = archive.endswith(".zip") and os.path.basename(tables) + "/" == TABLES
     return archive if within and os.path.isfile(archive) else None
+
+
+def file_stamp(path: str | None) -> tuple[int, int] | None:
+    """Returns time and size of a file, by which one that is kept is known to be old; None for no file."""
+    if path is None:
+        return None
+    try:
+        result = os.stat(archive_around(path) or path)
+    except (OSError, ValueError):
+        return 0, 0
+    return result.st_mtime_ns, result.st_size
 
 
 def named_content(

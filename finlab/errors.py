@@ -1,8 +1,15 @@
-"""Errors that a user can cause, under one base class.
+"""Errors that a user can cause, under one base class, and how a command ends with one.
 
 A message is one plain sentence that says what was got, what was expected, where, and what to do. The command
 line prints it behind `finlab: error: ` and exits with status 2; the app shows it as a notification.
 """
+
+import errno
+import io
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 
 
 def printable(text: str) -> str:
@@ -80,3 +87,73 @@ class AllocationError(FinlabError):
 
 class DataError(FinlabError):
     """A data set, a table of forces or a shard on disk is missing, corrupt or inconsistent."""
+
+
+@contextmanager
+def under(key: str = "", source: str = "") -> Iterator[None]:
+    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before that."""
+    try:
+        yield
+    except LayoutError as error:
+        raise error.under(key, source) from None
+
+
+FAILED = 2
+"""Exit code after an error that is printed in one sentence."""
+INTERRUPTED = 130
+"""128 + SIGINT, as shells report it."""
+BROKEN_PIPE = 141
+"""128 + SIGPIPE, as shells report it."""
+
+
+class ClosedOutput(io.TextIOBase):
+    """Standard output of a command that was started without it, as by `>&-`: Python has None in its place,
+    and `print` then says nothing and succeeds, as if somebody had read it."""
+
+    def writable(self) -> bool:
+        return False
+
+    def write(self, text: str, /) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
+def exit_code(program: str, work: Callable[[], int]) -> int:
+    """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
+
+    Standard output that is full or closed is an error like any other; a reader that ended early, such as
+    `head`, has what it wanted, and gets no words.
+    """
+    output = nullcontext() if sys.stdout is not None else redirect_stdout(ClosedOutput())
+    with output:
+        return _code_of(program, work)
+
+
+def _code_of(program: str, work: Callable[[], int]) -> int:
+    try:
+        code = work()
+        sys.stdout.flush()
+        return code
+    except FinlabError as error:
+        return _fail(program, str(error))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except OSError as error:
+        if error.filename is not None:
+            return _fail(program, f"{error.filename}: {error.strerror}")
+        _drop_output()
+        if isinstance(error, BrokenPipeError):
+            return BROKEN_PIPE
+        return _fail(program, f"cannot print: {error.strerror or error}; write the output to another place")
+
+
+def _fail(program: str, sentence: str) -> int:
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(f"{program}: error: {sentence}", file=sys.stderr)
+    return FAILED
+
+
+def _drop_output() -> None:
+    """Give standard output somewhere to write: Python flushes it once more at exit."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.file import parse_layout
+from finlab.layout.load import parse_layout
 from tests.least_power import farthest
 from tests.own_plant import LIMITS, NOMINAL, OwnPlant, edge_forces
 

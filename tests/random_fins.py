@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.layout import FinModelSpec, Layout, Limits, random_layout
+from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, make_law
+from finlab.random_layouts import random_layout
 
 Array = NDArray[np.float64]
 

@@ -6,33 +6,74 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from pkgutil import resolve_name
 
 import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-LEVELS = (
-    ("errors", "arrays"),
-    ("axes", "core", "files", "assets", "command_end", "least_squares", "precision", "whole_file"),
-    ("bundle_files", "executor", "display"),
+Levels = tuple[tuple[str, ...], ...]
+"""Rooms that may import those of earlier levels and themselves, never their neighbours or later ones."""
+
+CORE: Levels = (
+    ("arrays", "errors"),
+    ("assets", "axes", "core", "files", "least_squares", "whole_file"),
+    ("bundle_files", "display"),
     ("actuators",),
     ("interaction",),
     ("layout",),
     ("physics", "exchange"),
-    ("vehicle",),
-    ("networks", "hull"),
-    ("forces", "training"),
+    ("forces",),
     ("allocation",),
-    ("control", "paper"),
-    ("mdn", "sim", "analysis", "fit"),
-    ("evaluation", "deploy"),
-    ("log",),
-    ("cli",),
+    ("analysis", "fit"),
+    ("deploy",),
 )
-"""A room may import rooms of earlier levels and itself, never its neighbours or later ones."""
+"""What allocates, and what is said of a robot that allocates. It imports no wing."""
 
-LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
+WINGS: dict[str, Levels] = {
+    "swim": (("vehicle",), ("hull", "control"), ("sim", "fit/robot", "deploy/design_files")),
+    "research": (
+        ("executor", "networks", "random_layouts"),
+        ("training", "fit/interaction/drawn_samples"),
+        ("paper", "fit/interaction/train", "fit/interaction/surrogate_form"),
+        ("mdn",),
+        ("evaluation",),
+    ),
+    "logs": (("log",),),
+}
+"""What few of those who allocate need, by the wing that it stands in: rooms, and parts of rooms of the core
+that are imported there alone. A wing may import the whole core. The fourth wing is `webapp`."""
+
+USES = {"research": {"swim"}, "logs": {"research"}}
+"""Which other wings a wing imports: experiments swim, and what is told of a log is a document of rows."""
+
+VERBS = {
+    "cli/app_verb": {"app"},
+    "cli/eval_verbs": {"research"},
+    "cli/fit_robot": {"swim"},
+    "cli/log_verb": {"logs", "research"},
+    "cli/simulate": {"swim", "research"},
+    "cli/train_verbs": {"research"},
+}
+"""Verbs that wings bring, and those wings; all else of the command line knows the core alone."""
+
+REGISTRIES = {
+    "finlab.allocation.methods": {"research"},
+    "finlab.cli": set[str](),
+    "finlab.cli.layout_verbs": {"swim"},
+    "finlab.cli.shared_options": {"research"},
+}
+"""Modules outside of the wings that name what stands in these, in a string that is resolved when it is asked
+for."""
+
+LEVEL = {
+    room: (wing, level)
+    for wing, levels in {"core": CORE, **WINGS, "cli": (("cli",),)}.items()
+    for level, rooms in enumerate(levels)
+    for room in rooms
+}
+"""Room -> its wing, and its level there."""
 
 
 def _sources(package: str) -> list[Path]:
@@ -60,48 +101,113 @@ def _imports(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def _room(module: str) -> str | None:
+    """The room of a module: the longest path in the plan that it lies in; None of what is not ours."""
     parts = module.split(".")
-    return parts[1] if parts[0] == "finlab" and len(parts) > 1 and parts[1] in LEVEL else None
+    if parts[0] == "webapp":
+        return "webapp"
+    paths = ["/".join(parts[1:end]) for end in range(len(parts), 1, -1)] if parts[0] == "finlab" else []
+    return next((path for path in paths if path in LEVEL), None)
+
+
+def _wing(room: str) -> str:
+    return "app" if room == "webapp" else LEVEL[room][0]
+
+
+def _module_of(path: Path, root: Path = ROOT) -> str:
+    parts = path.relative_to(root).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _allowed(module: str, here: str, there: str) -> bool:
+    """Whether the plan has a module of one room import another room."""
+    if here == there:
+        return True
+    own, other = _wing(here), _wing(there)
+    if own == "cli":
+        return other == "core" or other in VERBS.get(module.replace(".", "/").removeprefix("finlab/"), set())
+    if own == other:
+        return LEVEL[there][1] < LEVEL[here][1]
+    return own != "core" and (other == "core" or other in USES.get(own, set()))
 
 
 def test_every_room_is_known() -> None:
     paths = [path for path in (ROOT / "finlab").iterdir() if path.suffix in ("", ".py")]
     rooms = {path.stem if path.is_file() else path.name for path in paths}
     rooms -= {"__init__", "__main__", "__pycache__"}
-    assert rooms <= set(LEVEL), "give a new room its place in LEVELS"
+    assert rooms <= set(LEVEL), "give a new room its place in CORE or WINGS"
+    parts = {room for room in LEVEL if "/" in room}
+    known = {path.relative_to(ROOT / "finlab").with_suffix("").as_posix() for path in _sources("finlab")}
+    known |= {str(Path(path).parent) for path in known}
+    assert parts <= known, "a part of a room has left: take it out of WINGS"
 
 
-def test_imports_go_one_way() -> None:
+def test_the_core_imports_no_wing_and_all_imports_go_one_way() -> None:
+    """Those in functions and for type checkers, too."""
     wrong = []
     for path in _sources("finlab"):
-        relative = path.relative_to(ROOT / "finlab")
-        here = relative.parts[0].removesuffix(".py")
-        if here not in LEVEL:  # finlab/__init__.py and __main__.py are the front door
+        module = _module_of(path)
+        here = _room(module)
+        if here is None:  # finlab/__init__.py and __main__.py are the front door
             continue
-        for module, line in _imports(path):
-            there = _room(module)
-            if there not in (None, here) and LEVEL[str(there)] >= LEVEL[here]:
-                wrong.append(f"finlab/{relative}:{line} imports {module}")
+        for imported, line in _imports(path):
+            there = _room(imported)
+            if there is not None and not _allowed(module, here, there):
+                wrong.append(f"{path.relative_to(ROOT)}:{line} imports {imported}")
     assert not wrong, "\n".join(wrong)
+
+
+def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
+    """Names of modules of another wing that stand as strings in a file which resolves such, with the wing."""
+    here = _room(module)
+    own = "door" if here is None else _wing(here)
+    if "resolve_name" not in path.read_text(encoding="utf-8"):
+        return
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            name = node.value.partition(":")[0]
+            room = _room(name) if name.startswith(("finlab.", "webapp.")) else None
+            if room is not None and _wing(room) not in ("core", "cli", own):
+                yield name, _wing(room)
+
+
+def test_wings_are_named_by_strings_in_registries_alone() -> None:
+    named: dict[str, set[str]] = {}
+    for module, path in _modules(ROOT).items():
+        if module.startswith("finlab") and (wings := {wing for _, wing in _names_of_wings(module, path)}):
+            named[module] = wings
+    assert named == {module: wings for module, wings in REGISTRIES.items() if wings}
+
+
+def test_what_registries_name_is_there() -> None:
+    from finlab.actuators.kinds import KINDS
+    from finlab.allocation.methods import METHODS
+    from finlab.cli import VERBS as COMMANDS
+    from finlab.cli.layout_verbs import REMARKS
+    from finlab.interaction import INTERACTIONS
+
+    for name, method in METHODS.items():
+        assert resolve_name(method).name == name
+    for name, kind in KINDS.items():
+        assert kind.type == name
+    for name, interaction in INTERACTIONS.items():
+        assert resolve_name(interaction).type == name
+    assert all(callable(resolve_name(home)) for home in (*COMMANDS.values(), *REMARKS))
 
 
 def _modules(root: Path) -> dict[str, Path]:
     """Every module of finlab and webapp by its full name."""
-    named = {}
-    for package in ("finlab", "webapp"):
-        for path in sorted((root / package).rglob("*.py")):
-            parts = path.relative_to(root).with_suffix("").parts
-            named[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return named
+    paths = [path for package in ("finlab", "webapp") for path in sorted((root / package).rglob("*.py"))]
+    return {_module_of(path, root): path for path in paths}
 
 
 def _import_graph(root: Path) -> "nx.DiGraph[str]":
-    """Which module needs which, at once, later (in functions, or by a name given to `import_module`), or for
-    types; a package's own file only where something is asked of it by name."""
+    """Which module needs which, at once, later (in functions, or by a name given to `import_module` or
+    `resolve_name`), or for types; a package's own file only where something is asked of it by name."""
     modules = _modules(root)
     graph: nx.DiGraph[str] = nx.DiGraph()
     for name, path in modules.items():
-        by_name = "import_module" in path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
+        by_name = "import_module" in text or "resolve_name" in text
         for node in ast.walk(_tree(path)):
             wanted: list[str] = []
             if isinstance(node, ast.Import):
@@ -110,7 +216,7 @@ def _import_graph(root: Path) -> "nx.DiGraph[str]":
                 inside = [f"{node.module}.{alias.name}" for alias in node.names]
                 wanted = [full if full in modules else str(node.module) for full in inside]
             elif by_name and isinstance(node, ast.Constant) and isinstance(node.value, str):
-                wanted = [node.value]
+                wanted = [node.value.partition(":")[0]]
             graph.add_edges_from((name, module) for module in wanted if module in modules)
     return graph
 
@@ -157,7 +263,7 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
     ("package", "banned"),
     [
         ("finlab", ("viser", "webapp", "playwright")),
-        *((f"finlab/{room}", ("trimesh",)) for rooms in LEVELS for room in rooms if room != "hull"),
+        *((f"finlab/{room}", ("trimesh",)) for room in LEVEL if room != "hull"),
         ("finlab/layout", ("torch", "scipy", "matplotlib")),
         ("finlab/actuators", ("torch", "scipy", "matplotlib")),
         *((f"finlab/{room}", ("torch",)) for room in ("evaluation", "sim", "control", "exchange")),
@@ -166,7 +272,7 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
     ],
 )
 def test_rooms_do_without(package: str, banned: tuple[str, ...]) -> None:
-    door = "finlab/cli/robot_verbs.py"  # the one place that starts the web app
+    door = "finlab/cli/app_verb.py"  # the one place that starts the web app
     wrong = [
         f"{path.relative_to(ROOT)}:{line} imports {module}"
         for path in _sources(package)
@@ -199,3 +305,27 @@ def test_allocating_needs_only_numpy_and_msgspec() -> None:
         "import finlab.allocation.dual.method, finlab.mdn.method, finlab.deploy.deployed_robot"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+
+
+MOST_FILES = 50
+"""Files of ours that an answer for a robot of fins loads."""
+
+
+def test_allocating_loads_few_files_and_no_wing() -> None:
+    code = (
+        "import sys\n"
+        "from finlab.cli import main\n"
+        "assert main(['allocate', 'A', '--wrench', '1', '0', '0', '0', '0', '0']) == 0\n"
+        "print(*(name for name, module in sys.modules.items() if getattr(module, '__file__', None)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    names = done.stdout.splitlines()[-1].split()
+    ours = [name for name in names if name.partition(".")[0] in ("finlab", "webapp")]
+    rooms = {room for name in ours if (room := _room(name)) is not None}
+    assert not [room for room in rooms if _wing(room) not in ("core", "cli")]
+    assert not {"torch", "scipy", "matplotlib", "safetensors", "tqdm"} & set(names)
+    kinds = {name.rpartition(".")[2] for name in ours if name.startswith("finlab.actuators.")}
+    assert "fin" in kinds and not kinds & {"thruster", "azimuth", "rudder", "propeller"}
+    assert len(ours) <= MOST_FILES, "\n".join(sorted(ours))

@@ -28,7 +28,7 @@ NAMES = {
     "finlab.hull": "Surface contradicts displaced estimated hull_of lift_of",
     "finlab.layout": "Actuator Azimuth Body Damage Fin FinModelSpec Hull Layout Limits MAX_ACTUATORS Rudder "
     "Servo Thruster Tilt Uncertainty layout_effectiveness layout_to_dict load_layout own_effectiveness "
-    "parse_layout random_layout save_layout",
+    "parse_layout save_layout",
     "finlab.log": "Judgement Log judge read_log",
     "finlab.physics": "FinLaw Plant TableLaw make_law plant_of read_table write_table",
     "finlab.sim": "ClosedLoop Fault NOISE_ALONE NO_NOISE RunLog SHIPPED SensorSettings Tick Trajectory "

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import msgspec
 
-from finlab.layout.file import layout_form
-from finlab.layout.load import Graph
+from finlab.layout.graph_file import Graph
+from finlab.layout.load import layout_form
 
 PACKAGE = Path(__file__).parents[1] / "finlab"
 

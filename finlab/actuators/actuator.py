@@ -216,9 +216,23 @@ class Actuator(Checked, ABC):
         """Path of the file that its law reads, None where it reads none."""
         return None
 
+    @property
+    def stamp(self) -> tuple[int, int] | None:
+        """Time and size of that file, for what is kept until it changes; None where it reads none."""
+        if self.reads is None:
+            return None
+        from finlab.bundle_files import file_stamp
+
+        return file_stamp(self.reads)
+
     def reading(self, path: str) -> Self:
         """Returns it with another file that its law reads."""
         return self
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether something is known of the error of its force: it is said, or a table tells."""
+        return self.uncertainty is not None or self.model_type == "table"
 
     @property
     def model_type(self) -> str:

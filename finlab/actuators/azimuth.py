@@ -13,7 +13,6 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
-from finlab.actuators.form import Form
 from finlab.actuators.propeller import (
     T200,
     ForceRate,
@@ -25,7 +24,7 @@ from finlab.actuators.propeller import (
     form_of,
     given_force,
 )
-from finlab.actuators.response import Group, Plane
+from finlab.actuators.response import Form, Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values

@@ -16,16 +16,12 @@ LOOKS = "fin", "thruster", "pod", "foil"
 """How an actuator may be drawn."""
 
 
-class Kinds(dict[str, type[Actuator]]):
-    """Kinds by the type that layouts give them. Raises FinlabError where one is added that is none: it lacks
-    what the contract asks for, whose name the sentence says."""
-
-    def __setitem__(self, name: str, kind: type[Actuator]) -> None:
-        """Adds a kind, or puts another one in its place."""
-        if problem := _problem(name, kind):
-            home = getattr(kind, "__module__", "?")
-            raise FinlabError(f"kind of actuator {name!r} of module {home!r}: {problem}; {CONTRACT}")
-        super().__setitem__(name, kind)
+def check_kind(name: str, kind: Any) -> None:
+    """Refuses what is no kind of actuator of that type. Raises FinlabError: it lacks what the contract asks
+    for, whose name the sentence says."""
+    if problem := _problem(name, kind):
+        home = getattr(kind, "__module__", "?")
+        raise FinlabError(f"kind of actuator {name!r} of module {home!r}: {problem}; {CONTRACT}")
 
 
 def _problem(name: str, kind: Any) -> str:

@@ -1,28 +1,68 @@
-"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here.
+"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here;
+it is imported when a robot has one.
 
 Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds its own to
 `KINDS`, which refuses what is no kind. A module that cannot be imported is a `FinlabError`.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from importlib import import_module
+from pkgutil import resolve_name
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Actuator, Places
-from finlab.actuators.azimuth import Azimuth, Tilt
-from finlab.actuators.fin.fin import Fin
-from finlab.actuators.kind_check import Kinds
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
-from finlab.actuators.rudder import Rudder
-from finlab.actuators.thruster import Thruster
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 
-KINDS = Kinds({kind.type: kind for kind in (Fin, Thruster, Azimuth, Tilt, Rudder)})
+
+class Kinds(MutableMapping[str, type[Actuator]]):
+    """Kinds by the type that layouts give them, each imported when it is asked for. Raises FinlabError where
+    one is added that is none: it lacks what the contract asks for, whose name the sentence says."""
+
+    def __init__(self, homes: dict[str, str]) -> None:
+        """Takes types of actuators -> where their classes stand, `module:Class`."""
+        self._kinds: dict[str, str | type[Actuator]] = dict(homes)
+
+    def __getitem__(self, name: str) -> type[Actuator]:
+        kind = self._kinds[name]
+        if isinstance(kind, str):
+            kind = self._kinds[name] = resolve_name(kind)
+        return kind
+
+    def __setitem__(self, name: str, kind: type[Actuator]) -> None:
+        """Adds a kind, or puts another one in its place."""
+        from finlab.actuators.kind_check import check_kind
+
+        check_kind(name, kind)
+        self._kinds[name] = kind
+
+    def __delitem__(self, name: str) -> None:
+        del self._kinds[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._kinds)
+
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._kinds
+
+
+KINDS = Kinds(
+    {
+        "fin": "finlab.actuators.fin.fin:Fin",
+        "thruster": "finlab.actuators.thruster:Thruster",
+        "azimuth": "finlab.actuators.azimuth:Azimuth",
+        "tilt": "finlab.actuators.azimuth:Tilt",
+        "rudder": "finlab.actuators.rudder:Rudder",
+    }
+)
 """Type of an actuator in a layout -> its class."""
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.actuators.form import size_numbers
+from finlab.actuators.hermite_grid import size_numbers
 from finlab.arrays import Array, Values, library_of
 
 OWN_INERTIA = 0.0097
@@ -138,10 +138,19 @@ class FinLaw(ActuatorLaw):
     """Angle [rad] from the zero direction to the thrust, where the law has one for all."""
     unevenness: tuple[float, float] = (0.0, 0.0)
     """e and phi_e: how the size depends on the zero direction, as 1 + e cos(phi - phi_e)."""
+    measured: bool = False
+    """Whether it is a table of forces rather than a formula."""
+    notes: tuple[str, ...] = ()
+    """What to know of the law, a sentence each."""
+
+    @property
+    def has_power(self) -> bool:
+        """Whether it is known what power the fins take."""
+        return True
 
     @abstractmethod
     def grid_numbers(self, lower: Array, upper: Array) -> Array:
-        """Returns the law of one fin within limits (3,) as a grid for the core; see `finlab.actuators.form`:
+        """Returns the law of one fin within limits (3,) as a grid for the core; see `grid_numbers`:
         forces along own axes, or their size alone, without the unevenness."""
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:

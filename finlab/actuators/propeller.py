@@ -10,13 +10,12 @@ from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from finlab.actuators.actuator import Actuator, Box, Command
-from finlab.actuators.form import Form
 from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
-from finlab.arrays import AnyArray, Array, Values
+from finlab.arrays import NEARLY, NOTHING, AnyArray, Array, Values
 from finlab.errors import AllocationError
-from finlab.precision import NEARLY, NOTHING
 
 ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
 Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]

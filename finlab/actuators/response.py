@@ -10,12 +10,11 @@ its convex hull, at which `T` has a steep place.
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from finlab.actuators.form import Form
-from finlab.arrays import Array
-from finlab.precision import NOTHING
+from finlab.arrays import NOTHING, Array
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
@@ -236,6 +235,37 @@ def power_of(response: Response, force: Array) -> Array:
         table.cost(np.abs(force)) for table in (response.table, response.reverse or response.table)
     )
     return np.where(force < 0.0, astern, ahead)
+
+
+class Form(NamedTuple):
+    """How a force of one actuator becomes a command, and a command a force, as numbers for the core:
+    finlab/core/src/command_law.c reads them."""
+
+    kind: Literal["thruster", "pod", "fin", "foil"]
+    """A force; an angle and a force; a beat of a fin; an angle of a foil."""
+    axes: Array | None = None
+    """Axes (3, 3) of the law's forces in the actuator's own ones; None where they are the same."""
+    law: Array | None = None
+    """A grid of the law, see `finlab.actuators.hermite_grid.grid_numbers`."""
+    beat: Array | None = None
+    """Of a fin: amplitudes and frequencies (K + 1, 2) of the shares (j / K)^2 of its largest force. Of a
+    foil: coefficients of lift, rising, and angles (K, 2)."""
+    deflection: Array | None = None
+    """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
+    sign: float = 1.0
+    """Of a thruster's command over its force: -1 where it only pulls."""
+    lean: float = 0.0
+    """Angle [rad] from the command of a fin to its force; of a foil the direction of travel."""
+    uneven: float = 0.0
+    """Of a fin, whose force grows by the factor 1 + uneven cos(angle - uneven_at)."""
+    uneven_at: float = 0.0
+    """See `uneven` [rad]."""
+    pressure: float = 1.0
+    """Dynamic pressure times area of a foil [N]."""
+    zero_lift_angle: float = 0.0
+    """Command of a foil at which it has no lift [rad]."""
+    zero_lift_drag: float = 0.0
+    """Coefficient of its drag there."""
 
 
 class Group(ABC):

@@ -18,16 +18,15 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators import actuator
-from finlab.actuators.form import Form, grid_numbers
+from finlab.actuators.hermite_grid import grid_numbers
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
+from finlab.actuators.response import CELLS, POINTS, Form, Group, Line, RadialTable, Response
 from finlab.actuators.thrust_model import lower_hull
 from finlab.actuators.thrust_power import Curve, radial_table
-from finlab.arrays import Array, Values
+from finlab.arrays import NOTHING, Array, Values
 from finlab.axes import AHEAD, SHORT, Direction3, Vector, across, arc_words
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
-from finlab.precision import NOTHING
 
 SHARPNESS = 50.0
 """How fast the flow separates around the angle of stall [1/rad]."""

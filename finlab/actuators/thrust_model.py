@@ -2,15 +2,15 @@
 
 import os
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
 from finlab.files.csv_table import read_table
-from finlab.files.schema import Checked
+from finlab.files.schema import Checked, Part
 
 MAX_FORCE = 1e6
 """Largest force of one actuator [N]."""
@@ -44,7 +44,7 @@ class PowerLaw(Checked):
 
 
 @dataclass(frozen=True)
-class PowerTable(Checked):
+class PowerTable(Checked, Part):
     """Force and power over the thruster's own command, as measured. Checked on construction."""
 
     type: ClassVar[str] = "table"
@@ -89,7 +89,21 @@ class PowerTable(Checked):
         return np.array(self.rows).T
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], unit: str = "") -> "PowerTable":
+    def file_form(cls) -> Any:
+        return TableForm
+
+    @classmethod
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+        if ("rows" in values) == ("path" in values):
+            raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
+        if "rows" in values:
+            return cls(**values)
+        if not may_open:
+            raise LayoutError("names a file, which is not opened here; write its rows", "path")
+        return cls.read(values["path"], values.get("unit", ""))
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], unit: str = "") -> Self:
         """Returns the table in a CSV file with the columns `COLUMNS`. Raises LayoutError: the file cannot be
         read, lacks a column, or its rows are not acceptable."""
         try:
@@ -104,6 +118,18 @@ class PowerTable(Checked):
             return cls(tuple(map(tuple, rows.tolist())), unit)
         except LayoutError as error:
             raise LayoutError(f"{path}: {error}", "path") from None
+
+
+class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
+    """Force and power over the thruster's own command: rows, or the CSV file that has them."""
+
+    stands_for: ClassVar[type[PowerTable]] = PowerTable
+
+    rows: Annotated[list[Row], Meta(min_length=3, max_length=MAX_ROWS)] | None = None
+    path: Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of thrust")] | None = (
+        None
+    )
+    unit: Annotated[str, Meta(max_length=20)] | None = None
 
 
 ThrustModel = PowerLaw | PowerTable

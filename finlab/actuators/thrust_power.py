@@ -9,8 +9,7 @@ import numpy as np
 
 from finlab.actuators.response import RadialTable, price_grid
 from finlab.actuators.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
-from finlab.arrays import AnyArray, Array
-from finlab.precision import NOTHING
+from finlab.arrays import NOTHING, AnyArray, Array
 
 
 class PowerCurve(Protocol):

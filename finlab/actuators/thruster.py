@@ -11,7 +11,6 @@ from typing import ClassVar, Self
 import numpy as np
 
 from finlab.actuators.actuator import Box, Command, Diameter, Faults, Metres, Place, Seconds, Uncertainty
-from finlab.actuators.form import Form
 from finlab.actuators.propeller import (
     T200,
     ForceRate,
@@ -23,7 +22,7 @@ from finlab.actuators.propeller import (
     form_of,
     given_force,
 )
-from finlab.actuators.response import Group, Line
+from finlab.actuators.response import Form, Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values

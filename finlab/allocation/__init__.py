@@ -3,7 +3,7 @@
 Names are imported on first use: an answer that comes from elsewhere needs no allocator.
 """
 
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,4 +37,4 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'finlab.allocation' has no attribute {name!r}")
-    return getattr(import_module(f"finlab.allocation.{_HOME[name]}"), name)
+    return resolve_name(f"finlab.allocation.{_HOME[name]}:{name}")

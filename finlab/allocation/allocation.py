@@ -9,17 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
-from finlab.allocation.binding import what_binds
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.rates import USUAL_PERIOD_S
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
+from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.allocation.solution import ARRAYS, Candidates, PlainData
 from finlab.arrays import Array
-from finlab.display import blocks
-from finlab.display.pictures import robot_picture
-from finlab.layout import Layout
+from finlab.display import html, text
 from finlab.layout.damage import Damage
-from finlab.physics.expected_miss import expected_miss
+from finlab.layout.layout import Layout
 from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
@@ -154,6 +151,10 @@ class Answer(PlainData, Generic[Number]):
     def expected_miss(self) -> Array:
         """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
         what the layout says, or a table's own; zeros where nothing is known to be."""
+        if not self._plant.is_uncertain:
+            return self._by_parts(lambda plant, rows: np.zeros((len(rows), 6)))
+        from finlab.physics.expected_miss import expected_miss
+
         return self._by_parts(expected_miss)
 
     @cached_property
@@ -330,6 +331,8 @@ class Allocation(Answer[float]):
         """
         if self.reachable or self.unknown_fins:
             return ()
+        from finlab.allocation.binding import what_binds
+
         period_s = float(self.settings.get("period_s", USUAL_PERIOD_S))
         missing = self.unallocated / self.scale
         return what_binds(self.layout, self.command, missing, self.previous, period_s)
@@ -357,10 +360,12 @@ class Allocation(Answer[float]):
         )
 
     def __str__(self) -> str:
-        return blocks.text(allocation_blocks(self))
+        return text(allocation_blocks(self))
 
     def _repr_html_(self) -> str:
-        return blocks.html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
+        from finlab.display.pictures import robot_picture
+
+        return html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
 
 
 def _kept(candidates: Candidates | None) -> Candidates | None:

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
-from finlab.allocation.method import Method
-from finlab.allocation.notes import answer_notes
+from finlab.allocation.method import Checkpoint, Method, Networks
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
     Usable,
@@ -29,16 +28,14 @@ from finlab.allocation.question import (
     free_mask,
     usable,
 )
+from finlab.allocation.report import answer_notes
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
-from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
-from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage
-from finlab.layout.load import load_layout
-from finlab.networks.trained import TrainedWeights
+from finlab.layout.layout import Layout
 from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant, plant_of
 
@@ -146,7 +143,7 @@ class Allocator:
         layout: Layout,
         method: methods.MethodName | type[Method] = "dual",
         *,
-        checkpoint: methods.Checkpoint = None,
+        checkpoint: Checkpoint = None,
         robust: float | None = None,
         period_s: float | None = None,
         calm: float | None = None,
@@ -180,10 +177,8 @@ class Allocator:
         if isinstance(method, str):
             self._made(layout, methods.choose_method(method, checkpoint, **settings))
         elif isinstance(method, type) and issubclass(method, Method):
-            known = checkpoint if isinstance(checkpoint, TrainedWeights) else None
-            self._made(
-                layout, methods.MethodChoice(method, methods.checked_settings(method, settings), known)
-            )
+            known = methods.checked_settings(method, settings)
+            self._made(layout, methods.MethodChoice(method, known, method.read_networks(checkpoint)))
         else:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
 
@@ -198,7 +193,11 @@ class Allocator:
             DataError: the bundle cannot be read, or was changed.
             LayoutError: its layout cannot be read.
         """
-        choice = methods.bundled_method(read_bundle_files(path), str(path))
+        from finlab.allocation.bundled_method import bundled_method
+        from finlab.bundle_files import read_bundle_files
+        from finlab.layout.load import load_layout
+
+        choice = bundled_method(read_bundle_files(path), str(path))
         return cls.of_choice(load_layout(path), choice)
 
     @classmethod
@@ -244,7 +243,7 @@ class Allocator:
         return self._scale
 
     @property
-    def weights(self) -> TrainedWeights | None:
+    def weights(self) -> Networks | None:
         """Trained networks; None for methods without."""
         return self._choice.weights
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.axes import axes_in, is_full_turn, wrapped
-from finlab.layout import Layout
+from finlab.layout.layout import Layout
 
 WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""

@@ -6,17 +6,17 @@ the error that compiled tables leave. The paper's method uses it with its surrog
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.rates import Box
-from finlab.arrays import AnyArray, Array, solve
+from finlab.arrays import NOTHING, AnyArray, Array, solve
 from finlab.axes import feasible
-from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
-from finlab.precision import NOTHING
+
+if TYPE_CHECKING:
+    from finlab.allocation.rates import Box
 
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
@@ -62,7 +62,7 @@ class CommandProblem:
             effectiveness = np.where(counts, effectiveness, 0.0)
         return replace(self, effectiveness=effectiveness, works=works, counts=counts)
 
-    def after(self, box: Box) -> Self:
+    def after(self, box: "Box") -> Self:
         """Returns the problem within what may follow the command of the tick before."""
         full_turn = box.free[:, 2] & self.full_turn
         return replace(self, lower=box.lower, upper=box.upper, full_turn=full_turn)
@@ -133,6 +133,8 @@ def refine(
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first order;
     commands at a limit that would leave it are held.
     """
+
+    from finlab.least_squares import Damping, levenberg_marquardt
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.

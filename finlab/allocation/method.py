@@ -1,26 +1,46 @@
 """Base of all allocation methods: made once for a layout of healthy actuators, each solves for wrenches."""
 
+import os
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
 from finlab.allocation.policy import Policy, PolicyName
-from finlab.allocation.rates import USUAL_PERIOD_S, Rates
-from finlab.allocation.settings import Settings
+from finlab.allocation.settings import USUAL_PERIOD_S, Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
-from finlab.layout import FinModelSpec, Layout
-from finlab.networks.trained import TrainedWeights
-from finlab.physics import plant_of
-from finlab.vehicle.actuator_motion import following_delay
+from finlab.layout.layout import Layout
+from finlab.physics.plant import plant_of
+
+if TYPE_CHECKING:
+    from finlab.allocation.rates import Rates
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
+
+
+class Networks(Protocol):
+    """Trained networks, as far as allocating has to know them; methods that have some know the rest."""
+
+    @property
+    def name(self) -> str:
+        """Name of the checkpoint that they come from."""
+        ...
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file of their weights; empty for what was not read from a file."""
+        ...
+
+
+Checkpoint = str | os.PathLike[str] | Networks | None
+"""A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
 
 
 class Method(ABC):
@@ -43,11 +63,11 @@ class Method(ABC):
     """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
     looks_ahead: ClassVar[bool] = False
     """Whether `solve` takes the `reference` of the next ticks."""
-    fin_model: FinModelSpec | None = None
-    """Fin model that the networks have learned; None for methods that ask every fin's own model."""
+    weights: Networks | None
+    """Trained networks; None for methods without."""
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
     ) -> None:
         """Prepares the method for a layout of healthy actuators and the axes that count, with settings of its
         `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot, and trained networks, where
@@ -78,6 +98,24 @@ class Method(ABC):
         except LayoutError:
             return False
         return True
+
+    @classmethod
+    def read_networks(cls, checkpoint: Checkpoint) -> Networks | None:
+        """Returns the networks that the method is made with. Methods that ask some are those of
+        `finlab.networks.learned_method.LearnedMethod`, which reads them; any other is made with what it is
+        given."""
+        return None if isinstance(checkpoint, str | os.PathLike) else checkpoint
+
+    @classmethod
+    def networks_in(cls, files: Mapping[str, bytes], source: str, name: str | None) -> Networks | None:
+        """Returns the networks that came with a bundle; None for methods without."""
+        return None
+
+    @classmethod
+    def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
+        """Returns the SHA-256 of the networks' weights, and by name the files of those that a bundle has to
+        bring, since they do not come with finlab; None and no files for methods without."""
+        return None, {}
 
     @classmethod
     def option_names(cls) -> list[str]:
@@ -124,7 +162,7 @@ class Method(ABC):
     def _late(self) -> float | None:
         """By how many ticks commands are late; None where the time between ticks is no setting."""
         period_s = vars(self.settings).get("period_s")
-        return None if period_s is None else following_delay(self.layout) / period_s + 0.5
+        return None if period_s is None else self.layout.delay_s / period_s + 0.5
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""
@@ -153,8 +191,10 @@ class Method(ABC):
         return float(vars(self.settings).get("period_s", USUAL_PERIOD_S))
 
     @cached_property
-    def rates(self) -> Rates:
+    def rates(self) -> "Rates":
         """How far commands may change in a tick."""
+        from finlab.allocation.rates import Rates
+
         return Rates(self.plant, self.layout.rates * self.period_s)
 
     @property
@@ -165,11 +205,12 @@ class Method(ABC):
     @property
     def unknown_fins(self) -> tuple[str, ...]:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
-        if self.fin_model is None:
-            return ()
-        known = self.fin_model.type, self.fin_model.values()
-        models = ((part.name, part.value("model")) for part in self.layout.actuators)
-        return tuple(name for name, model in models if (model.type, model.values()) != known)
+        return ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that the user should read before trusting any answer of the method for its robot."""
+        return ()
 
 
 class LeastErrorMethod(Method):

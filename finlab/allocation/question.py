@@ -12,8 +12,8 @@ from finlab.allocation.solution import among_all
 from finlab.arrays import Array
 from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
-from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage, lost_names
+from finlab.layout.layout import Layout
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""

@@ -10,9 +10,6 @@ from finlab.arrays import Array
 from finlab.axes import wrapped
 from finlab.physics.plant import Plant
 
-USUAL_PERIOD_S = 0.1
-"""Time between ticks of methods for which it is no setting [s]."""
-
 
 class Box(NamedTuple):
     """Commands that may follow a previous one."""

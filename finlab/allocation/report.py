@@ -1,19 +1,26 @@
-"""Report of an answer: two small tables and sentences for people, a JSON object for programs."""
+"""What is said of an answer: two small tables and sentences for people, a JSON object for programs."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.arrays import Array
-from finlab.axes import AXES
-from finlab.display.blocks import Block, Table
-from finlab.layout import Layout
-from finlab.physics.expected_miss import sources_of_miss
+from finlab.actuators.fin.fin_laws import make_law
+from finlab.actuators.fin.fin_model import DOUBT, FinModelSpec, Limits
+from finlab.actuators.kinds import KINDS
+from finlab.actuators.law import FinLaw
+from finlab.arrays import NEARLY, Array
+from finlab.axes import AXES, axes_in
+from finlab.display import Block, Table
+from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
+
+if TYPE_CHECKING:
+    from finlab.allocation.method import Method
 
 Allocation = Any
 """`finlab.allocation.Allocation`, which prints itself by what is here."""
@@ -27,6 +34,11 @@ COLUMNS = ("actuator", "type", "command", "force [N]")
 """Columns of the table of actuators."""
 WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
 """Columns of the table of wrenches."""
+
+RESTLESS = 0.05
+"""Share of its largest force below which a fin counts as able to rest."""
+STEPS = (5, 5, 16)
+"""Amplitudes, frequencies and zero directions at which a fin is asked for its smallest and largest force."""
 
 
 def summary(result: Allocation) -> str:
@@ -104,6 +116,8 @@ def doubts(result: Allocation) -> tuple[str, ...]:
 
 def next_measurement(result: Allocation, plant: Plant) -> str:
     """The sentence about what adds most to the expected error of an answer."""
+    from finlab.physics.expected_miss import sources_of_miss
+
     sources = sources_of_miss(plant, result.command[None])
     parts = np.array([(source.variance[0] / result.scale**2).sum() for source in sources])
     most = int(parts.argmax())
@@ -149,3 +163,89 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
         return {"actuators": values}
     rows = [None if np.isnan(row).any() else row.tolist() for row in command]
     return {"actuators": values, "fins": list(layout.names), "command": rows}
+
+
+def answer_notes(
+    layout: Layout, method: Method, flow: Array | None, target: Array, own: tuple[str, ...] = ()
+) -> tuple[str, ...]:
+    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of the method, those
+    of `fin_notes`, those about these very answers (`own`), and what is asked of axes that nothing drives or
+    that do not count."""
+    notes = fin_notes(layout, flow) + own
+    wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
+    named = axes_in(wanted)
+    undriven = method.undriven
+    if left := [axis for axis in named if axis in undriven]:
+        notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
+    if left := [axis for axis in named if axis not in layout.axes]:
+        its = f"layout {layout.name} does not command {' or '.join(left)} (axes)"
+        notes = (*notes, f"{its}: what is asked of it does not count")
+    return method.notes + notes
+
+
+def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
+    """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
+    why the layout itself is not to be trusted, where its description begins so. After them, what needs the
+    flow and has none, what a flow (6,) leaves unknown, or that no actuator feels it.
+
+    None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
+    """
+    notes = _made(layout, layout.stamps)
+    foils = [part for part in layout.actuators if part.BY_FLOW]
+    if flow is None and not foils:
+        return notes
+    if flow is None:
+        names, one = ", ".join(part.name for part in foils), len(foils) == 1
+        them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
+        return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
+    if layout.interaction is not None:
+        guessed = [part.name for part in layout.actuators if part.jet and part.advance is None]
+        taken = f"what speed takes from {', '.join(guessed)} is guessed: no open_water is known of them"
+        return (*notes, taken) if guessed else notes
+    if not foils:
+        kind = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
+        return (
+            *notes,
+            f"the flow is without effect: layout {layout.name} has no {kind}, and what speed through the "
+            "water takes from other actuators is not known",
+        )
+    models = {part.name: getattr(part, "model", None) for part in layout.actuators if not part.BY_FLOW}
+    tables = ", ".join(name for name, model in models.items() if model and model.type == "table")
+    speed = (f"the tables of {tables} hold forces at rest; what speed changes is not known",)
+    return notes + (speed if tables else ())
+
+
+@lru_cache(maxsize=256)
+def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
+    first = layout.description.partition("\n")[0]
+    notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
+    for fin in layout.fins:
+        own = _notes_of(fin.model, fin.limits, fin.stamp)
+        notes += [note.replace("{name}", fin.name) for note in own]
+    return tuple(notes)
+
+
+@lru_cache(maxsize=1024)
+def _notes_of(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> tuple[str, ...]:
+    """The sentences about any fin of a model within limits, with a place for its name."""
+    law = make_law(model)
+    doubts = [f"the model of fin {{name}} is {note}" for note in law.notes if note.startswith(DOUBT)]
+    notes = (*doubts, *_restless(law, limits))
+    if not law.measured:
+        return notes
+    from finlab.allocation.table_notes import beyond_table
+
+    return (*notes, *beyond_table(law, limits))
+
+
+def _restless(law: FinLaw, limits: Limits) -> list[str]:
+    ends = zip(limits.lower, limits.upper, STEPS, strict=True)
+    grid = np.meshgrid(*(np.linspace(low, high, count) for low, high, count in ends), indexing="ij")
+    size = np.linalg.norm(law.force(np.stack(grid, axis=-1)), axis=-1)
+    least, most = float(size.min()), float(size.max())
+    if least <= RESTLESS * most:
+        return []
+    return [
+        f"fin {{name}} cannot rest: within its limits it always pushes with at least {least:.3g} N of at "
+        f"most {most:.3g} N; wrenches that need less of it are out of reach"
+    ]

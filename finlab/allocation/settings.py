@@ -10,6 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 from finlab.errors import AllocationError
 from finlab.physics.objective import Name
 
+USUAL_PERIOD_S = 0.1
+"""Time between ticks of methods for which it is no setting [s]."""
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
 

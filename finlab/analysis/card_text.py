@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from finlab.analysis.authority import AXES, Authority, Loss
-from finlab.display.blocks import Block, Table
+from finlab.display import Block, Table
 
 ScoreCard = Any
 """`finlab.analysis.ScoreCard`, which shows itself by what is here."""

@@ -1,7 +1,8 @@
 """Improve a layout: move chosen actuators within bounds until a goal is as good as it gets."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +17,11 @@ from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import Directions, Hill, Look, Power
 from finlab.arrays import Array
-from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
+Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""A function and the parts of a piece of work -> its results, in their order."""
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
 DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
@@ -74,6 +76,7 @@ def optimize_layout(
     flow: ArrayLike | None = None,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
+    mapped: Mapped = map,
 ) -> Improvement:
     """Moves actuators to raise a goal: by its slopes from several starts, and, where these find nothing
     better or the flow changes what actuators push, by SciPy's differential evolution.
@@ -100,6 +103,8 @@ def optimize_layout(
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
         cancelled: asked after each round, and within long ones; the search stops when it answers True.
+        mapped: gives a function's results for parts of the work, in order, as `map` does in this process;
+            `finlab.executor.map_parts` does on a cluster.
     """
     bounds, water, start = bounds or {}, check_flow(flow), layout
     if axes is not None:
@@ -119,7 +124,7 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled)
+    search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled, mapped)
     if not moves.bends:
         search.climb(
             Power(moves.smooth, mission, water)
@@ -160,9 +165,11 @@ class _Search:
         rounds: int,
         progress: Callable[[Progress], None] | None,
         cancelled: Callable[[], bool] | None,
+        mapped: Mapped,
     ) -> None:
         self._moves, self._rules, self._before, self._rounds = moves, rules, before, rounds
         self._progress, self._cancelled = progress, cancelled or (lambda: False)
+        self._mapped = mapped
         self.vector, self.best, self.gained, self.stopped = moves.start, before, False, False
         self._kept = rules.broken(moves.start[None])[0] <= 0.0
         if not self._kept:
@@ -245,7 +252,7 @@ class _Search:
             nonlocal least
             rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
             chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-            valued = map_parts(chunk_cost, chunks)
+            valued = iter(self._mapped(chunk_cost, chunks))
             for chunk in chunks:
                 if self._cancelled():
                     return np.full(len(rows), np.inf)

@@ -21,7 +21,7 @@ from finlab.analysis.authority import (
 )
 from finlab.analysis.card_text import card_blocks
 from finlab.arrays import Array
-from finlab.display import blocks
+from finlab.display import html, text
 from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
@@ -69,12 +69,12 @@ class ScoreCard:
         return min(self.losses, key=_left, default=None)
 
     def __str__(self) -> str:
-        return blocks.text(card_blocks(self))
+        return text(card_blocks(self))
 
     def _repr_html_(self) -> str:
         low, high = -np.array(self.authority.most_negative), np.array(self.authority.largest)
         title = f"{self.layout}: largest wrench along each axis"
-        return blocks.html(card_blocks(self), lambda: ranges_picture(title, AXES, low, high))
+        return html(card_blocks(self), lambda: ranges_picture(title, AXES, low, high))
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the card as numbers, strings, lists and None, for JSON."""

@@ -1,6 +1,6 @@
 """The `finlab` command: verbs that parse, call one library function and print, and their pages of help.
 
-A function is named after its verb; `verbs` is a `SubcommandApp` of several. A module imports the library only
+`VERBS` says where each verb stands. A module imports the library only
 inside its functions, so that `finlab --help` stays fast and `finlab layout check` never loads torch. It
 writes its files before it prints, so that a reader that goes away (`finlab ... | head`) costs none of them.
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from functools import partial
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 import tyro
@@ -19,8 +19,7 @@ from tyro.extras import SubcommandApp
 from finlab import __version__
 from finlab.assets import EXTRAS, install
 from finlab.cli.shared_options import with_json_file
-from finlab.command_end import FAILED, exit_code
-from finlab.errors import FinlabError
+from finlab.errors import FAILED, FinlabError, exit_code
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "": ("finlab allocate A --wrench 1 0 0.5 0 0 0.1", "finlab app"),
@@ -117,27 +116,50 @@ def _parsed(argv: list[str]) -> int:
 
 
 VERBS = {
-    "allocate": ("robot_verbs", "allocate", None),
-    "layout": ("layout_verbs", "verbs", "Check, show and optimize layout files."),
-    "data": ("train_verbs", "data_verbs", "Generate what the paper's networks learn from."),
-    "train": ("train_verbs", "verbs", "Train the networks of methods `mdn` and `paper`."),
-    "eval": ("eval_verbs", "verbs", "Measure methods by the fins' own models."),
-    "bench": ("eval_verbs", "bench", None),
-    "fit": ("fit", "verbs", "Fit actuators and robots to measurements."),
-    "log": ("log_verb", "log", None),
-    "simulate": ("simulate", "simulate", None),
-    "export": ("robot_verbs", "export", None),
-    "app": ("robot_verbs", "app", None),
+    "allocate": "finlab.cli.robot_verbs:allocate",
+    "layout check": "finlab.cli.layout_verbs:check",
+    "layout show": "finlab.cli.layout_verbs:show",
+    "layout convert": "finlab.cli.layout_verbs:convert_layout",
+    "layout optimize": "finlab.cli.layout_verbs:optimize",
+    "data generate": "finlab.cli.train_verbs:generate",
+    "data interaction": "finlab.cli.train_verbs:interaction_data",
+    "train mdn": "finlab.cli.train_verbs:mdn",
+    "train surrogate": "finlab.cli.train_verbs:surrogate",
+    "train allocator": "finlab.cli.train_verbs:allocator",
+    "train interaction": "finlab.cli.train_verbs:interaction",
+    "eval": "finlab.cli.eval_verbs:verbs",
+    "bench": "finlab.cli.eval_verbs:bench",
+    "fit fin": "finlab.cli.fit:fin",
+    "fit thruster": "finlab.cli.fit:thruster",
+    "fit actuator": "finlab.cli.fit:thruster",
+    "fit interaction": "finlab.cli.fit:interaction",
+    "fit robot": "finlab.cli.fit_robot:robot",
+    "log": "finlab.cli.log_verb:log",
+    "simulate": "finlab.cli.simulate:simulate",
+    "export": "finlab.cli.robot_verbs:export",
+    "app": "finlab.cli.app_verb:app",
 }
-"""Verbs, or groups of them: module, what it has there, and its line of help where that is no docstring."""
+"""Verb -> where its function stands, `module:function`; only that of the asked verb is imported. `eval` makes
+its verbs of the experiments that there are."""
+GROUPS = {
+    "layout": "Check, show and optimize layout files.",
+    "data": "Generate what the paper's networks learn from.",
+    "train": "Train the networks of methods `mdn` and `paper`.",
+    "eval": "Measure methods by the fins' own models.",
+    "fit": "Fit actuators and robots to measurements.",
+}
+"""First words of several verbs, and the line of help of each."""
+OTHER_NAMES = {"fit actuator": "The same as `fit thruster`, by its earlier name."}
+"""Verbs that are others by a further name, and the line of help of each."""
 
 
 def _ran(argv: list[str]) -> Any:
     """What the verb returns that arguments name, which alone is imported: an exit code, None means 0."""
-    if argv[:1] and argv[0] in VERBS:
-        verb, words = _verb(argv[0], argv), VERBS[argv[0]][2]
+    name = argv[0] if argv else ""
+    if name in VERBS or name in GROUPS:
+        verb = _verb(name, argv)
         run = verb.cli if isinstance(verb, SubcommandApp) else partial(tyro.cli, verb)
-        return run(prog=f"finlab {argv[0]}", description=words, args=argv[1:])
+        return run(prog=f"finlab {name}", description=GROUPS.get(name), args=argv[1:])
     about = "Control allocation for underwater robots: a target wrench in, commands out."
     return _command_line(argv).cli(prog="finlab", description=about, args=argv)
 
@@ -145,16 +167,23 @@ def _ran(argv: list[str]) -> Any:
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
     """All verbs."""
     root = SubcommandApp()
-    for name, (_, _, words) in VERBS.items():
-        root.command(_verb(name, argv), name=name, help=words)
+    for name in dict.fromkeys(verb.split()[0] for verb in VERBS):
+        root.command(_verb(name, argv), name=name, help=GROUPS.get(name))
     return root
 
 
 def _verb(name: str, argv: Sequence[str]) -> Any:
-    """A verb's function or group."""
-    module, what, _ = VERBS[name]
-    verb = getattr(import_module(f"finlab.cli.{module}"), what)
-    return verb(argv) if name == "eval" else verb
+    """A verb's function, or the group of verbs that begin with a word."""
+    if name == "eval":
+        return resolve_name(VERBS[name])(argv)
+    if name in VERBS:
+        return resolve_name(VERBS[name])
+    group = SubcommandApp()
+    for verb, home in VERBS.items():
+        first, _, second = verb.partition(" ")
+        if first == name:
+            group.command(resolve_name(home), name=second, help=OTHER_NAMES.get(verb))
+    return group
 
 
 def examples(argv: Sequence[str]) -> tuple[str, ...]:

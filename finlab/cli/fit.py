@@ -1,18 +1,13 @@
-"""`finlab fit thruster|fin|interaction|robot`: from measurements and swims to what layouts say."""
+"""`finlab fit thruster|fin|interaction`: from measurements to what layouts say."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg
-from tyro.extras import SubcommandApp
 
-from finlab.cli.shared_options import Robot, open_robot
-
-verbs = SubcommandApp()
+from finlab.cli.shared_options import Robot, open_robot, tell
 
 
-@verbs.command
 def fin(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="FIN.csv", aliases=["-o"])],
@@ -34,13 +29,12 @@ def fin(
     from finlab.fit.measurements import read_measurements
 
     check_table_path(output)
-    fit = fit_fin(in_worker(read_measurements, data), seed, _tell)
+    fit = fit_fin(in_worker(read_measurements, data), seed, tell)
     write_fin(fit, output)
     print("\n".join(summary(fit)))
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
 
 
-@verbs.command
 def thruster(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="TABLE.csv", aliases=["-o"])],
@@ -72,10 +66,6 @@ def thruster(
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
 
 
-verbs.command(name="actuator", help="The same as `fit thruster`, by its earlier name.")(thruster)
-
-
-@verbs.command
 def interaction(
     layout: Robot,
     samples: Annotated[Positional[Path], arg(metavar="SAMPLES.csv")],
@@ -97,8 +87,7 @@ def interaction(
     from finlab.files.worker import in_worker
     from finlab.fit.interaction.constants import fit_constants
     from finlab.fit.interaction.samples import read_table
-    from finlab.layout.file import save_layout
-    from finlab.layout.file_form import plain
+    from finlab.layout.save import plain, save_layout
 
     robot = open_robot(layout)[0]
     fit = fit_constants(in_worker(read_table, robot, samples))
@@ -107,49 +96,3 @@ def interaction(
     if output is not None:
         save_layout(replace(robot, interaction=fit.jets), output)
         print(f"{output}: the robot with these jets")
-
-
-@verbs.command
-def robot(
-    layout: Robot,
-    logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG...")],
-    output: Annotated[Path, arg(metavar="LAYOUT2", aliases=["-o"])],
-    other_law: bool = True,
-) -> None:
-    """Learn a robot from swims: its actuators' strengths and directions, and its body.
-
-    A log is log.npz of `finlab simulate`, or a CSV file: t, what was measured (x, y, z, roll, pitch, yaw, u,
-    v, w, p, q, r), and what was commanded: NAME.A, NAME.f, NAME.phi of a fin, NAME.force of a thruster,
-    NAME.angle and NAME.force of an azimuth, NAME.deflection of a rudder. `finlab simulate --excite` makes a
-    swim that determines much.
-
-    Args:
-        layout: the robot as it is believed to be: layout file or the name of a shipped layout.
-        logs: swims of that robot.
-        output: the layout as the swims show it; fins whose law is another one become tables beside it.
-        other_law: of robots of fins look for another law of thrust, too, and use it where it helps on parts
-            not seen.
-    """
-    from finlab.errors import DataError
-    from finlab.files.worker import in_worker
-    from finlab.fit.robot.fitted_robot import summary, table, write_robot
-    from finlab.fit.robot.robot_fit import fit_robot
-    from finlab.fit.robot.swim import read_swim
-
-    if output.suffix.lower() not in (".yaml", ".yml", ".json"):
-        raise DataError(
-            f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
-        )
-    believed = open_robot(layout)[0]
-    swims = [in_worker(read_swim, log, believed) for log in logs]
-    fit = fit_robot(believed, swims, other_law, _tell)
-    write_robot(fit, output)
-    print("\n".join(summary(fit)))
-    print()
-    print(table(fit))
-    print(f"\n{output}: the robot as it swam")
-
-
-def _tell(words: str) -> None:
-    if sys.stderr.isatty():
-        print(f"{words} ...", file=sys.stderr, flush=True)

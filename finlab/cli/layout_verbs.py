@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from tyro.conf import Positional, UseAppendAction, arg
-from tyro.extras import SubcommandApp
 
 from finlab.cli import shared_options
 from finlab.errors import FinlabError, printable
@@ -17,18 +17,17 @@ if TYPE_CHECKING:
     from finlab.analysis import Improvement
     from finlab.analysis.authority import MotionAxis
 
-verbs = SubcommandApp()
+REMARKS = ("finlab.vehicle.righting:righting_words",)
+"""What else there is to say of a layout that is right: where functions stand, `module:function`, that give a
+sentence or None."""
 
 
-@verbs.command
 def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...")]) -> int:
     """Say of each layout file whether it is valid, and if not, which key is wrong and why.
 
     Args:
         layouts: files or names of shipped layouts.
     """
-    from finlab.vehicle.righting import righting_words
-
     if not layouts:
         raise FinlabError("layout check: expected at least one file or name of a shipped layout, got none")
     n_bad = 0
@@ -40,12 +39,12 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             n_bad += 1
         else:
             print(f"{text}: ok, layout {layout.name} with {layout.counted}")
-            if (words := righting_words(layout)) is not None:
-                print(f"{text}: {words}")
+            for remark in REMARKS:
+                if (words := resolve_name(remark)(layout)) is not None:
+                    print(f"{text}: {words}")
     return 2 if n_bad else 0
 
 
-@verbs.command
 def show(
     layout: shared_options.Robot,
     lost: shared_options.Lost = (),
@@ -65,7 +64,6 @@ def show(
     shared_options.put_json(card.to_dict(), json, f"{robot}\n\n{card}")
 
 
-@verbs.command(name="convert")
 def convert_layout(
     file: Annotated[Positional[str], arg(metavar="FILE")],
     output: Annotated[Positional[Path], arg(metavar="OUT")],
@@ -102,7 +100,6 @@ def convert_layout(
     print("\n".join(lines))
 
 
-@verbs.command
 def optimize(
     layout: shared_options.Robot,
     actuators: Annotated[tuple[str, ...], arg(metavar="NAME...", aliases=["--fins"])],
@@ -140,7 +137,6 @@ def optimize(
 
     from finlab.analysis import Bounds, Progress, optimize_layout
     from finlab.analysis.goals import MISSION
-    from finlab.executor import on_cluster
     from finlab.layout import save_layout
 
     shared_options.check_json_file(output, "output")
@@ -158,7 +154,7 @@ def optimize(
         bar.update()
         bar.set_postfix_str(f"{progress.before:.4g} -> {progress.best:.4g}")
 
-    with bar, on_cluster(cluster):
+    with bar, shared_options.mapping_on(cluster) as mapped:
         improvement = optimize_layout(
             robot,
             actuators,
@@ -171,6 +167,7 @@ def optimize(
             axes=cast("tuple[MotionAxis, ...]", axes) or None,  # which checks them
             flow=flow,
             progress=report,
+            mapped=mapped,
         )
     save_layout(improvement.layout, output)
     print(_improvement_text(improvement, output))

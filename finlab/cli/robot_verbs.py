@@ -1,8 +1,7 @@
-"""`finlab allocate`, `finlab export` and `finlab app`: answers for a robot here, on board and on a page."""
+"""`finlab allocate` and `finlab export`: answers for a robot here and on board."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -139,33 +138,3 @@ def export(
     size = sum(map(len, bundle.files.values())) / 1e6
     print(f"{output}: {robot.counted}, {len(bundle.files)} files, {size:.2f} MB")
     print(f"check it on the robot: finlab-runtime check {output.name}")
-
-
-def app(
-    layout: Annotated[str, arg(metavar="LAYOUT")] = "ucat",
-    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
-    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
-    port: Annotated[int, arg(metavar="N")] = 8080,
-) -> None:
-    """Serve the web app until interrupted.
-
-    Args:
-        layout: layout to open first: a file or the name of a shipped one.
-        checkpoint: trained checkpoint, of method mdn or paper.
-        host: address to listen on; the default is reachable from this machine only.
-        port: port to listen on.
-    """
-    from finlab.assets import install, shipped
-
-    # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
-    if (home := str(shipped("webapp").parent)) not in sys.path:
-        sys.path.insert(0, home)
-    try:
-        from webapp.serving import serve
-    except ModuleNotFoundError as error:
-        if str(error.name).split(".")[0] in ("finlab", "webapp"):
-            raise
-        raise FinlabError(
-            f"the web app needs {error.name!r}, which is not installed; run: {install('app')}"
-        ) from error
-    serve(host=host, port=port, layout=layout, checkpoint=checkpoint)

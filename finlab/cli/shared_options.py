@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.errors import CommandError, DataError
-from finlab.whole_file import write_whole
 
 if TYPE_CHECKING:
     from finlab.layout import Layout
@@ -19,6 +21,8 @@ JSON = "file for one JSON object; it is printed in place of the table where no f
 LAYOUT = "layout file, bundle, or the name of a shipped layout"
 FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
 CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://desk:8786"
+EXECUTOR = "finlab.executor"
+"""Where the workers of a cluster are asked; it is imported with an address alone."""
 STDOUT = Path("-")  # what stands for stdout
 JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]  # where one JSON object goes
 Wrench = tuple[float, float, float, float, float, float]
@@ -53,6 +57,8 @@ def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
         print(json.dumps(value, allow_nan=False))
         return
     if path is not None:
+        from finlab.whole_file import write_whole
+
         write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n", DataError)
     if table is not None:
         print(table)
@@ -79,3 +85,20 @@ def check_positive(**counts: int | None) -> None:
     for name, value in counts.items():
         if value is not None and value < 1:
             raise CommandError(f"{name.replace('_', '-')}: expected a number of at least 1, got {value}")
+
+
+def tell(words: str) -> None:
+    """Say what is being done, on a terminal."""
+    if sys.stderr.isatty():
+        print(f"{words} ...", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def mapping_on(cluster: str | None) -> Iterator[Any]:
+    """Yields what computes the parts of a piece of work, as `map` does: this process, or, with the address of
+    a scheduler, the workers of its cluster. Raises FinlabError: nobody answers there."""
+    if cluster is None:
+        yield map
+        return
+    with resolve_name(EXECUTOR + ":on_cluster")(cluster):
+        yield resolve_name(EXECUTOR + ":map_parts")

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
-from tyro.extras import SubcommandApp
 
 from finlab.cli.shared_options import Cluster, Count, check_positive
 
 if TYPE_CHECKING:
     from finlab.networks.trained import TrainedWeights
-
-data_verbs, verbs = SubcommandApp(), SubcommandApp()
 
 _Preset = Annotated[str, arg(metavar="NAME")]
 _Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
@@ -42,7 +39,6 @@ class Paper:
     """such as cpu or cuda:1; a graphics card where there is one by default."""
 
 
-@verbs.command
 def mdn(
     output: _Output,
     preset: _Preset = "default",
@@ -70,7 +66,6 @@ def mdn(
     _report(output, train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds, resume=resume))
 
 
-@verbs.command
 def surrogate(options: OmitArgPrefixes[Paper]) -> None:
     """Train the paper's physics surrogate and write a checkpoint folder with it alone.
 
@@ -82,7 +77,6 @@ def surrogate(options: OmitArgPrefixes[Paper]) -> None:
     _report(options.output, train_surrogate(Options(**vars(options))))
 
 
-@verbs.command
 def allocator(
     options: OmitArgPrefixes[Paper], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
 ) -> None:
@@ -99,7 +93,6 @@ def allocator(
     _report(options.output, train_allocator(Options(**vars(options)), surrogate))
 
 
-@verbs.command
 def interaction(
     data: Annotated[Positional[Path], arg(metavar="DATA")],
     output: _Output,
@@ -138,7 +131,6 @@ def _report(output: Path, made: TrainedWeights) -> None:
             print(f"{group} {name} {value:.3g}")
 
 
-@data_verbs.command
 def generate(
     output: _Output,
     layouts: Count = 1000,
@@ -177,7 +169,6 @@ def generate(
     print(f"{output}: {layouts} layouts with {commands} commands each, seed {seed}")
 
 
-@data_verbs.command(name="interaction")
 def interaction_data(
     output: Annotated[Path, arg(metavar="FILE.npz", aliases=["-o"])],
     layouts: Count = 4000,
@@ -200,7 +191,8 @@ def interaction_data(
             when left out.
     """
     from finlab.evaluation.method_specs import own_function
-    from finlab.fit.interaction.samples import drawn, with_jets, write_samples
+    from finlab.fit.interaction.drawn_samples import drawn, with_jets
+    from finlab.fit.interaction.samples import write_samples
 
     check_positive(layouts=layouts, commands=commands, actuators=actuators[0])
     judge = with_jets if plant is None else own_function(plant)

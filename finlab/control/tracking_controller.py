@@ -18,7 +18,6 @@ from finlab.axes import wrapped
 from finlab.control.contract import Measurement, Setpoint, axes_of
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
-from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.fossen import complete_body, dynamics_of
 
 BY_FORCES, BY_RUDDERS = (1.0, 0.756, 0.38), (0.75, 0.24, 0.045)
@@ -64,7 +63,7 @@ class TrackingGains:
 
 def pace_of(layout: Layout) -> float:
     """Inverse of the delay of a robot's actuators, its sensors and a period [1/s]."""
-    return 1.0 / (following_delay(layout) + BEHIND_S)
+    return 1.0 / (layout.delay_s + BEHIND_S)
 
 
 def most_of(layout: Layout) -> Array:

@@ -7,7 +7,6 @@ fin with a horizontal shaft are the paper's ten (x_i in R^10: position, mounting
 other actuators have two of their own axes in place of the angle.
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -20,23 +19,20 @@ from msgspec import to_builtins
 import finlab
 from finlab import bundle_files
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.methods import METHODS_ON_BOARD
-from finlab.assets import NAME, shipped_checkpoints
+from finlab.allocation.methods import METHODS_ON_BOARD, method_class
+from finlab.assets import NAME
 from finlab.axes import AXES
 from finlab.bundle_files import named_content
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError, LayoutError
 from finlab.files.guarded import packed
 from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
-from finlab.interaction.learned import NETWORK_SUFFIX, WHAT, Learned
+from finlab.interaction.learned import NETWORK_SUFFIX, WHAT
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.file import FORMAT as LAYOUT_FORMAT
-from finlab.layout.file import layout_to_dict
-from finlab.layout.file_form import plain
-from finlab.layout.load import Data, Edge, Graph, Normalization, Robot, edges_of, robot_bytes
-from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_checkpoint
-from finlab.networks.trained import TrainedWeights
-from finlab.paper.network import POSITION_SCALE, SCALES
+from finlab.layout.bundled_robot import Robot
+from finlab.layout.graph_file import POSITION_SCALE, SCALES, Data, Edge, Graph, Normalization, edges_of
+from finlab.layout.load import FORMAT as LAYOUT_FORMAT
+from finlab.layout.save import layout_to_dict, plain
 from finlab.physics.objective import yardstick
 from finlab.whole_file import PART, write_folder, write_whole
 
@@ -85,12 +81,12 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
         )
     layout, cases = allocator.layout, self_tests(allocator, lost)
     inside, tables = with_tables_inside(layout)
-    sha256, networks = _networks(allocator.weights)
+    sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.weights)
     files = {
-        bundle_files.ROBOT: robot_bytes(Robot(inside, lost, sha256, cases)),
+        bundle_files.ROBOT: _robot_bytes(Robot(inside, lost, sha256, cases)),
         bundle_files.ABOUT: _about(allocator),
         **tables,
-        **networks,
+        **{bundle_files.NETWORKS + name: content for name, content in networks.items()},
         bundle_files.README: _readme(allocator, lost).encode(),
     }
     if sum(map(len, files.values())) > bundle_files.LARGEST_BUNDLE:
@@ -100,17 +96,10 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     return Bundle({**files, bundle_files.CHECKSUMS: bundle_files.checksums(files)})
 
 
-def _networks(weights: TrainedWeights | None) -> tuple[str | None, dict[str, bytes]]:
-    """SHA-256 of networks, and the files of those that do not come with finlab."""
-    if weights is None:
-        return None, {}
-    shipped = shipped_checkpoints().get(weights.name)
-    if shipped is not None and read_checkpoint(shipped).sha256 == weights.sha256:
-        return weights.sha256, {}
-    files = checkpoint_files(weights)
-    return hashlib.sha256(files[WEIGHTS_FILE]).hexdigest(), {
-        bundle_files.NETWORKS + name: files[name] for name in files
-    }
+def _robot_bytes(robot: Robot) -> bytes:
+    """Contents of the file of the robot."""
+    values = {**to_builtins(robot, builtin_types=(Layout,)), "layout": layout_to_dict(robot.layout)}
+    return (json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
 def _about(allocator: Allocator) -> bytes:
@@ -131,7 +120,7 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     names, contents, own = dict[str, str](), dict[str, bytes](), layout.interaction
     table = bundle_files.LARGEST_TABLE, "a table of forces for a bundle"
     for path in layout.files:
-        is_network = isinstance(own, Learned) and path == own.path
+        is_network = own is not None and path == own.reads
         content = named_content(path, *((LARGEST_NETWORK, WHAT) if is_network else table))
         names[path] = bundle_files.table_name(content, NETWORK_SUFFIX if is_network else ".csv")
         contents[names[path]] = content
@@ -142,9 +131,9 @@ def renamed(layout: Layout, names: Mapping[str, str]) -> Layout:
     """A layout whose tables and network have other names, or paths, by those that they have."""
     parts = tuple(part.reading(names[part.reads]) if part.reads else part for part in layout.actuators)
     own = layout.interaction
-    return replace(
-        layout, actuators=parts, interaction=Learned(names[own.path]) if isinstance(own, Learned) else own
-    )
+    if own is not None and own.reads is not None:
+        own = own.reading(names[own.reads])
+    return replace(layout, actuators=parts, interaction=own)
 
 
 def _readme(allocator: Allocator, lost: tuple[str, ...]) -> str:

@@ -10,8 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from finlab import __version__
-from finlab.command_end import FAILED, exit_code
-from finlab.errors import FinlabError
+from finlab.errors import FAILED, FinlabError, exit_code
 
 if TYPE_CHECKING:
     from finlab.deploy.deployed_robot import DeployedRobot

@@ -15,14 +15,16 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.methods import bundled_method, method_class
+from finlab.allocation.bundled_method import bundled_method
+from finlab.allocation.methods import method_class
 from finlab.allocation.policy import KINDS
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.layout.load import Case, robot_of
+from finlab.layout.bundled_robot import Case, robot_of
+from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from finlab.physics.objective import REACHED
 
@@ -85,7 +87,7 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     """The robot in the contents of a bundle's files; errors as in `load_robot`. Force tables are read from
     the folder or archive `source` once they are needed."""
     check_bundle_files(files, source)
-    robot = robot_of(files, source)
+    robot = robot_of(files, source, parse_layout)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
     if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
         raise DataError(f"{source}: was made with other networks than this finlab's; export it with this one")

@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
 from finlab.deploy.bundle import renamed
-from finlab.errors import DataError, LayoutError
+from finlab.errors import DataError, LayoutError, under
 from finlab.exchange import Exchange, read_robot
 from finlab.files.guarded import decoded, read_file, unpacked
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
-from finlab.interaction.learned import NETWORK_SUFFIX, Learned
+from finlab.interaction.learned import NETWORK_SUFFIX
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
-from finlab.layout.file_form import under
-from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, robot_of
+from finlab.layout.bundled_robot import robot_of
+from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, parse_layout
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
@@ -75,7 +75,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     inside = Path(os.path.abspath(source))
     if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         parts = bundle_files_of(content, source)
-        robot = robot_of(parts, source)
+        robot = robot_of(parts, source, parse_layout)
         layout, lost = robot.layout, robot.lost
     else:
         parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
@@ -130,9 +130,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
                 "its learned interaction, into one ZIP archive, and open that",
                 source=source,
             )
-        suffix = (
-            NETWORK_SUFFIX if isinstance(own := layout.interaction, Learned) and path == own.path else ".csv"
-        )
+        is_network = layout.interaction is not None and path == layout.interaction.reads
+        suffix = NETWORK_SUFFIX if is_network else ".csv"
         names[path] = _kept(parts[here], folder / TABLE_FOLDER, suffix)
     layout, body = renamed(layout, names), layout.body
     if body is None or body.hull is None or body.hull.mesh is None:

@@ -35,8 +35,8 @@ from finlab.arrays import Array
 from finlab.deploy.deployed_robot import DeployedRobot
 from finlab.deploy.transport import MAX_LINE, StandardStreams, Unsent
 from finlab.errors import AllocationError, CommandError, LayoutError
+from finlab.files import parse_json
 from finlab.files.guarded import decoded
-from finlab.files.plain_values import parse_json
 from finlab.files.schema import checked
 from finlab.physics import plant_of
 

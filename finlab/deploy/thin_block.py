@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.response import table_numbers
-from finlab.arrays import Array
+from finlab.arrays import NOTHING, Array
 from finlab.core.fields import Record, actuators_of, head_of, tables_begin
-from finlab.precision import NOTHING
 
 TOLERANCE = 1e-5
 """Largest error of the grid of a law, over its largest value."""

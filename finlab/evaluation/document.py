@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finlab.command_end import aligned
+from finlab.display import aligned
 
 Row = dict[str, Any]
 WIDTH = 110  # of plain text

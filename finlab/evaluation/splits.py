@@ -13,18 +13,19 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import wrapped
 from finlab.errors import DataError
-from finlab.layout import Fin, FinModelSpec, Layout, random_layout
-from finlab.layout.random_layouts import (
+from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.physics import Plant, TableLaw, make_law, write_table
+from finlab.random_layouts import (
     TRAINING_BOX,
     random_azimuth,
     random_fin_model,
+    random_layout,
     random_robot,
     random_shaft_fin,
     random_thruster,
     random_tilt,
 )
-from finlab.layout.random_layouts import Draw as ActuatorDraw
-from finlab.physics import Plant, TableLaw, make_law, write_table
+from finlab.random_layouts import Draw as ActuatorDraw
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""

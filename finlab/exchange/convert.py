@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from finlab.assets import shipped_layouts
-from finlab.errors import CommandError, LayoutError
+from finlab.errors import CommandError, LayoutError, under
 from finlab.exchange import motor_factors
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
@@ -13,11 +13,10 @@ from finlab.exchange.gazebo import read_description
 from finlab.exchange.matrix_table import plain_of, table_of
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
+from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import is_regular, read_text
-from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.layout import Layout, load_layout, save_layout
-from finlab.layout.file import parse_layout
-from finlab.layout.file_form import under
+from finlab.layout.load import parse_layout
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 5_000_000

@@ -13,8 +13,8 @@ from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.exchange.labels import FRAMES, Path, frame_said, lookup, nodes, numbers_in, unread
 from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
+from finlab.files import yaml_text
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
-from finlab.files.plain_values import yaml_text
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 
 Ends = tuple[float, float]

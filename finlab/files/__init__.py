@@ -1,1 +1,130 @@
-"""Files that may come from a stranger: opened in one way, unpacked within limits, read as plain values."""
+"""YAML and JSON text to plain values: mappings, lists, text, true, false, null, and the numbers of JSON.
+
+The text may come from a stranger. Nothing in it runs code, expands, drops a key, or takes more than linear
+time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a date or a yes is text here.
+"""
+
+import json
+import math
+import re
+from typing import Any
+
+from finlab.errors import DataError, FinlabError
+
+MAX_EVENTS = 30_000
+"""Most YAML events (keys, values, brackets); a layout of 64 fins has about four thousand."""
+MAX_DEPTH = 20
+"""Deepest nesting of YAML; a layout needs five levels."""
+MAX_DIGITS = 100
+"""Most characters of a number."""
+
+_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
+_WORDS = {"": None, "null": None, "true": True, "false": False}
+_ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+
+
+def parse_json(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
+    """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON, or holds
+    a key twice or a number that is not finite; the message calls the document `source`."""
+    numbers: Any = dict.fromkeys(("parse_float", "parse_constant", "parse_int"), _number)
+    try:
+        values = json.loads(content, object_pairs_hook=_once, **numbers)
+        if _ESCAPED_SURROGATE.search(content):  # half of a pair is no character, and cannot be written
+            json.dumps(values, ensure_ascii=False).encode()
+        return values
+    except json.JSONDecodeError as problem:
+        raise error.at(source, f"is not valid JSON: line {problem.lineno}: {problem.msg}") from None
+    except RecursionError:
+        raise error.at(source, "is nested too deeply") from None
+    except ValueError as problem:
+        raise error.at(source, str(problem)[:160]) from None
+
+
+def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
+    """Returns the values of one YAML document; aliases and tags are refused. Raises FinlabError of the kind
+    `error`: it is no YAML, or holds what is refused; the message calls the document `source`."""
+    import yaml  # a robot's computer reads JSON and may lack PyYAML
+
+    try:
+        return _document(content)
+    except yaml.YAMLError as problem:
+        mark = getattr(problem, "problem_mark", None)
+        said = getattr(problem, "problem", None) or str(problem).splitlines()[0]
+        place = f"line {mark.line + 1}: " if mark else ""
+        raise error.at(source, f"is not valid YAML: {place}{said}"[:200]) from None
+    except ValueError as problem:
+        raise error.at(source, str(problem)[:200]) from None
+
+
+def yaml_text(values: Any) -> str:
+    """Returns the text of plain values, in their order."""
+    import yaml
+
+    style: Any = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None, "width": 110}
+    return str(yaml.safe_dump(values, **style))
+
+
+def _number(text: str) -> int | float:
+    """A finite number as JSON writes it."""
+    if len(text) > MAX_DIGITS:
+        raise ValueError(f"holds a number of {len(text):,} digits, expected at most {MAX_DIGITS}")
+    value = int(text) if text.lstrip("-").isdigit() else float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"holds {text}, expected a finite number")
+    return value
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in values:
+            raise ValueError(f"key {key!r:.60} is given twice")
+        values[key] = value
+    return values
+
+
+def _document(content: str) -> Any:
+    """The value of the document; what it is made of is looked through before anything is built."""
+    import yaml
+
+    # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
+    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    depth = n_documents = 0
+    for count, event in enumerate(yaml.parse(content, Loader=loader)):
+        line = event.start_mark.line + 1 if event.start_mark else 0
+        if count > MAX_EVENTS:
+            raise ValueError(f"line {line}: has more than {MAX_EVENTS} entries, too many to be read")
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+            raise ValueError(f"line {line}: anchors and aliases (&, *) are not allowed; write the value out")
+        if getattr(event, "tag", None):
+            raise ValueError(f"line {line}: tags (!) are not allowed; write plain keys and values")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            raise ValueError(f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep to be read")
+        n_documents += isinstance(event, yaml.DocumentStartEvent)
+        if n_documents > 1:
+            raise ValueError(f"is not valid YAML: line {line}: a second document begins, expected one")
+    node = yaml.compose(content, loader)
+    return None if node is None else _value(node)
+
+
+def _value(node: Any) -> Any:
+    """The value of a YAML node: plain scalars are numbers and words of JSON or text, a key stands once."""
+    if node.id == "sequence":
+        return [_value(each) for each in node.value]
+    if node.id == "mapping":
+        values: dict[str, Any] = {}
+        for key, value in node.value:
+            line = key.start_mark.line + 1
+            if key.id != "scalar":
+                raise ValueError(f"line {line}: a key must be plain text")
+            if key.value in values:
+                raise ValueError(f"line {line}: key {key.value!r:.60} is given twice")
+            values[key.value] = _value(value)
+        return values
+    if node.style or not (node.value in _WORDS or _NUMBER.match(node.value)):
+        return node.value
+    try:
+        return _WORDS[node.value] if node.value in _WORDS else _number(node.value)
+    except ValueError as problem:
+        raise ValueError(f"line {node.start_mark.line + 1}: {problem}") from None

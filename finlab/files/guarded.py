@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 
 from finlab.arrays import AnyArray
 from finlab.errors import DataError, FinlabError
-from finlab.files.plain_values import parse_json
+from finlab.files import parse_json
 
 Name = str | os.PathLike[str]
 PART = 1 << 20

@@ -5,10 +5,11 @@ in code is checked by it, files are read by it, and the published JSON Schemas a
 """
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, TypeVar, cast, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, TypeVar, cast, get_args, get_type_hints
 
 import msgspec
 from msgspec import Meta, inspect
@@ -172,6 +173,26 @@ class Checked:
         keys = {**cls.KEYS, **{name: key for name, (key, _) in cls.DEGREES.items()}}
         name = argument.partition(".")[0].partition("[")[0]
         return keys.get(name, name) + argument[len(name) :]
+
+
+class Part(ABC):
+    """What a part of a file stands for whose keys are not the fields of its class."""
+
+    @classmethod
+    @abstractmethod
+    def file_form(cls) -> Any:
+        """Returns the form of the part: a `msgspec.Struct` whose `stands_for` is this class, or several."""
+
+    @classmethod
+    @abstractmethod
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+        """Returns what a part stands for. Raises LayoutError: something does not fit.
+
+        Args:
+            tag: which of several forms it has.
+            values: what the part says, by field of the form; paths are absolute.
+            may_open: whether files that the part names may be opened.
+        """
 
 
 _LINES = {ord("\n"): " ", ord("\t"): " "}

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.actuators.fin.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
+from finlab.actuators.fin.fin_model import DOUBT, MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.actuators.fin.force_table_file import COLUMNS, DEVIATIONS, POWER_COLUMN, table_text
 from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.errors import DataError

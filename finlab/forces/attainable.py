@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
-from finlab.display.blocks import Table, html
+from finlab.display import Table, html
 from finlab.display.pictures import body_picture
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.forces.reach import UNPROVEN, largest

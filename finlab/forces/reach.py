@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.axes import AXES
-from finlab.display.blocks import Table, html
+from finlab.display import Table, html
 from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.layout import Layout

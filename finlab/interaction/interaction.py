@@ -1,19 +1,20 @@
 """The contract of an interaction: what the jets of a robot's actuators take from its forces.
 
-A robot's layout names an interaction, a formula (`jets`) or a network (`learned`). It gives the force that
-comes at each actuator's place beside the actuator's own, from the forces of all. Forces are in the body
-frame; derivatives are those by the forces, not by the commands.
+A robot's layout names a model of interaction, a formula or a network (`finlab.interaction.INTERACTIONS`). It
+gives the force that comes at each actuator's place beside the actuator's own, from the forces of all. Forces
+are in the body frame; derivatives are those by the forces, not by the commands.
 """
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.core.library import library
+from finlab.files.schema import Checked
 
 DENSITY = 1000.0
 """Of the water [kg/m^3]."""
@@ -104,6 +105,32 @@ class AtPlaces(Interaction):
         outs = (change.ctypes.data, wrench.ctypes.data, slope.ctypes.data if steep else None)
         library().fl_jets(*ins, *outs)
         return change, wrench, slope
+
+
+class InteractionModel(Checked, ABC):
+    """An interaction as a layout describes it: the contract of a model."""
+
+    @abstractmethod
+    def of(self, places: Places) -> AtPlaces:
+        """Returns the interaction of a robot's actuators. Raises FinlabError: a file that it reads is bad."""
+
+    @property
+    def reads(self) -> str | None:
+        """Path of the file that it reads; None where it reads none."""
+        return None
+
+    @property
+    def stamp(self) -> tuple[int, int] | None:
+        """Time and size of that file, for what is kept until it changes; None where it reads none."""
+        if self.reads is None:
+            return None
+        from finlab.bundle_files import file_stamp
+
+        return file_stamp(self.reads)
+
+    def reading(self, path: str) -> Self:
+        """Returns it with another file that it reads."""
+        return self
 
 
 def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:

@@ -16,8 +16,7 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.arrays import Array
-from finlab.files.schema import Checked
-from finlab.interaction.interaction import AtPlaces, Places
+from finlab.interaction.interaction import AtPlaces, InteractionModel, Places
 
 Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
 Share = Annotated[float, Meta(ge=0.0, le=10.0)]
@@ -30,7 +29,7 @@ MISSED = 0.1
 
 
 @dataclass(frozen=True)
-class Jets(Checked):
+class Jets(InteractionModel):
     """What the jets of a robot's actuators take, by a formula. Checked on construction."""
 
     type: ClassVar[str] = "jets"

@@ -13,12 +13,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.arrays import AnyArray, Array
-from finlab.bundle_files import named_content
+from finlab.bundle_files import file_stamp, named_content
 from finlab.errors import CheckpointError
-from finlab.files.schema import Checked
-from finlab.interaction.interaction import AtPlaces, Places, complex_slope, with_own
+from finlab.interaction.interaction import AtPlaces, InteractionModel, Places, complex_slope, with_own
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
 
 MEMBERS = 3
@@ -34,7 +32,7 @@ same for `hull`."""
 
 
 @dataclass(frozen=True)
-class Learned(Checked):
+class Learned(InteractionModel):
     """What the jets of a robot's actuators take, by a network. Checked on construction."""
 
     type: ClassVar[str] = "learned"
@@ -47,6 +45,13 @@ class Learned(Checked):
         """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no such
         network."""
         return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), places)
+
+    @property
+    def reads(self) -> str:
+        return self.path
+
+    def reading(self, path: str) -> "Learned":
+        return Learned(path)
 
 
 class LearnedInteraction(AtPlaces):

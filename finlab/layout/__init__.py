@@ -1,27 +1,33 @@
-"""Description of a robot: actuators, limits and body, as frozen values, files and padded arrays."""
+"""Description of a robot: actuators, limits and body, as frozen values, files and padded arrays.
 
-from finlab.actuators.actuator import Actuator as Actuator
-from finlab.actuators.actuator import Uncertainty as Uncertainty
-from finlab.actuators.azimuth import Azimuth as Azimuth
-from finlab.actuators.azimuth import Tilt as Tilt
-from finlab.actuators.fin.fin import Fin as Fin
-from finlab.actuators.fin.fin import Servo as Servo
-from finlab.actuators.fin.fin_model import FinModelSpec as FinModelSpec
-from finlab.actuators.fin.fin_model import Limits as Limits
-from finlab.actuators.rudder import Rudder as Rudder
-from finlab.actuators.thruster import Thruster as Thruster
-from finlab.layout.body import Body as Body
-from finlab.layout.body import Hull as Hull
-from finlab.layout.damage import Damage as Damage
-from finlab.layout.effectiveness import layout_effectiveness as layout_effectiveness
-from finlab.layout.effectiveness import own_effectiveness as own_effectiveness
-from finlab.layout.file import layout_to_dict as layout_to_dict
-from finlab.layout.file import parse_layout as parse_layout
-from finlab.layout.file import save_layout as save_layout
-from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
-from finlab.layout.layout import Layout as Layout
-from finlab.layout.load import load_layout as load_layout
-from finlab.layout.random_layouts import random_layout as random_layout
+Names are imported on first use: a robot of fins needs no rudders.
+"""
+
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from finlab.actuators.actuator import Actuator as Actuator
+    from finlab.actuators.actuator import Uncertainty as Uncertainty
+    from finlab.actuators.azimuth import Azimuth as Azimuth
+    from finlab.actuators.azimuth import Tilt as Tilt
+    from finlab.actuators.fin.fin import Fin as Fin
+    from finlab.actuators.fin.fin import Servo as Servo
+    from finlab.actuators.fin.fin_model import FinModelSpec as FinModelSpec
+    from finlab.actuators.fin.fin_model import Limits as Limits
+    from finlab.actuators.rudder import Rudder as Rudder
+    from finlab.actuators.thruster import Thruster as Thruster
+    from finlab.layout.body import Body as Body
+    from finlab.layout.body import Hull as Hull
+    from finlab.layout.damage import Damage as Damage
+    from finlab.layout.effectiveness import layout_effectiveness as layout_effectiveness
+    from finlab.layout.effectiveness import own_effectiveness as own_effectiveness
+    from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
+    from finlab.layout.layout import Layout as Layout
+    from finlab.layout.load import load_layout as load_layout
+    from finlab.layout.load import parse_layout as parse_layout
+    from finlab.layout.save import layout_to_dict as layout_to_dict
+    from finlab.layout.save import save_layout as save_layout
 
 __all__ = [
     "MAX_ACTUATORS",
@@ -44,6 +50,36 @@ __all__ = [
     "load_layout",
     "own_effectiveness",
     "parse_layout",
-    "random_layout",
     "save_layout",
 ]
+
+_HOMES = {
+    "Actuator": "finlab.actuators.actuator",
+    "Uncertainty": "finlab.actuators.actuator",
+    "Azimuth": "finlab.actuators.azimuth",
+    "Tilt": "finlab.actuators.azimuth",
+    "Fin": "finlab.actuators.fin.fin",
+    "Servo": "finlab.actuators.fin.fin",
+    "FinModelSpec": "finlab.actuators.fin.fin_model",
+    "Limits": "finlab.actuators.fin.fin_model",
+    "Rudder": "finlab.actuators.rudder",
+    "Thruster": "finlab.actuators.thruster",
+    "Body": "finlab.layout.body",
+    "Hull": "finlab.layout.body",
+    "Damage": "finlab.layout.damage",
+    "layout_effectiveness": "finlab.layout.effectiveness",
+    "own_effectiveness": "finlab.layout.effectiveness",
+    "parse_layout": "finlab.layout.load",
+    "MAX_ACTUATORS": "finlab.layout.layout",
+    "Layout": "finlab.layout.layout",
+    "load_layout": "finlab.layout.load",
+    "layout_to_dict": "finlab.layout.save",
+    "save_layout": "finlab.layout.save",
+}
+"""Public name -> the module in which it stands."""
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'finlab.layout' has no attribute {name!r}")
+    return resolve_name(f"{_HOMES[name]}:{name}")

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -12,17 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin import Fin
-from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.arrays import Array
 from finlab.axes import AXES, CommandedAxes, mask_of
-from finlab.display import blocks
-from finlab.display.pictures import robot_picture
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Name
-from finlab.interaction.jets import Jets
-from finlab.interaction.learned import Learned
-from finlab.layout.body import Body
-from finlab.layout.layout_text import layout_blocks
+
+if TYPE_CHECKING:
+    from finlab.interaction.interaction import InteractionModel
+    from finlab.layout.body import Body
+else:  # most robots have neither, and what checks a layout need not know more of them
+    Body = InteractionModel = Checked
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -40,11 +39,11 @@ class Layout(Checked):
     """The actuators, 1 to 64, with unique names. Commands and arrays follow this order."""
     description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] = ""
     """What there is to know about it, for people."""
-    body: Body | None = None
+    body: "Body | None" = None
     """Hull, mass and hydrodynamics, where known."""
     axes: CommandedAxes = AXES
     """Axes of the wrench that the robot commands; the others take what the cheapest answer gives them."""
-    interaction: Jets | Learned | None = None
+    interaction: "InteractionModel | None" = None
     """What the actuators do to each other; None where that does not count."""
 
     def __post_init__(self) -> None:
@@ -76,10 +75,17 @@ class Layout(Checked):
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     def __str__(self) -> str:
-        return blocks.text(layout_blocks(self))
+        from finlab.display import text
+        from finlab.layout.layout_text import layout_blocks
+
+        return text(layout_blocks(self))
 
     def _repr_html_(self) -> str:
-        return blocks.html(layout_blocks(self), lambda: robot_picture(self))
+        from finlab.display import html
+        from finlab.display.pictures import robot_picture
+        from finlab.layout.layout_text import layout_blocks
+
+        return html(layout_blocks(self), lambda: robot_picture(self))
 
     @cached_property
     def fins(self) -> tuple[Fin, ...]:
@@ -104,13 +110,20 @@ class Layout(Checked):
     @cached_property
     def files(self) -> tuple[str, ...]:
         """Paths of the tables and of the network that its laws and its interaction read."""
-        own = (self.interaction.path,) if isinstance(self.interaction, Learned) else ()
-        return (*own, *(part.reads for part in self.actuators if part.reads))
+        return tuple(part.reads for part in self._readers if part.reads)
 
     @property
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:
         """Time and size of each file that a law reads, for what is kept until one of them changes."""
-        return tuple(map(file_stamp, self.files)) if self.files else ()
+        return tuple(part.stamp for part in self._readers)
+
+    @cached_property
+    def _readers(self) -> "tuple[Actuator | InteractionModel, ...]":
+        """What reads a file: interaction and actuators, in this order."""
+        parts: tuple[Actuator | InteractionModel, ...] = self.actuators
+        if self.interaction is not None:
+            parts = (self.interaction, *parts)
+        return tuple(part for part in parts if part.reads)
 
     @property
     def is_of_fins(self) -> bool:
@@ -185,6 +198,11 @@ class Layout(Checked):
         """How fast the commands of each actuator change at most from tick to tick (n, 3) [per second],
         infinite where nothing limits them; read-only."""
         return _read_only([part.rates for part in self.actuators])
+
+    @cached_property
+    def delay_s(self) -> float:
+        """How late the slowest actuator follows its command [s]."""
+        return max(part.delay_s for part in self.actuators)
 
     @cached_property
     def speed_limit(self) -> Array:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from finlab.display.blocks import Block, Table
+from finlab.display import Block, Table
 
 Layout = Any
 """`finlab.layout.Layout`, which shows itself by what is here."""

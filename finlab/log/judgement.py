@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, UNITS
 from finlab.evaluation.document import three
 from finlab.layout import Layout
-from finlab.layout.file import layout_to_dict
+from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay
 
 HELD = 0.02

@@ -15,7 +15,6 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.fin_laws import file_stamp
 from finlab.actuators.fin.fin_response import fin_table
 from finlab.actuators.response import POINTS
 from finlab.arrays import AnyArray, Array
@@ -93,7 +92,7 @@ class EffortFins:
         """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no thrust
         within the limits."""
         compiled = [fin_table(fin) for fin in layout.fins]
-        costs = [_costs(fin, file_stamp(fin.reads)) for fin in layout.fins]
+        costs = [_costs(fin, fin.stamp) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)
         gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]
         return cls(

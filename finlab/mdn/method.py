@@ -26,6 +26,7 @@ from finlab.mdn.descent import realize
 from finlab.mdn.features import Proposal, Seen, propose, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.networks.layers import single_threaded_products
+from finlab.networks.learned_method import LearnedMethod
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import costs
 
@@ -59,7 +60,7 @@ def names_of(proposal: Proposal) -> tuple[str, ...]:
     return tuple([f"component {k + 1}" for k in proposal.component[0]])
 
 
-class Mdn(Method):
+class Mdn(LearnedMethod):
     """Exact answers of little effort, refined from what a network proposes and from nothing else."""
 
     name = "mdn"
@@ -67,7 +68,6 @@ class Mdn(Method):
     policy_under_way = "direction"
     settings_class = MdnSettings
     settings: MdnSettings
-    weights: TrainedWeights
 
     def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
         self.config = weights.network_of(ForceNetworkConfig)

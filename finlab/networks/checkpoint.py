@@ -15,8 +15,8 @@ import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError, DataError, LayoutError
+from finlab.files import parse_json
 from finlab.files.guarded import decoded, read_file
-from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec
 from finlab.networks.trained import Normalization, State, TrainedWeights, check_arrays
 from finlab.whole_file import make_folder, write_whole

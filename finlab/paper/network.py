@@ -10,16 +10,13 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from finlab.arrays import Values, library_of
+from finlab.layout.graph_file import POSITION_SCALE, SCALES
 from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
 
 RAW_SIZE = 10
 """Number of node features (paper: x_i in R^10)."""
-POSITION_SCALE = 0.3
-"""Positions [m] of order one: the paper's layouts lie within."""
-SCALES = (0.6, 2.1, math.pi)
-"""Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
 
 
 def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:

@@ -12,6 +12,7 @@ from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.layers import single_threaded_products
+from finlab.networks.learned_method import LearnedMethod
 from finlab.networks.trained import TrainedWeights, to_command, to_normalized
 from finlab.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, blocks_of
@@ -49,14 +50,14 @@ ADAM_DECAY = (0.9, 0.999)
 """Decays of Adam's running means of the gradient and of its square (Kingma and Ba, 2015)."""
 
 
-class Paper(LeastErrorMethod):
+class Paper(LearnedMethod, LeastErrorMethod):
     """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
 
     name = "paper"
     takes: ClassVar[Takes] = "horizontal fins"
     settings_class = PaperSettings
     settings: PaperSettings
-    weights: TrainedWeights
+    shipped_checkpoint = "paper"
 
     def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
         super().__init__(layout, settings, scale, weights)

@@ -18,7 +18,8 @@ import numpy as np
 
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin import Fin
-from finlab.actuators.fin.fin_laws import TableLaw, make_law
+from finlab.actuators.fin.fin_laws import make_law
+from finlab.actuators.fin.table_law import TableLaw
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 from finlab.layout.effectiveness import body_force

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array, Values
-from finlab.layout import Layout
+from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant, plant_of
 
 AMPLITUDE, FREQUENCY, ZERO_DIRECTION, PRODUCT = 1.0, 1.0, 0.1, 1.0

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import astuple
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.kinds import free_angles, laws_of
 from finlab.actuators.law import ActuatorLaw, Blade
-from finlab.actuators.propeller import held
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
-from finlab.layout.places import places_of
+
+if TYPE_CHECKING:
+    from finlab.interaction.interaction import AtPlaces
 
 
 class Plant:
@@ -45,8 +46,12 @@ class Plant:
         # A robot of one law is spared the copies of fancy indexing.
         self._laws: list[tuple[Any, ActuatorLaw]] = [(slice(None), laws[0][1])] if len(laws) == 1 else laws
         own = layout.interaction
-        self.interaction = None if own is None else own.of(places_of(layout))
+        self.interaction: AtPlaces | None = None
         """What the actuators do to each other; None where that does not count."""
+        if own is not None:
+            from finlab.layout.places import places_of
+
+            self.interaction = own.of(places_of(layout))
         self.counts: NDArray[np.bool_] = np.ones(6, bool)
         """Axes (6,) of the wrench that count, the others being 0."""
         self.feels_flow = own is not None or any(law.feels_flow for _, law in self._laws)
@@ -189,6 +194,11 @@ class Plant:
         return jacobian
 
     @cached_property
+    def is_uncertain(self) -> bool:
+        """Whether something is known of the errors of its forces; see `finlab.physics.expected_miss`."""
+        return self.interaction is not None or any(part.is_uncertain for part in self.layout.actuators)
+
+    @cached_property
     def blade(self) -> Blade:
         """The plates whose beating takes power, side by side, one for each fin."""
         fins = [astuple(make_law(fin.model).blade) for fin in self.layout.fins]
@@ -218,6 +228,8 @@ class Plant:
         """Returns commands (..., n, 3) with those inside a dead band, which give no force, at rest."""
         if self._dead_band is None:
             return command
+        from finlab.actuators.propeller import held
+
         return held(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
 
     def grid(self, counts: Sequence[int]) -> Array:

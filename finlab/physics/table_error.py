@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.fin_laws import TableLaw
-from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
+from finlab.actuators.fin.table_law import TableLaw
+from finlab.actuators.hermite_grid import Grid, HermiteGrids
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, Networks
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -24,7 +24,6 @@ from finlab.control import Measurement, Setpoint
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Layout
 from finlab.layout.effectiveness import layout_effectiveness
-from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.devices import SensorSettings
@@ -139,7 +138,7 @@ class Exciting(Method):
     settings: ExcitingSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
         self._rng = np.random.default_rng(self.settings.seed)

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import defstruct
 
 from finlab.arrays import AnyArray
-from finlab.display.blocks import Table, html
+from finlab.display import Table, html
 from finlab.display.pictures import path_picture
 from finlab.errors import DataError
 from finlab.files.guarded import check_shapes, json_of, read_arrays

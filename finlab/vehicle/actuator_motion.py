@@ -1,7 +1,6 @@
 """Actuators that follow their commands: for simulation, observer and monitor."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,9 +114,3 @@ class ActuatorMotion:
         kept = np.where(np.isnan(direction), self.held_part(result), direction)
         result[..., self._places, self._held] = kept
         return result
-
-
-@lru_cache(maxsize=256)
-def following_delay(layout: Layout) -> float:
-    """How late the slowest actuator of a robot is [s]."""
-    return max(part.delay_s for part in layout.actuators)

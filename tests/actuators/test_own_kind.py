@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from webapp.tasks.background import Workers
 
-from finlab.actuators.kind_check import Kinds
-from finlab.actuators.kinds import KINDS, import_kinds
+from finlab.actuators.kinds import KINDS, Kinds, import_kinds
 from finlab.allocation import Allocator
 from finlab.deploy.command import main as runtime
 from finlab.errors import FinlabError
@@ -115,7 +114,7 @@ def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[
 
 
 def test_all_kinds_keep_the_contract() -> None:
-    again = Kinds()
+    again = Kinds({})
     for name, kind in KINDS.items():
         again[name] = kind
     assert again == KINDS

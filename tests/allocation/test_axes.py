@@ -12,7 +12,8 @@ from finlab.axes import AXES
 from finlab.cli import main
 from finlab.errors import CommandError, LayoutError
 from finlab.layout import Layout, load_layout
-from finlab.layout.file import layout_to_dict, parse_layout
+from finlab.layout.load import parse_layout
+from finlab.layout.save import layout_to_dict
 from tests.least_power import lower_bound
 from tests.mixed_robots import layout_of
 from tests.own_plant import OwnPlant

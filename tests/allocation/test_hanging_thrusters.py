@@ -14,7 +14,8 @@ from finlab.cli import main
 from finlab.errors import AllocationError, LayoutError
 from finlab.interaction.jets import Jets
 from finlab.layout import Damage, Layout, load_layout
-from finlab.layout.file import layout_to_dict, parse_layout
+from finlab.layout.load import parse_layout
+from finlab.layout.save import layout_to_dict
 from finlab.physics import plant_of
 from tests.terminal import refused
 

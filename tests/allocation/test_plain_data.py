@@ -50,7 +50,7 @@ def test_values_do_not_change_and_no_option_is_required(room: str) -> None:
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
 FILES = [
-    ROOT / "finlab/precision.py",
+    ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
     *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("response", "fin/fin_response", "thruster")),

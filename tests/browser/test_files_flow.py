@@ -10,7 +10,7 @@ import trimesh
 import finlab
 from finlab.actuators.fin.force_table_file import write_table
 from finlab.cli import main
-from finlab.files.plain_values import yaml_text
+from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
 from tests.fit.cell import columns_of, commands, measured, soft, write

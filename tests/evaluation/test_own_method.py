@@ -11,7 +11,7 @@ from finlab.cli import main
 from finlab.errors import AllocationError
 from finlab.evaluation.experiments.wrench import own_case
 from finlab.evaluation.method_specs import installed_methods, load_method_spec, load_method_specs
-from finlab.layout.file import save_layout
+from finlab.layout.save import save_layout
 from tests.terminal import refused
 
 SOURCE = """

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from finlab.actuators.fin.fin_laws import read_table
+from finlab.actuators.fin.table_law import read_table
 from finlab.allocation import Allocator
 from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
 from finlab.deploy.bundle import make_bundle

@@ -9,9 +9,9 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.fit.fin_fit import fit_fin, write_fin
-from finlab.layout import FinModelSpec, random_layout
-from finlab.layout.random_layouts import random_fin_model
+from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
+from finlab.random_layouts import random_fin_model, random_layout
 from tests.exhaustive import sampled
 from tests.fit.cell import commands, measured, samples
 

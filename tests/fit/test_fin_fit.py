@@ -9,8 +9,8 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from finlab import load_layout
-from finlab.actuators.fin.fin_laws import read_table
-from finlab.actuators.fin.force_table_file import DOUBT
+from finlab.actuators.fin.fin_model import DOUBT
+from finlab.actuators.fin.table_law import read_table
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError

@@ -11,8 +11,8 @@ import finlab
 from finlab import Allocator, Azimuth, Layout, PowerLaw
 from finlab.arrays import Array
 from finlab.interaction.jets import Jets
-from finlab.layout.random_layouts import random_azimuth, random_jet_robot, random_shaft_fin, random_thruster
 from finlab.physics import Plant
+from finlab.random_layouts import random_azimuth, random_jet_robot, random_shaft_fin, random_thruster
 
 KINDS = {
     "thrusters": [random_thruster],

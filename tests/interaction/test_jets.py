@@ -12,8 +12,8 @@ from finlab.interaction.interaction import Interaction
 from finlab.interaction.jets import Jets
 from finlab.layout import FinModelSpec, Hull
 from finlab.layout.places import places_of
-from finlab.layout.random_layouts import random_jet_robot
 from finlab.physics import Plant
+from finlab.random_layouts import random_jet_robot
 from tests.interaction import oracle
 
 D = 0.1

@@ -13,16 +13,17 @@ from finlab.errors import CheckpointError, FinlabError
 from finlab.interaction.learned import Learned, read_network
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.places import places_of
-from finlab.layout.random_layouts import random_jet_robot
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
+from finlab.random_layouts import random_jet_robot
 from tests.interaction.hidden_plant import wrenches
 from tests.interaction.test_jets import differs
 
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
-    from finlab.fit.interaction.samples import drawn, read_samples, write_samples
+    from finlab.fit.interaction.drawn_samples import drawn
+    from finlab.fit.interaction.samples import read_samples, write_samples
     from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
 
     folder = tmp_path_factory.mktemp("interaction")

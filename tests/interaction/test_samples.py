@@ -14,7 +14,8 @@ import finlab
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.interaction.constants import fit_constants
-from finlab.fit.interaction.samples import Samples, drawn, read_samples, read_table, write_samples
+from finlab.fit.interaction.drawn_samples import drawn
+from finlab.fit.interaction.samples import Samples, read_samples, read_table, write_samples
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, save_layout
 from finlab.layout.effectiveness import body_force

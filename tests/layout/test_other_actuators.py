@@ -12,7 +12,8 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, Tilt, parse_layout
-from finlab.layout.file_form import Reader, actuator_form, plain
+from finlab.layout.load import Reader, actuator_form
+from finlab.layout.save import plain
 
 THRUSTER = {
     "name": "lift",

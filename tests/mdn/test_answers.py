@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from finlab.layout import FinModelSpec, Layout, random_layout
+from finlab.layout import FinModelSpec, Layout
 from finlab.mdn.answers import Answers, EffortRobot, Steps, effort_robot, follow, ranked, refined, traced
 from finlab.mdn.descent import descend, wrench
 from finlab.physics import plant_of
+from finlab.random_layouts import random_layout
 
 SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

@@ -8,7 +8,7 @@ import torch
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 
 from finlab.assets import checkpoint_path
-from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.mdn.answers import effort_robot
 from finlab.mdn.descent import EffortProblem, realize, wrench
 from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
@@ -16,6 +16,7 @@ from finlab.mdn.network import NODE_SIZE, PAIR_SIZE, ForceMixture, ForceNetworkC
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import plant_of
 from finlab.physics.objective import effort_of_shares
+from finlab.random_layouts import random_layout
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

@@ -10,13 +10,14 @@ import pytest
 from finlab.allocation.settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
-from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
+from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.mdn.answers import follow
 from finlab.mdn.features import see, shares
 from finlab.mdn.method import STEPS, Mdn
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort
+from finlab.random_layouts import random_layout
 from tests.any_robot import AnyRobot
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]

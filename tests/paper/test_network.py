@@ -9,11 +9,12 @@ import torch
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 from torch_geometric.nn import GATv2Conv
 
-from finlab.layout import Fin, Layout, Limits, random_layout
+from finlab.layout import Fin, Layout, Limits
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.layers import graph_attention
 from finlab.networks.trained import State
 from finlab.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_features
+from finlab.random_layouts import random_layout
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 B, N, M = 4, 3, 5

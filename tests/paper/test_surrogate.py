@@ -5,10 +5,11 @@ import pytest
 import torch
 
 from finlab.errors import CheckpointError
-from finlab.layout import Layout, Limits, random_layout
+from finlab.layout import Layout, Limits
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import Normalization, TrainedWeights
 from finlab.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
+from finlab.random_layouts import random_layout
 from tests.paper.asked_in_torch import wrench_in_torch
 
 

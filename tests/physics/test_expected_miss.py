@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.fin_laws import TableLaw
+from finlab.actuators.fin.table_law import TableLaw
 from finlab.actuators.rudder import Rudder
 from finlab.actuators.thrust_model import PowerTable
 from finlab.actuators.thruster import Thruster

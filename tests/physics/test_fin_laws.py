@@ -8,9 +8,8 @@ import pytest
 import torch
 from scipy.special import j0, j1
 
-from finlab.actuators.fin.fin_laws import PLANAR_LAWS
+from finlab.actuators.fin.fin_laws import PLANAR_LAWS, bessel_j0, bessel_j1
 from finlab.actuators.fin.fin_model import FIN_MODELS
-from finlab.actuators.fin.formulas import bessel_j0, bessel_j1
 from finlab.actuators.law import OWN_INERTIA, Blade
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.layout import Azimuth, Layout, Rudder, Thruster, load_layout
-from finlab.vehicle.actuator_motion import ActuatorMotion, following_delay
+from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinLag
 
 LAW = PowerLaw(1.0)
@@ -85,6 +85,6 @@ def test_an_azimuth_turns_the_short_way_and_one_that_is_lost_stops(mixed: Layout
 
 
 def test_the_slowest_actuator_says_how_late_a_robot_is(mixed: Layout) -> None:
-    assert following_delay(mixed) == pytest.approx(0.2 + 0.2 * 2.0 * math.pi / 1.5)
-    assert following_delay(load_layout("A")) == pytest.approx(2.0 / 3.5)
-    assert following_delay(load_layout("bluerov2_heavy")) == pytest.approx(0.1)
+    assert mixed.delay_s == pytest.approx(0.2 + 0.2 * 2.0 * math.pi / 1.5)
+    assert load_layout("A").delay_s == pytest.approx(2.0 / 3.5)
+    assert load_layout("bluerov2_heavy").delay_s == pytest.approx(0.1)

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from finlab.actuators.fin.force_table_file import DOUBT, table_bytes
+from finlab.actuators.fin.fin_model import DOUBT
+from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table

@@ -12,7 +12,7 @@ from finlab.allocation.report import allocation_record
 from finlab.assets import shipped_checkpoints
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import FinlabError, LayoutError
-from finlab.files.plain_values import yaml_text
+from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
 from tests.any_robot import FIN_ROBOTS

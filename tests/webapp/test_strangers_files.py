@@ -17,7 +17,7 @@ from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.exchange import Exchange
 from finlab.exchange.convert import WRITERS
-from finlab.files.plain_values import yaml_text
+from finlab.files import yaml_text
 from finlab.hull import hull_of
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law

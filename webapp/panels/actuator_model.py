@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
-from finlab.actuators.fin.fin_laws import TableLaw
-from finlab.actuators.fin.force_table_file import DOUBT
+from finlab.actuators.fin.fin_model import DOUBT
+from finlab.actuators.fin.table_law import TableLaw
 from finlab.actuators.thrust_model import PowerTable
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError

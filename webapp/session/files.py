@@ -19,8 +19,8 @@ from finlab.assets import shipped_layouts
 from finlab.deploy import design_files
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import FinlabError, LayoutError
+from finlab.files import yaml_text
 from finlab.files.guarded import packed as pack
-from finlab.files.plain_values import yaml_text
 from finlab.hull.mesh_file import Mesh, SizeError, stl_of
 from finlab.hull.surface import UNITS, Surface
 from finlab.layout import Layout, layout_to_dict, load_layout

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Struct
 
 from finlab.allocation.allocation import Allocation
-from finlab.files.plain_values import parse_yaml
+from finlab.files import parse_yaml
 from finlab.files.schema import checked
 from webapp.session.core import Core
 from webapp.session.files import shipped

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from finlab.actuators.fin.fin_laws import read_table
+from finlab.actuators.fin.table_law import read_table
 from finlab.actuators.thrust_model import PowerTable
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.fin_laws import TableLaw
-from finlab.actuators.fin.hermite_grid import ROUNDING, closed_axes, shapes, with_neighbours
-from finlab.arrays import Array
+from finlab.actuators.fin.table_law import TableLaw
+from finlab.actuators.hermite_grid import ROUNDING, closed_axes, shapes, with_neighbours
+from finlab.arrays import CLOSE, NOTHING, ROUNDS, Array
 from finlab.axes import TURN
-from finlab.precision import CLOSE, NOTHING, ROUNDS
 
 MOST_KEPT = 4096
 """Cells of a table whose coefficients are kept."""

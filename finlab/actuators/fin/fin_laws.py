@@ -1,99 +1,120 @@
-"""From the description of a fin's model to its law: a formula, or a table measured or computed."""
+"""Laws of fins: drag propulsion, reactive propulsion, soft fins as they are measured; which model has which.
 
-import os
+Tables of measured or computed forces have their law in `table_law`, which is imported where a fin has one.
+"""
+
+import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.fin.fin_model import FinModelSpec
-from finlab.actuators.fin.force_table_file import read_force_table
-from finlab.actuators.fin.formulas import Drag, Lighthill, Soft
-from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
-from finlab.actuators.form import grid_numbers
-from finlab.actuators.law import FinLaw, PlanarLaw
+from finlab.actuators.law import Blade, FinLaw, PlanarLaw
 from finlab.arrays import Array, Values, library_of
-from finlab.axes import TURN
-from finlab.bundle_files import archive_around
 
 
-class GridLaw(FinLaw):
-    """Forces and power by interpolation on one grid, or on one for each of n fins; see `FinLaw`."""
+class Drag(PlanarLaw):
+    """T = 2 rho Cd S rc^2 (2 pi f)^2 (1 - cos 2A) with half amplitude A and frequency f: the law on board of
+    U-CAT."""
 
-    uniform = False
+    def __init__(self, density: Any, drag_coefficient: Any, area: Any, lever: Any) -> None:
+        """Takes water density [kg/m^3], drag coefficient, fin area [m^2] and lever to its centre [m]."""
+        # 1 - cos 2A = 2 sin^2 A is written as the latter below: it keeps its digits at small amplitudes.
+        self.coefficient = 4.0 * density * drag_coefficient * area * lever**2 * (2.0 * math.pi) ** 2
+        """Thrust over f^2 sin^2(A) [N s^2]; 4.737 for the defaults."""
+        # A rectangle of that area whose centre lies at the lever, one edge on the shaft.
+        self.blade = Blade(2.0 * lever, area / (2.0 * lever), density)
 
-    def __init__(self, grids: list[Grid]) -> None:
-        """Takes grids of forces [N], all of them with power [W] or none: three columns or four."""
-        self._grids = HermiteGrids(grids)
+    def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
+        """See `PlanarLaw`; the zero direction does not matter."""
+        return self.coefficient * (frequency * library_of(amplitude).sin(amplitude)) ** 2
 
-    @property
-    def has_power(self) -> bool:
-        """Whether it is known what power the fins take."""
-        return self._grids.columns > 3
-
-    def grid_numbers(self, lower: Array, upper: Array) -> Array:
-        """See `FinLaw`: the table as it is."""
-        (grid,) = self._grids.grids
-        return grid_numbers(grid.axes, grid.values[..., :3], TURN if grid.periodic else 0.0)
-
-    def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""
-        xp = library_of(command)
-        if xp is not np:
-            values = self.force(command.detach().cpu().numpy())
-            return xp.from_numpy(np.ascontiguousarray(values)).to(command)
-        return self._grids(command, 1)[..., 0, 0, 0, :3].astype(command.dtype, copy=False)
-
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """See `FinLaw`; exact derivatives of the interpolation."""
-        result = self._grids(command, 2)[..., :3]
-        return result[..., 0, 0, 0, :], _jacobian(result)
-
-    def power(self, command: Values, inflow: Array | None = None) -> Values:
-        if not self.has_power:
-            return super().power(command)
-        # A polynomial through points near zero may dip below.
-        return np.maximum(self._grids(command, 1)[..., 0, 0, 0, 3], 0.0)
-
-    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        if not self.has_power:
-            return super().power_gradient(command)
-        result = self._grids(command, 2)[..., 3:]
-        return _jacobian(result)[..., 0] * (result[..., 0, 0, 0, :] > 0.0)
+    def thrust_gradient(
+        self, amplitude: Array, frequency: Array, zero_direction: Array
+    ) -> tuple[Array, Array, Array | float]:
+        beat = 2.0 * self.coefficient * frequency * np.sin(amplitude)
+        return beat * frequency * np.cos(amplitude), beat * np.sin(amplitude), 0.0
 
 
-class TableLaw(GridLaw):
-    """The law of one table of measured or computed forces, with what is known beside them."""
-
-    def __init__(
-        self,
-        axes: list[Array],
-        values: Array,
-        periodic: bool,
-        notes: tuple[str, ...] = (),
-        deviation: Array | None = None,
-    ) -> None:
-        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and values (a, f, d, 3 or
-        4): forces [N], and power [W] where it is known. The forces' standard deviations (a, f, d, 3) [N] are
-        None or (a, f, d, 0) where unknown. A periodic grid has no second end of the circle."""
-        self.grid = Grid(axes, values, periodic)
-        """What was measured."""
-        super().__init__([self.grid])
-        self.periodic = periodic
-        self.notes = notes
-        """What to know of the table, a sentence each."""
-        self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
-        """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
-        self.deviation = deviation if deviation is not None and deviation.shape[-1] else None
-        """Standard deviations of the forces at the grid's points (a, f, d, 3) [N], where they are known."""
+# J_n(x) = (x/2)^n sum_k (-1)^k (x/2)^(2k) / (k! (k+n)!). An amplitude is at most pi/2, where the terms fall
+# below 1e-17 after k = 11; a few more keep float64 exact to |x| = 4.
+_TERMS = 17
+_J0, _J1 = (
+    tuple((-1) ** k / (math.factorial(k) * math.factorial(k + n)) for k in range(_TERMS)) for n in (0, 1)
+)
 
 
-def _jacobian(mixed: Array) -> Array:
-    """First derivatives (..., 3 commands, c) of values and mixed derivatives (..., 2, 2, 2, c)."""
-    by = mixed[..., 1, 0, 0, :], mixed[..., 0, 1, 0, :], mixed[..., 0, 0, 1, :]
-    return np.stack(by, axis=-2)
+def _series(coefficients: tuple[float, ...], x: Values) -> Values:
+    squared = (0.5 * x) ** 2
+    total = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        total = total * squared + coefficient
+    return total
+
+
+def bessel_j0(x: Values) -> Values:
+    """Returns the Bessel function J0 of x, |x| <= 4: a polynomial, for arrays, tensors and symbols alike."""
+    return _series(_J0, x)
+
+
+def bessel_j1(x: Values) -> Values:
+    """Returns the Bessel function J1 of x, |x| <= 4."""
+    return 0.5 * x * _series(_J1, x)
+
+
+class Lighthill(PlanarLaw):
+    """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water moved per metre of trailing edge: the
+    mean thrust of a stiff plate that turns by A about one end, at rest (Lighthill, 1971)."""
+
+    def __init__(self, density: Any, length: Any, width: Any) -> None:
+        """Takes water density [kg/m^3], fin length from the shaft [m] and trailing-edge width [m]."""
+        virtual_mass = math.pi / 4.0 * density * width**2
+        self.coefficient = 0.5 * virtual_mass * length**2 * (2.0 * math.pi) ** 2
+        """Thrust over f^2 A J1(A) [N s^2]; 6.20 for the defaults."""
+        self.blade = Blade(length, width, density)
+
+    def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
+        """See `PlanarLaw`; the zero direction does not matter."""
+        return self.coefficient * frequency**2 * amplitude * bessel_j1(amplitude)
+
+    def thrust_gradient(
+        self, amplitude: Array, frequency: Array, zero_direction: Array
+    ) -> tuple[Array, Array, Array | float]:
+        beat = self.coefficient * frequency * amplitude
+        # d(A J1)/dA = A J0
+        return beat * frequency * bessel_j0(amplitude), 2.0 * beat * bessel_j1(amplitude), 0.0
+
+
+class Soft(PlanarLaw):
+    """T = k x^p / (1 + (x / x0)^q) (1 + e cos(phi - phi_e)) with x = A f, along phi + d: our form for soft
+    fins, whose thrust saturates and then falls."""
+
+    def __init__(self, k: Any, p: Any, x0: Any, q: Any, e: Any, phi_e: Any, d: Any) -> None:
+        """Takes thrust scale [N], exponents, saturation [rad Hz], unevenness, its angle and lean [rad]."""
+        self._k, self._p, self._x0, self._q, self._e, self._phi_e = k, p, x0, q, e, phi_e
+        self.offset, self.unevenness = d, (e, phi_e)
+        self.uniform = not np.any(e)
+
+    def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
+        x = amplitude * frequency
+        cos = library_of(zero_direction).cos
+        uneven = 1.0 + self._e * cos(zero_direction - self._phi_e)
+        return self._k * x**self._p / (1.0 + (x / self._x0) ** self._q) * uneven
+
+    def thrust_gradient(
+        self, amplitude: Array, frequency: Array, zero_direction: Array
+    ) -> tuple[Array, Array, Array | float]:
+        x = amplitude * frequency
+        fall = (x / self._x0) ** self._q
+        # x dT/dx over T is p - q fall / (1 + fall); at rest the slope of x^p is taken a hair above zero.
+        safe = np.maximum(x, 1e-12)
+        size = self._k * safe**self._p / (1.0 + fall)
+        by_x = size / safe * (self._p - self._q * fall / (1.0 + fall))
+        turned = zero_direction - self._phi_e
+        uneven = 1.0 + self._e * np.cos(turned)
+        return by_x * uneven * frequency, by_x * uneven * amplitude, -size * self._e * np.sin(turned)
 
 
 PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
@@ -104,7 +125,9 @@ def make_law(spec: FinModelSpec) -> FinLaw:
     """Returns the law of one fin model. Raises DataError: it is a table whose file is missing or wrong."""
     values: dict[str, Any] = spec.values()
     if spec.type == "table":
-        return _table(values["path"], file_stamp(values["path"]))
+        from finlab.actuators.fin.table_law import kept_table
+
+        return kept_table(values["path"])
     return PLANAR_LAWS[spec.type](**values)
 
 
@@ -112,10 +135,7 @@ def stack_laws(specs: Sequence[FinModelSpec]) -> list[tuple[NDArray[np.intp], Fi
     """Returns the laws of n fins as (places, law); fins of one formula, and those with tables of as many
     columns, are evaluated together. Errors as for `make_law`."""
     laws = [make_law(spec) for spec in specs]
-    kinds = [
-        law.has_power if isinstance(law, TableLaw) else spec.type
-        for spec, law in zip(specs, laws, strict=True)
-    ]
+    kinds = [(spec.type, law.has_power) for spec, law in zip(specs, laws, strict=True)]
     groups: list[tuple[NDArray[np.intp], FinLaw]] = []
     for kind in dict.fromkeys(kinds):
         places = np.array([i for i, own in enumerate(kinds) if own == kind])
@@ -127,30 +147,9 @@ def _together(specs: list[FinModelSpec], laws: list[FinLaw]) -> FinLaw:
     """One law for fins of one formula, or with tables of as many columns."""
     if all(spec == specs[0] for spec in specs):
         return laws[0]
-    tables = [law.grid for law in laws if isinstance(law, TableLaw)]
-    if tables:
-        return GridLaw(tables)
+    if laws[0].measured:
+        from finlab.actuators.fin.table_law import GridLaw, TableLaw
+
+        return GridLaw([law.grid for law in laws if isinstance(law, TableLaw)])
     rows: list[dict[str, Any]] = [spec.values() for spec in specs]
     return PLANAR_LAWS[specs[0].type](**{name: np.array([row[name] for row in rows]) for name in rows[0]})
-
-
-def file_stamp(path: str | None) -> tuple[int, int] | None:
-    """Returns time and size of a file that a law reads, None where it reads none."""
-    if path is None:
-        return None
-    try:
-        result = os.stat(archive_around(path) or path)
-    except (OSError, ValueError):
-        return 0, 0
-    return result.st_mtime_ns, result.st_size
-
-
-def read_table(path: str | os.PathLike[str]) -> TableLaw:
-    """Returns the law in a CSV file; errors as for `read_force_table`."""
-    return TableLaw(*read_force_table(path))
-
-
-@lru_cache(maxsize=64)
-def _table(path: str, stamp: tuple[int, int] | None) -> TableLaw:
-    """The table in a file, read again when the file has changed."""
-    return read_table(path)

@@ -3,19 +3,21 @@
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Union
+from typing import Annotated, Any, ClassVar, Self, Union
 
 from msgspec import Meta, Struct, defstruct
 
 from finlab.axes import FULL_TURN_TOLERANCE, TURN
 from finlab.errors import LayoutError
-from finlab.files.schema import Checked, checked, given
+from finlab.files.schema import Checked, Part, checked, given
 
 MAX_AMPLITUDE = math.pi / 2
 """Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the hull."""
 MAX_FREQUENCY = 20.0
 """Largest frequency a layout may allow [Hz]; ten times what such servos reach."""
 
+DOUBT = "not to be trusted"
+"""How a table's note begins that every answer repeats."""
 
 Amplitude = Annotated[float, Meta(ge=0.0, le=MAX_AMPLITUDE)]
 Frequency = Annotated[float, Meta(ge=0.0, le=MAX_FREQUENCY)]
@@ -128,23 +130,8 @@ SCALES_THRUST: Mapping[str, tuple[str, float]] = {
 """The parameter by which a model's thrust is made larger or smaller, and its exponent."""
 
 
-def _form(name: str, parameters: Mapping[str, Parameter]) -> type[Struct]:
-    """The part of a file that gives the parameters of a model."""
-    path = Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of forces")]
-    keys: list[Any] = [("path", path)] if name == "table" else []
-    for key, rule in parameters.items():
-        about = f"{rule.meaning}{rule.unit and f' [{rule.unit}]'}; {rule.default:g} when left out"
-        kind = Annotated[float, Meta(ge=rule.low, le=rule.high, description=about)]
-        keys.append((key, kind | None, None))
-    return defstruct(f"{name.title()}Model", keys, tag=name, tag_field="type", forbid_unknown_fields=True)
-
-
-Model: Any = Union[tuple(_form(name, parameters) for name, parameters in FIN_MODELS.items())]  # noqa: UP007
-"""A fin model in a file: keys and values, among them its `type`."""
-
-
 @dataclass(frozen=True)
-class FinModelSpec:
+class FinModelSpec(Part):
     """Name and parameters of a fin model, as a layout file gives them. Checked on construction."""
 
     type: str = "drag"
@@ -155,6 +142,14 @@ class FinModelSpec:
     def __post_init__(self) -> None:
         model: Any = checked({**dict(self.parameters), "type": self.type}, Model)
         object.__setattr__(self, "parameters", tuple(sorted(given(model).items())))
+
+    @classmethod
+    def file_form(cls) -> Any:
+        return Model
+
+    @classmethod
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+        return cls(tag, tuple(values.items()))
 
     @classmethod
     def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
@@ -176,3 +171,25 @@ class FinModelSpec:
         """Returns all parameters of the model, those given and those left at their defaults."""
         defaults = {name: rule.default for name, rule in FIN_MODELS[self.type].items()}
         return {**defaults, **dict(self.parameters)}
+
+
+def _form(name: str, parameters: Mapping[str, Parameter]) -> type[Struct]:
+    """The part of a file that gives the parameters of a model."""
+    path = Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of forces")]
+    keys: list[Any] = [("path", path)] if name == "table" else []
+    for key, rule in parameters.items():
+        about = f"{rule.meaning}{rule.unit and f' [{rule.unit}]'}; {rule.default:g} when left out"
+        kind = Annotated[float, Meta(ge=rule.low, le=rule.high, description=about)]
+        keys.append((key, kind | None, None))
+    return defstruct(
+        f"{name.title()}Model",
+        keys,
+        tag=name,
+        tag_field="type",
+        forbid_unknown_fields=True,
+        namespace={"stands_for": FinModelSpec},
+    )
+
+
+Model: Any = Union[tuple(_form(name, parameters) for name, parameters in FIN_MODELS.items())]  # noqa: UP007
+"""A fin model in a file: keys and values, among them its `type`."""

@@ -6,7 +6,7 @@ any law, convex or not. A fin whose force differs from one direction to the next
 force that the same cost gives in each direction.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from threading import Lock
@@ -14,16 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from finlab.actuators.fin.bernstein_bound import TableBound
-from finlab.actuators.fin.fin_laws import TableLaw, file_stamp, make_law
+from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
-from finlab.actuators.form import Form
 from finlab.actuators.law import FinLaw, PlanarLaw
-from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
-from finlab.arrays import Array
+from finlab.actuators.response import POINTS, Form, Group, Plane, RadialTable, price_grid
+from finlab.arrays import NEARLY, NOTHING, ROUNDING, ROUNDS, Array
 from finlab.axes import TURN, is_full_turn, wrapped
 from finlab.errors import DataError
-from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
 GRID = 17, 33
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
@@ -89,7 +86,7 @@ class FinGroup(Group):
         a grid of commands."""
         result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
-            if isinstance(table.box.law, TableLaw):
+            if table.box.law.measured:
                 continue
             own = price[:, i]
             place = np.interp(own, price_grid(table.table.top), table.table.force) / self._largest[i]
@@ -108,10 +105,10 @@ class FinGroup(Group):
         """See `Group`: a bound, of fins that were measured alone."""
         result = np.full((len(price), len(self._tables)), np.nan)
         for table in {id(table): table for table in self._tables}.values():
-            if isinstance(law := table.box.law, TableLaw):
+            if table.box.law.measured:
                 places = [i for i, own in enumerate(self._tables) if own is table]
                 own = np.einsum("maw,nw->nma", self._effectiveness[places], price)
-                result[:, places] = _table_bound(law, table.box)(own.reshape(-1, 3)).reshape(len(price), -1)
+                result[:, places] = _table_bound(table.box)(own.reshape(-1, 3)).reshape(len(price), -1)
         return result
 
 
@@ -121,7 +118,7 @@ _LOCK = Lock()
 def fin_table(fin: Any) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
     with _LOCK:  # of two threads each would compile one, and equal fins would not be known as alike
-        result = _compiled(fin.model, fin.limits, file_stamp(fin.reads))
+        result = _compiled(fin.model, fin.limits, fin.stamp)
     if result is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
@@ -282,8 +279,13 @@ class _Box:
 
 
 @lru_cache(maxsize=32)
-def _table_bound(law: TableLaw, box: _Box) -> TableBound:
-    return TableBound(law, box.lower, box.upper)
+def _table_bound(box: _Box) -> Callable[[Array], Array]:
+    """What forces of a fin that was measured are worth at most; see `TableBound`."""
+    from finlab.actuators.fin.bernstein_bound import TableBound
+    from finlab.actuators.fin.table_law import TableLaw
+
+    assert isinstance(box.law, TableLaw)
+    return TableBound(box.law, box.lower, box.upper)
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:

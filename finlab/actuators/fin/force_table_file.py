@@ -30,8 +30,6 @@ POWER_COLUMN = "P"
 """Column of the mean power [W], which may be left out."""
 DEVIATIONS = ("sFx", "sFy", "sFz")
 """Columns of the forces' standard deviations [N], which may be left out."""
-DOUBT = "not to be trusted"
-"""How a table's note begins that every answer repeats."""
 LEAST, MOST = 1e-6, 1e6
 """Least size of the largest thrust [N], and largest of any force [N] and power [W]."""
 LEAST_STEP = 1e-6

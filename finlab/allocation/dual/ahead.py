@@ -6,16 +6,13 @@ turning there and back with every wave gains little; half of the rest is wanted 
 of what then remains.
 """
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import Array
 from finlab.core.calls import Now
-
-if TYPE_CHECKING:
-    from finlab.allocation.dual.method import Dual
 
 MOST_AHEAD = 8
 """Ticks to which pods look ahead."""
@@ -27,7 +24,7 @@ HELD_BY = 10.0
 """Times as much as usual does it cost to stand elsewhere than is wanted."""
 
 
-def turning_ahead(method: "Dual", reference: Array, now: Now) -> Now:
+def turning_ahead(method: Any, reference: Array, now: Now) -> Now:
     """Returns what holds now, with the angles near which pods are to stand.
 
     Args:

@@ -11,12 +11,10 @@ from finlab.actuators.actuator import Places
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
-from finlab.arrays import Array
+from finlab.arrays import ROUNDING, Array
 from finlab.core.calls import STILL, Now, Worth
-from finlab.layout import Layout
-from finlab.physics.expected_miss import uncertainties
+from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
-from finlab.precision import ROUNDING
 
 
 class Compiled:
@@ -121,6 +119,8 @@ def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
     square; None where nothing does. A `DataError` where a force table cannot be read."""
     if robust == 0.0:
         return None
+    from finlab.physics.expected_miss import uncertainties
+
     shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
     return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
 

@@ -8,26 +8,24 @@ actuators' own laws, is removed by Levenberg-Marquardt steps on the commands, wi
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.ahead import turning_ahead
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
-from finlab.allocation.dual.price_ascent import raised_price
-from finlab.allocation.dual.turns import settled, whole_of
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
-from finlab.arrays import Array
+from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS, Array
 from finlab.axes import axes_in
 from finlab.core.calls import STILL, Found, Now
-from finlab.core.whole import Whole
 from finlab.layout.effectiveness import wrench_of_forces
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
+
+if TYPE_CHECKING:
+    from finlab.core.whole import Whole
 
 EXACT = 1e-8
 """Error, on the yardstick, up to which commands need no further step."""
@@ -74,7 +72,9 @@ class Dual(Method):
         return CommandProblem.of(self.plant, self.scale)
 
     @cached_property
-    def whole(self) -> Whole:
+    def whole(self) -> "Whole":
+        from finlab.allocation.dual.turns import whole_of
+
         return whole_of(self)
 
     def at(self, flow: Array | None) -> Self:
@@ -121,6 +121,8 @@ class Dual(Method):
         now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
         method = self.at(flow)
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
+            from finlab.allocation.dual.ahead import turning_ahead
+
             now = turning_ahead(method, reference, now)
         return method.solve_now(targets, policy, now, prices)
 
@@ -152,6 +154,8 @@ class Dual(Method):
             Commands, with the lower bound of their power.
         """
         if self.plant.interaction is not None:
+            from finlab.allocation.dual.turns import settled
+
             return settled(self, targets, policy, now, prices)
         found = self.forces(targets, policy, prices, now)
         # A search of bytes, in a third of the time of numpy's `all`.
@@ -371,6 +375,8 @@ class Dual(Method):
     ) -> Array:
         """Lower bounds (R,) [W] for some rows (R,) of answers, at prices that are raised by the measured
         tables themselves."""
+        from finlab.allocation.dual.price_ascent import raised_price
+
         if len(rows) == 0:
             return np.empty(0)
         questions = zip(wrench[rows], price[rows], command[rows], strict=True)

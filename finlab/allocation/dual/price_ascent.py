@@ -6,9 +6,8 @@ smoothing fades. Any prices prove a bound, so that the draw decides how high it 
 
 import numpy as np
 
-from finlab.arrays import Array
+from finlab.arrays import CLOSE, NOTHING, ROUNDS, Array
 from finlab.physics.plant import Plant
-from finlab.precision import CLOSE, NOTHING, ROUNDS
 
 DRAWN = 800
 """Commands of each actuator."""

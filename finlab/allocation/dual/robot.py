@@ -7,14 +7,12 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.form import Form
-from finlab.actuators.response import POINTS, Line, Plane, RadialTable, Response, power_of, price_grid
-from finlab.arrays import AnyArray, Array
+from finlab.actuators.response import POINTS, Form, Line, Plane, RadialTable, Response, power_of, price_grid
+from finlab.arrays import CLOSE, NEARLY, NOTHING, AnyArray, Array
 from finlab.axes import TURN
 from finlab.core.calls import MAGIC, Core
 from finlab.core.fields import numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
-from finlab.precision import CLOSE, NEARLY, NOTHING
 
 
 class DualRobot:

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
-from finlab.arrays import Array
+from finlab.arrays import CLOSE, NEARLY, ROUNDS, Array
 from finlab.core.calls import Found, Now
 from finlab.core.whole import Beside, Ended, Whole
 from finlab.interaction.jets import JetInteraction
-from finlab.precision import CLOSE, NEARLY, ROUNDS
 
 ASIDE = 0.38
 """Angle [rad] by which jets are turned aside where an answer begins anew."""

@@ -11,22 +11,22 @@ import numpy as np
 
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import CLOSEST
-from finlab.arrays import Array
+from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
 from finlab.evaluation.method_specs import own_function
 from finlab.fit.interaction.constants import fit_constants
-from finlab.fit.interaction.samples import Judge, Samples, drawn, left_by_laws, with_jets
+from finlab.fit.interaction.drawn_samples import Judge, drawn, with_jets
+from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import Interaction
 from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
 from finlab.layout import Layout
 from finlab.layout.effectiveness import body_force
 from finlab.layout.places import places_of
-from finlab.layout.random_layouts import random_jet_robot, random_shaft_fin
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
-from finlab.precision import NEARLY, ROUNDS
+from finlab.random_layouts import random_jet_robot, random_shaft_fin
 
 GROUPS = {
     "unseen robots": ((4, 8), None),

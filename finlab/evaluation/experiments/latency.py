@@ -17,9 +17,9 @@ from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec, can_run, load_method_spec, load_method_specs
-from finlab.layout import Layout, random_layout
-from finlab.layout.random_layouts import random_robot, random_thruster
+from finlab.layout import Layout
 from finlab.physics import plant_of
+from finlab.random_layouts import random_layout, random_robot, random_thruster
 
 DOMAIN = 0xF1257  # leads the seed of every robot
 REFERENCE = "dual"  # the method that the others are compared with, where it takes part

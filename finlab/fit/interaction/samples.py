@@ -8,7 +8,7 @@ its layout file of the same name.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -22,10 +22,8 @@ from finlab.errors import DataError
 from finlab.files.csv_table import TURNS
 from finlab.files.guarded import check_shapes, json_of, read_arrays
 from finlab.fit.columns import command_columns, commands_in, read_columns
-from finlab.interaction.jets import Jets
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.effectiveness import body_force
-from finlab.layout.random_layouts import random_jet_robot
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 from finlab.whole_file import write_whole
@@ -33,10 +31,6 @@ from finlab.whole_file import write_whole
 MAX_BYTES = 1_000_000_000
 """Largest file of samples that is read [bytes]."""
 WHAT = "samples of wrenches (.npz)"
-JETS = Jets()
-
-Judge = Callable[[Layout, Array], Array]
-"""Gives the wrenches (K, 6) [N, N m] of commands (K, n, 3) of a robot, such as a CFD code does."""
 
 
 class Samples(NamedTuple):
@@ -66,30 +60,6 @@ def left_by_laws(samples: Samples) -> Left:
     plant, scale = Plant(layout), yardstick(layout)
     own = plant.force(samples.command)
     return Left(body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale)
-
-
-def with_jets(layout: Layout, command: Array, jets: Jets = JETS) -> Array:
-    """Returns wrenches (K, 6) [N, N m] of commands (K, n, 3) by the formula of jets; a `Judge`."""
-    return Plant(replace(layout, interaction=jets)).wrench(command)
-
-
-def drawn(
-    judge: Judge, layouts: int, commands: int, seed: int, noise: float, count: tuple[int, int]
-) -> list[Samples]:
-    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches
-    with normal noise, a share of each axis' root mean square. They depend on the seed and the number
-    alone. Raises DataError: the judge gives wrenches of another shape."""
-    result = []
-    for k in range(layouts):
-        rng = np.random.default_rng([31_000, seed, k])
-        layout = random_jet_robot(rng, f"robot_{k + 1}", count)
-        command = Plant(layout).sample(rng, (commands,))
-        wrench = np.asarray(judge(layout, command), np.float64)
-        if wrench.shape != (commands, 6):
-            raise DataError(f"the plant gave an array of shape {wrench.shape}, expected ({commands}, 6)")
-        size = np.sqrt((wrench**2).mean(axis=0))
-        result.append(Samples(layout, command, wrench + noise * size * rng.normal(size=wrench.shape)))
-    return result
 
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from finlab.actuators.actuator import Actuator, Uncertainty
-from finlab.actuators.fin.force_table_file import COLUMNS, DOUBT, POWER_COLUMN, table_text
+from finlab.actuators.fin.fin_model import DOUBT
+from finlab.actuators.fin.force_table_file import COLUMNS, POWER_COLUMN, table_text
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.fit.robot.robot_fit import SOUND, UNTOLD, RobotFit, fit_robot

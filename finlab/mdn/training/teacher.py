@@ -11,12 +11,12 @@ from torch import Tensor
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
-from finlab.layout.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
 from finlab.mdn.answers import LAST, EffortRobot, distinct, effort_robot
 from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.features import VECTORS, features
 from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant
+from finlab.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
 from finlab.whole_file import write_whole
 
 STARTS = 32

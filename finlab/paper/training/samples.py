@@ -19,12 +19,12 @@ from torch import Tensor
 from finlab.arrays import AnyArray
 from finlab.errors import DataError
 from finlab.executor import cores, map_parts
+from finlab.files import parse_json
 from finlab.files.guarded import decoded, read_file
-from finlab.files.plain_values import parse_json
-from finlab.layout import FinModelSpec, Layout, random_layout
-from finlab.layout.random_layouts import TRAINING_FINS
+from finlab.layout import FinModelSpec, Layout
 from finlab.networks.trained import Normalization
 from finlab.physics import Plant
+from finlab.random_layouts import TRAINING_FINS, random_layout
 from finlab.training.loop import seeded_generator
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 

@@ -13,7 +13,7 @@ from finlab.actuators.azimuth import Tilt
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.arrays import Array
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
-from finlab.layout.file import save_layout
+from finlab.layout.save import save_layout
 from finlab.physics.plant import Plant
 from tests.exhaustive import sampled
 

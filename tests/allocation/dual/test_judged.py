@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.layout.file import parse_layout
+from finlab.layout.load import parse_layout
 from tests import mixed_robots
 from tests.exhaustive import sampled
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound

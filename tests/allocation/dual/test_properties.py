@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
 from finlab.allocation.modes import force_sizes, mode_signature, same_signature
-from finlab.layout import Layout, random_layout
+from finlab.layout import Layout
 from finlab.physics import Plant
+from finlab.random_layouts import random_layout
 from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5

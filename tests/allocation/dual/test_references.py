@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.actuators.form import Form
-from finlab.actuators.response import Line, RadialTable, price_grid
+from finlab.actuators.response import Form, Line, RadialTable, price_grid
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.allocation.dual.robot import DualRobot

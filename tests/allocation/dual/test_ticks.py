@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
-from finlab.layout.file import parse_layout
+from finlab.layout.load import parse_layout
 from tests.hostile_robots import hostile_robot
 from tests.mixed_robots import KINDS, bluerov2_heavy, layout_of, random_flow, random_robot, with_rates
 

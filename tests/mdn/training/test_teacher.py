@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from finlab.layout import Layout
-from finlab.layout.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
 from finlab.mdn.answers import EffortRobot, effort_robot
 from finlab.mdn.descent import realize, wrench
 from finlab.mdn.training import teacher
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
+from finlab.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.layout import Layout, random_layout
+from finlab.layout import Layout
 from finlab.networks.trained import Normalization, TrainedWeights
 from finlab.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig
 from finlab.paper.training import modules
 from finlab.paper.training.recipes import RECIPES
 from finlab.paper.training.samples import N_FINS, Batch, DataSettings, fresh_batch
+from finlab.random_layouts import random_layout
 from finlab.training.loop import first_weights
 from tests.torch_weights import arrays_of
 
