@@ -14,7 +14,6 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
-from finlab.random_layouts import random_layout
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
 

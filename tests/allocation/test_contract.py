@@ -20,8 +20,7 @@ from finlab.allocation.methods import method_class
 from finlab.allocation.solution import equal
 from finlab.arrays import Array
 from finlab.axes import AXES
-from finlab.layout import Damage, Layout
-from finlab.layout.file import parse_layout
+from finlab.layout import Damage, Layout, parse_layout
 from finlab.physics.plant import plant_of
 from tests.allocation.quick import quick_allocator
 from tests.exhaustive import sampled

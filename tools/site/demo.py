@@ -21,7 +21,23 @@ from finlab.vehicle.fossen import complete_body
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = "bluerov2_heavy", "A", "turtle_hybrid", "catamaran"
-EXPORTS = "fl_fields", "fl_sizes", "fl_check", "fl_prepare", "fl_answer_one", "fl_power_of_force", "__heap_base"
+EXPORTS = (
+    "fl_fields",
+    "fl_sizes",
+    "fl_check",
+    "fl_prepare",
+    "fl_answer_one",
+    "fl_power_of_force",
+    "__heap_base",
+)
+    "fl_fields",
+    "fl_sizes",
+    "fl_check",
+    "fl_prepare",
+    "fl_answer_one",
+    "fl_power_of_force",
+    "__heap_base",
+)
 
 
 def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
