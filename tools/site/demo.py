@@ -30,14 +30,6 @@ EXPORTS = (
     "fl_power_of_force",
     "__heap_base",
 )
-    "fl_fields",
-    "fl_sizes",
-    "fl_check",
-    "fl_prepare",
-    "fl_answer_one",
-    "fl_power_of_force",
-    "__heap_base",
-)
 
 
 def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
