@@ -66,6 +66,8 @@ class LearnedMethod(Method):
     def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
         """Returns the SHA-256 of the networks' weights, and by name the files of those that do not come with
         finlab."""
+        if networks is None:  # a method that was made without its own
+            return None, {}
         assert isinstance(networks, TrainedWeights)
         shipped = shipped_checkpoints().get(networks.name)
         if shipped is not None and read_checkpoint(shipped).sha256 == networks.sha256:

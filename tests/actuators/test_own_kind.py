@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from webapp.tasks.background import Workers
+from webapp.tasks.slot import Pools
 
 from finlab.actuators.kinds import KINDS, Kinds, import_kinds
 from finlab.allocation import Allocator
@@ -93,8 +93,8 @@ def test_the_command_line_and_the_runtime_take_it(
 
 
 def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[str]) -> None:
-    workers = Workers()
-    tab = Tab(workers, boat, Solver())
+    pools = Pools()
+    tab = Tab(pools, boat, Solver())
     session = tab.view.session
     tab.on_loop(lambda: tab.view.do(lambda: session.add("water_jet")))
     name: Any = session.selected
@@ -110,7 +110,7 @@ def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[
     assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
     assert "water_jet" in shown and "Exact" in shown and "cannot be shown" not in shown
     tab.close()
-    workers.stop()
+    pools.stop()
 
 
 def test_all_kinds_keep_the_contract() -> None:

@@ -122,7 +122,7 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("-o README.md", "out: expected a folder, got the file README.md"),
+        ("-o README.md", "output: expected a folder, got the file README.md"),
         ("-o somewhere --sections nothing", "sections: expected some of all, wrench, "),
     ],
 )

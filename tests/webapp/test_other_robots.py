@@ -146,7 +146,9 @@ def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
     robot = {"format": "finlab-layout", "version": 2, "name": "x"}
     robot["actuators"] = [{**thruster, "force_n": [-5, 5], "model": model}]
     content = json.dumps(robot).encode()
-    with pytest.raises(LayoutError, match="model.path: names a file, which is not opened here"):
+    with pytest.raises(
+        LayoutError, match="model.path of thruster 't': names a file, which is not opened here"
+    ):
         files.read_layout("x.json", content)
 
 
