@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from webapp.tasks.slot import Pools
 
 from finlab.actuators.kinds import KINDS, Kinds, import_kinds
 from finlab.allocation import Allocator
@@ -21,6 +20,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Damage, Layout, load_layout, save_layout
 from finlab.physics import plant_of
 from tests.webapp.test_faults import Tab
+from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 ROOT = Path(__file__).resolve().parents[2]
