@@ -18,6 +18,7 @@ from finlab.assets import shipped_layouts
 from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
+from finlab.networks.learned_method import LearnedMethod
 from finlab.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings
@@ -121,7 +122,8 @@ def test_what_is_exact_by_an_uncertain_model_says_so() -> None:
 
 def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
     layout = load_layout("ucat")
-    learned = type("Learned", (StandIn,), {"fin_model": layout.fins[0].model})
+    own = {"fin_model": layout.fins[0].model, "read_networks": classmethod(lambda cls, checkpoint: None)}
+    learned = type("Learned", (StandIn, LearnedMethod), own)
     other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
     strange = replace(layout, actuators=(*layout.fins[:2], other, layout.fins[3]))
     allocator = Allocator(strange, learned)

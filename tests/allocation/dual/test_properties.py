@@ -142,7 +142,10 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot
     )
     # A robot of few fins may have been moved away from the target.
     moved = normalized_error(search.normalization, Plant(other.layout).wrench(one.command), target)
-    assert other.err_norm <= max(GOOD, moved) and same_power(one, other, 0.002)
+    assert other.err_norm <= max(GOOD, moved)
+    # Fins that hardly span a wrench make the least power itself sensitive: then both are proved to be least.
+    is_least = [answer.power <= (1.0 + 1e-4) * answer.bound for answer in (one, other)]
+    assert same_power(one, other, 0.002) or all(is_least)
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
     if same_signature(*ways):
         np.testing.assert_allclose(one.forces, other.forces, atol=0.05)
