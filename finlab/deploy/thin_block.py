@@ -50,7 +50,7 @@ def tables_of(block: Array) -> list[dict[int, Table]]:
 
 
 def _length(field: str, table: Array, is_fin: bool) -> int:
-    """Returns how many numbers a table has, by its first ones (see core.h)."""
+    """Returns how many numbers a table has, by its first ones (see fl_work.h)."""
     if field in ("ahead", "back"):
         cells = int(table[1])
         return 3 + 3 * (cells + 1)
