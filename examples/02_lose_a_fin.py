@@ -6,7 +6,7 @@
 # %%
 import finlab
 from finlab.analysis import score_card
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.swim.simulation import ClosedLoop, make_trajectory
 
 layout = finlab.load_layout("A")
 allocator = finlab.Allocator(layout)

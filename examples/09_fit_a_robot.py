@@ -9,11 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import finlab
-from finlab.fit.robot.fitted_robot import summary, write_robot
-from finlab.fit.robot.robot_fit import fit_robot
-from finlab.fit.robot.swim import read_swim
-from finlab.sim import perturbed
-from finlab.sim.excite import excitation
+from finlab.swim.identification.fitted_robot import summary, write_robot
+from finlab.swim.identification.robot_fit import fit_robot
+from finlab.swim.identification.swim import read_swim
+from finlab.swim.simulation import perturbed
+from finlab.swim.simulation.excite import excitation
 
 drawn = finlab.load_layout("A")
 built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import finlab
-from finlab.evaluation.experiments.wrench import experiment
 from finlab.physics import plant_of
+from finlab.research.evaluation.experiments.wrench import experiment
 
 
 def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> np.ndarray:

@@ -12,8 +12,8 @@ from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked
 from finlab.allocation.settings import Settings
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
-from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
-from finlab.networks.trained import Normalization
+from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
+from finlab.research.networks.trained import Normalization
 
 
 class AnyRobot:

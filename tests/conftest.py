@@ -21,11 +21,11 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
 
-    from finlab.networks.checkpoint import write_checkpoint
-    from finlab.networks.trained import Normalization, TrainedWeights, sizes_for_file
-    from finlab.paper.network import NetworkConfig
-    from finlab.paper.surrogate import SurrogateConfig
-    from finlab.training.loop import first_weights
+    from finlab.research.networks.checkpoint import write_checkpoint
+    from finlab.research.networks.trained import Normalization, TrainedWeights, sizes_for_file
+    from finlab.research.paper.network import NetworkConfig
+    from finlab.research.paper.surrogate import SurrogateConfig
+    from finlab.research.training.loop import first_weights
     from tests.torch_weights import arrays_of
 
     surrogate = SurrogateConfig(hidden=(16, 16))
@@ -50,10 +50,10 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
-    from finlab.mdn.training.train_mdn import RECIPES
-    from finlab.networks.checkpoint import read_normalization, resolve_checkpoint, write_checkpoint
-    from finlab.networks.trained import TrainedWeights, sizes_for_file
-    from finlab.training.loop import first_weights
+    from finlab.research.mdn.training.train_mdn import RECIPES
+    from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint, write_checkpoint
+    from finlab.research.networks.trained import TrainedWeights, sizes_for_file
+    from finlab.research.training.loop import first_weights
     from tests.torch_weights import arrays_of
 
     network = RECIPES["smoke"].network

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, make_law
-from finlab.random_layouts import random_layout
+from finlab.research.random_layouts import random_layout
 
 Array = NDArray[np.float64]
 

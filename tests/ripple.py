@@ -7,9 +7,9 @@ import numpy as np
 from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop
-from finlab.sim.devices import ActuatorForce
-from finlab.vehicle.fin_motion import FinMotion
+from finlab.swim.simulation import ClosedLoop
+from finlab.swim.simulation.devices import ActuatorForce
+from finlab.swim.vehicle.fin_motion import FinMotion
 
 
 class RippleForce(ActuatorForce):

@@ -2,7 +2,7 @@
 
 import torch
 
-from finlab.networks.trained import State
+from finlab.research.networks.trained import State
 
 
 def arrays_of(weights: dict[str, torch.Tensor]) -> State:

@@ -14,14 +14,19 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.cli.eval_verbs import verb_of
-from finlab.evaluation.document import Column, Row
-from finlab.evaluation.experiment import Experiment, check_names, progress
-from finlab.evaluation.method_specs import PATIENCE_S, MethodSpec, load_method_spec, load_method_specs
-from finlab.evaluation.scoring import ratio_interval, sigma_of
-from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, cost_meter
+from finlab.research.evaluation.document import Column, Row
+from finlab.research.evaluation.experiment import Experiment, check_names, progress
+from finlab.research.evaluation.method_specs import (
+    PATIENCE_S,
+    MethodSpec,
+    load_method_spec,
+    load_method_specs,
+)
+from finlab.research.evaluation.scoring import ratio_interval, sigma_of
+from finlab.research.evaluation.splits import SPLITS, Case, make_split
 
 EXACT, TRACKED = 1e-5, 1e-3
 """Normalized errors up to which the yardstick and a method count as delivering a target."""

@@ -17,8 +17,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from finlab.evaluation.document import Table, to_markdown
-from finlab.evaluation.experiment import begin, load_experiment
+from finlab.research.evaluation.document import Table, to_markdown
+from finlab.research.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]}

@@ -101,9 +101,11 @@ class Method(ABC):
 
     @classmethod
     def read_networks(cls, checkpoint: Checkpoint) -> Networks | None:
-        """Returns the networks that the method is made with. Methods that ask some are those of
-        `finlab.networks.learned_method.LearnedMethod`, which reads them; any other is made with what it is
-        given."""
+        """Returns the networks that the method is made with.
+
+        Methods that need some inherit from `finlab.research.networks.learned_method.LearnedMethod`, which
+        reads them; any other is made with what it is given.
+        """
         return None if isinstance(checkpoint, str | os.PathLike) else checkpoint
 
     @classmethod

@@ -16,8 +16,8 @@ MethodName = Literal[
 """Names of the methods that come with finlab; `METHODS` says where their classes stand."""
 METHODS: dict[str, str] = {
     "dual": "finlab.allocation.dual.method:Dual",
-    "mdn": "finlab.mdn.method:Mdn",
-    "paper": "finlab.paper.pipeline:Paper",
+    "mdn": "finlab.research.mdn.method:Mdn",
+    "paper": "finlab.research.paper.pipeline:Paper",
     "qp": "finlab.allocation.baselines.linear:Qp",
     "sqp": "finlab.allocation.baselines.sqp:Sqp",
     "paper_sqp": "finlab.allocation.baselines.linear:PaperSqp",

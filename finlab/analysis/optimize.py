@@ -104,7 +104,7 @@ def optimize_layout(
         progress: called after each round.
         cancelled: asked after each round, and within long ones; the search stops when it answers True.
         mapped: gives a function's results for parts of the work, in order, as `map` does in this process;
-            `finlab.executor.map_parts` does on a cluster.
+            `finlab.research.executor.map_parts` does on a cluster.
     """
     bounds, water, start = bounds or {}, check_flow(flow), layout
     if axes is not None:

@@ -15,7 +15,7 @@ from finlab.cli.shared_options import STDOUT, Cluster, Count, JsonFile, check_js
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
-    from finlab.evaluation.experiment import Experiment
+    from finlab.research.evaluation.experiment import Experiment
 
 
 def verbs(argv: Sequence[str]) -> SubcommandApp:
@@ -24,7 +24,7 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
     Only the experiment that these name is imported, or all for `finlab eval --help`; the others have no
     options here.
     """
-    from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+    from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 
     made, wanted = SubcommandApp(), argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
@@ -36,10 +36,10 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
-    from finlab.evaluation.document import to_text
-    from finlab.evaluation.experiment import begin
-    from finlab.evaluation.plots import check_picture, write_picture
-    from finlab.executor import on_cluster
+    from finlab.research.evaluation.document import to_text
+    from finlab.research.evaluation.experiment import begin
+    from finlab.research.evaluation.plots import check_picture, write_picture
+    from finlab.research.executor import on_cluster
 
     options = experiment.options()
 
@@ -84,7 +84,7 @@ def examples_of(name: str) -> tuple[str, ...]:
     Args:
         name: the experiment, one of `EXPERIMENTS`; for another name those of `wrench`.
     """
-    from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+    from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 
     experiment = load_experiment(name if name in EXPERIMENTS else "wrench")
     return experiment.command(experiment.quick), f"finlab eval {experiment.name} --json rows.json"
@@ -92,7 +92,7 @@ def examples_of(name: str) -> tuple[str, ...]:
 
 def _shown(option: inspect.Parameter) -> inspect.Parameter:
     """An option as the parser takes it: lists are texts with commas between."""
-    from finlab.evaluation.experiment import item_type
+    from finlab.research.evaluation.experiment import item_type
 
     kind, default = option.annotation, option.default
     item, several = item_type(kind)
@@ -107,7 +107,7 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
 
 
 def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
-    from finlab.evaluation.experiment import item_type
+    from finlab.research.evaluation.experiment import item_type
 
     kind, several = item_type(option.annotation)
     if not several or value is None:
@@ -138,7 +138,7 @@ def report(
     """
     if output.exists() and not output.is_dir():
         raise DataError(f"output: expected a folder, got the file {output}")
-    from finlab.evaluation.report_page import make_report
+    from finlab.research.evaluation.report_page import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
     print(make_report(output, size="quick" if quick else "full", seed=seed, names=names))
@@ -167,9 +167,9 @@ def bench(
         seed: of robots and wrenches.
     """
     check_json_file(json)
-    from finlab.evaluation.document import to_text
-    from finlab.evaluation.experiments.wrench import HARD, experiment
-    from finlab.executor import on_cluster
+    from finlab.research.evaluation.document import to_text
+    from finlab.research.evaluation.experiments.wrench import HARD, experiment
+    from finlab.research.executor import on_cluster
 
     names = tuple(splits.split(",")) if splits else QUICK if quick else HARD
     size = {"layouts": 5, "targets": 4} if quick else {"layouts": 20, "targets": 10}

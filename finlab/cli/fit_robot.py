@@ -30,9 +30,9 @@ def robot(
     """
     from finlab.errors import DataError
     from finlab.files.worker import in_worker
-    from finlab.fit.robot.fitted_robot import summary, table, write_robot
-    from finlab.fit.robot.robot_fit import fit_robot
-    from finlab.fit.robot.swim import read_swim
+    from finlab.swim.identification.fitted_robot import summary, table, write_robot
+    from finlab.swim.identification.robot_fit import fit_robot
+    from finlab.swim.identification.swim import read_swim
 
     if output.suffix.lower() not in (".yaml", ".yml", ".json"):
         raise DataError(

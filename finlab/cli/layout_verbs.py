@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from finlab.analysis import Improvement
     from finlab.analysis.authority import MotionAxis
 
-REMARKS = ("finlab.vehicle.righting:righting_words",)
+REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
 """What else there is to say of a layout that is right: where functions stand, `module:function`, that give a
 sentence or None."""
 

@@ -41,11 +41,11 @@ def log(
         output: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
     """
-    from finlab.evaluation.plots import check_picture, write_picture
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
     from finlab.log import judge, read_log
     from finlab.log.words import judgement_text, picture
+    from finlab.research.evaluation.plots import check_picture, write_picture
 
     shared_options.check_json_file(json)
     shared_options.check_json_file(output, "output")

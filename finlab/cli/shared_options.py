@@ -21,7 +21,7 @@ JSON = "file for one JSON object; it is printed in place of the table where no f
 LAYOUT = "layout file, bundle, or the name of a shipped layout"
 FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
 CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://desk:8786"
-EXECUTOR = "finlab.executor"
+EXECUTOR = "finlab.research.executor"
 """Where the workers of a cluster are asked; it is imported with an address alone."""
 STDOUT = Path("-")  # what stands for stdout
 JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]  # where one JSON object goes

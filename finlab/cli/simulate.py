@@ -17,8 +17,8 @@ from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
-    from finlab.fit.robot.fitted_robot import OnlineFit
-    from finlab.sim import ClosedLoop, Fault, RunLog
+    from finlab.swim.identification.fitted_robot import OnlineFit
+    from finlab.swim.simulation import ClosedLoop, Fault, RunLog
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
         make_folder(options.output)
     tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
     with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
-        from finlab.evaluation.plots import check_picture, write_picture
-        from finlab.vehicle.righting import righting_words
+        from finlab.research.evaluation.plots import check_picture, write_picture
+        from finlab.swim.vehicle.righting import righting_words
 
         check_picture(options.plot)
         loop = _excitation(options) if options.excite else _swim(options)
@@ -103,7 +103,7 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
         loop.log.save(options.output / "log.npz")
         lines.append(f"\n{options.output}: written log.npz.")
     if options.plot is not None:
-        from finlab.evaluation.plots import swim_picture
+        from finlab.research.evaluation.plots import swim_picture
 
         write_picture(lambda _: swim_picture(loop.log), (), options.plot)
         lines.append(f"\n{options.plot}: written.")
@@ -112,7 +112,7 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
 
 def _excitation(options: Options) -> ClosedLoop:
     """The swim of a robot that is shaken on the spot."""
-    from finlab.sim.excite import LONGEST_S, excitation
+    from finlab.swim.simulation.excite import LONGEST_S, excitation
 
     robot, lost = open_robot(options.layout)
     if _faults(options) or options.monitor or options.learn or options.controller != "tracking":
@@ -126,9 +126,9 @@ def _excitation(options: Options) -> ClosedLoop:
 
 def _swim(options: Options) -> ClosedLoop:
     """The swim along a trajectory, at its start."""
-    from finlab.control import FaultMonitor, make_controller
-    from finlab.evaluation.method_specs import load_method_spec
-    from finlab.sim import ClosedLoop, Fault, make_trajectory
+    from finlab.research.evaluation.method_specs import load_method_spec
+    from finlab.swim.control import FaultMonitor, make_controller
+    from finlab.swim.simulation import ClosedLoop, Fault, make_trajectory
 
     robot, lost = open_robot(options.layout)
     world = _world(options)
@@ -149,7 +149,7 @@ def _swim(options: Options) -> ClosedLoop:
 
 def _faults(options: Options) -> list[Fault]:
     """What becomes of actuators during the swim."""
-    from finlab.sim import Fault
+    from finlab.swim.simulation import Fault
 
     faults = [Fault.parse("lost", text) for text in options.lost]
     faults += [Fault.parse("torn", text) for text in options.torn]
@@ -160,7 +160,7 @@ def _faults(options: Options) -> list[Fault]:
 
 def _world(options: Options) -> dict[str, Any]:
     """The robot that really swims, its sensors, the water and the seed."""
-    from finlab.sim import NO_NOISE
+    from finlab.swim.simulation import NO_NOISE
 
     return {
         "truth": None if options.truth is None else open_robot(options.truth)[0],
@@ -172,7 +172,12 @@ def _world(options: Options) -> dict[str, Any]:
 
 def summary(log: RunLog) -> str:
     """The run in a few lines."""
-    from finlab.evaluation.experiments.closed_loop import LOST_M, RTE_DELTA_S, follow_row, speed_error
+    from finlab.research.evaluation.experiments.closed_loop import (
+        LOST_M,
+        RTE_DELTA_S,
+        follow_row,
+        speed_error,
+    )
 
     row = follow_row(log)
     keeps_course = log.controller != "velocity"
@@ -200,7 +205,7 @@ def excitation_summary(log: RunLog) -> str:
     """How far the robot went from where it began, in a line or two."""
     import numpy as np
 
-    from finlab.vehicle.attitude import euler
+    from finlab.swim.vehicle.attitude import euler
 
     away = np.abs(log.position - log.position[0]).max(axis=0)
     tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())
@@ -215,7 +220,7 @@ def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
     import numpy as np
 
-    from finlab.fit.robot.fitted_robot import OnlineFit, leaned
+    from finlab.swim.identification.fitted_robot import OnlineFit, leaned
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout
     allocator.on(leaned(layout, np.full(layout.n, 0.01)))

@@ -12,7 +12,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from finlab.cli.shared_options import Cluster, Count, check_positive
 
 if TYPE_CHECKING:
-    from finlab.networks.trained import TrainedWeights
+    from finlab.research.networks.trained import TrainedWeights
 
 _Preset = Annotated[str, arg(metavar="NAME")]
 _Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
@@ -59,7 +59,7 @@ def mdn(
         steps: most optimizer steps instead of the recipe's.
         resume: go on from the last state in the folder.
     """
-    from finlab.mdn.training.train_mdn import train_mdn
+    from finlab.research.mdn.training.train_mdn import train_mdn
 
     check_positive(minutes=minutes, steps=steps)
     seconds = None if minutes is None else 60.0 * minutes
@@ -71,7 +71,7 @@ def surrogate(options: OmitArgPrefixes[Paper]) -> None:
 
     With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate ...
     """
-    from finlab.paper.training.train import Options, train_surrogate
+    from finlab.research.paper.training.train import Options, train_surrogate
 
     check_positive(steps=options.steps)
     _report(options.output, train_surrogate(Options(**vars(options))))
@@ -87,7 +87,7 @@ def allocator(
     Args:
         surrogate: checkpoint whose surrogate guides the training.
     """
-    from finlab.paper.training.train import Options, train_allocator
+    from finlab.research.paper.training.train import Options, train_allocator
 
     check_positive(steps=options.steps)
     _report(options.output, train_allocator(Options(**vars(options)), surrogate))
@@ -115,7 +115,7 @@ def interaction(
         resume: go on from the last state in the folder.
     """
     from finlab.fit.interaction.samples import read_samples
-    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
+    from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
     check_positive(steps=steps, minutes=minutes)
     error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
@@ -153,9 +153,9 @@ def generate(
         fin_model: what causes the wrenches: drag, lighthill, soft, or a table of measured forces.
     """
     from finlab.errors import CommandError
-    from finlab.executor import on_cluster
     from finlab.layout import FinModelSpec
-    from finlab.paper.training.samples import DataSettings, generate
+    from finlab.research.executor import on_cluster
+    from finlab.research.paper.training.samples import DataSettings, generate
 
     check_positive(layouts=layouts, commands=commands)
     if seed < 0:
@@ -190,9 +190,9 @@ def interaction_data(
         plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula of jets
             when left out.
     """
-    from finlab.evaluation.method_specs import own_function
-    from finlab.fit.interaction.drawn_samples import drawn, with_jets
     from finlab.fit.interaction.samples import write_samples
+    from finlab.research.evaluation.method_specs import own_function
+    from finlab.research.interaction.drawn_samples import drawn, with_jets
 
     check_positive(layouts=layouts, commands=commands, actuators=actuators[0])
     judge = with_jets if plant is None else own_function(plant)

@@ -1,6 +1,6 @@
 """From measurements to models: fins, thrusters, and in `robot` a layout from swims.
 
-Nothing here uses what `finlab.sim` knows to be true; fits come from data alone.
+Nothing here uses what `finlab.swim.simulation` knows to be true; fits come from data alone.
 """
 
 from finlab.fit.fin_fit import FinFit, fit_fin, write_fin

@@ -10,10 +10,10 @@ from msgspec import to_builtins
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.arrays import Array
 from finlab.axes import AXES, UNITS
-from finlab.evaluation.document import three
 from finlab.layout import Layout
 from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay
+from finlab.research.evaluation.document import three
 
 HELD = 0.02
 """Share of what was missing along an axis that a replay which holds it may miss."""

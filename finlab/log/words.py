@@ -9,8 +9,8 @@ import numpy as np
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.axes import AXES, UNITS
 from finlab.display.pictures import COLORS, panels
-from finlab.evaluation.document import Block, Column, Row, Table, to_text
 from finlab.log.judgement import Judgement
+from finlab.research.evaluation.document import Block, Column, Row, Table, to_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

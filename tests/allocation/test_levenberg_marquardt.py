@@ -9,7 +9,7 @@ import pytest
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
-from finlab.random_layouts import random_layout
+from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot
 
 

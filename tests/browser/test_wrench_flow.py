@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from finlab.layout import Damage
-from finlab.sim import load_log
+from finlab.swim.simulation import load_log
 from webapp.session.state import COMPARED
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
-from finlab.sim import load_log
+from finlab.swim.simulation import load_log
 from tests.terminal import first_shown, refused
 
 FILES = {"log.npz"}

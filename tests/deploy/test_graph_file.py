@@ -15,7 +15,7 @@ from finlab.cli import main
 from finlab.deploy.bundle import features_of, graph_text, write_graph
 from finlab.errors import LayoutError
 from finlab.layout import load_layout
-from finlab.paper.network import raw_features
+from finlab.research.paper.network import raw_features
 from tests.terminal import refused
 
 SCHEMA = Path(__file__).parents[2] / "finlab" / "layout" / "graph.schema.json"

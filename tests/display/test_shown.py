@@ -15,7 +15,7 @@ import pytest
 import finlab
 from finlab.analysis import attainable_set, score_card
 from finlab.forces.reach import axis_ranges
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.swim.simulation import ClosedLoop, make_trajectory
 
 HOSTILE = "<img src=x onerror=alert(1)> & $\\frac{'\""
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]

@@ -62,7 +62,7 @@ def test_make_targets_of_all_pages_exist() -> None:
 
 
 def test_figures_of_pages_are_columns_of_experiments() -> None:
-    from finlab.evaluation.experiment import load_experiment
+    from finlab.research.evaluation.experiment import load_experiment
 
     marks = [
         mark for page in PAGES for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())

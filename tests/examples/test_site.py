@@ -57,9 +57,15 @@ def test_a_numbered_equation_has_an_anchor_and_its_number(site: Any) -> None:
 def test_names_of_a_package_stand_below_it_in_the_navigation(site: Any) -> None:
     import hooks
 
-    names = ("index", "finlab", "finlab.Layout", "finlab.sim", "finlab.sim.ClosedLoop")
+    names = (
+        "index",
+        "finlab",
+        "finlab.Layout",
+        "finlab.swim.simulation",
+        "finlab.swim.simulation.ClosedLoop",
+    )
     grouped = hooks._by_package([f"reference/python/{name}.md" for name in names])
     assert grouped[0] == "reference/python/index.md"
     sections = {title: pages for entry in grouped[1:] for title, pages in entry.items()}
-    assert [list(page) for page in sections["finlab.sim"]] == [["All names"], ["ClosedLoop"]]
+    assert [list(page) for page in sections["finlab.swim.simulation"]] == [["All names"], ["ClosedLoop"]]
     assert sections["finlab"][1] == {"Layout": "reference/python/finlab.Layout.md"}

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import trimesh
+from tests.fit.robot.swims import write_csv as write_swim
 
 from finlab.actuators.fin.table_law import read_table
 from finlab.allocation import Allocator
@@ -26,16 +27,15 @@ from finlab.deploy.deployed_robot import load_robot
 from finlab.errors import FinlabError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.fit.measurements import read_measurements
-from finlab.fit.robot.swim import read_swim
-from finlab.hull import Surface
 from finlab.layout import FinModelSpec, load_layout, save_layout
-from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import make_law, write_table
-from finlab.sim import load_log
-from finlab.sim.log import Tick, log_of_ticks
-from finlab.sim.task import make_trajectory
+from finlab.research.networks.checkpoint import read_checkpoint
+from finlab.swim.hull import Surface
+from finlab.swim.identification.swim import read_swim
+from finlab.swim.simulation import load_log
+from finlab.swim.simulation.log import Tick, log_of_ticks
+from finlab.swim.simulation.task import make_trajectory
 from tests.fit.cell import columns_of, commands, measured, soft, write
-from tests.fit.robot.swims import write_csv as write_swim
 from webapp.session.files import packed as design
 from webapp.session.files import read_layout, unpacked
 

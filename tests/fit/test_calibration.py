@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.fit.fin_fit import fit_fin, write_fin
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
-from finlab.random_layouts import random_fin_model, random_layout
+from finlab.research.random_layouts import random_fin_model, random_layout
 from tests.exhaustive import sampled
 from tests.fit.cell import commands, measured, samples
 

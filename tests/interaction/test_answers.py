@@ -12,7 +12,7 @@ from finlab import Allocator, Azimuth, Layout, PowerLaw
 from finlab.arrays import Array
 from finlab.interaction.jets import Jets
 from finlab.physics import Plant
-from finlab.random_layouts import random_azimuth, random_jet_robot, random_shaft_fin, random_thruster
+from finlab.research.random_layouts import random_azimuth, random_jet_robot, random_shaft_fin, random_thruster
 
 KINDS = {
     "thrusters": [random_thruster],

@@ -13,7 +13,7 @@ from finlab.interaction.jets import Jets
 from finlab.layout import FinModelSpec, Hull
 from finlab.layout.places import places_of
 from finlab.physics import Plant
-from finlab.random_layouts import random_jet_robot
+from finlab.research.random_layouts import random_jet_robot
 from tests.interaction import oracle
 
 D = 0.1

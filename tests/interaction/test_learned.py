@@ -15,16 +15,16 @@ from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.places import places_of
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
-from finlab.random_layouts import random_jet_robot
+from finlab.research.random_layouts import random_jet_robot
 from tests.interaction.hidden_plant import wrenches
 from tests.interaction.test_jets import differs
 
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
-    from finlab.fit.interaction.drawn_samples import drawn
     from finlab.fit.interaction.samples import read_samples, write_samples
-    from finlab.fit.interaction.train import WEIGHTS_FILE, recipe, train
+    from finlab.research.interaction.drawn_samples import drawn
+    from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
     folder = tmp_path_factory.mktemp("interaction")
     write_samples(folder / "data.npz", drawn(wrenches, 60, 20, 0, 0.02, (4, 8)))
@@ -83,7 +83,7 @@ def test_a_bundle_takes_it_along(network: Learned, tmp_path: Path) -> None:
 
 
 def test_a_stranger_s_layout_opens_no_file_of_ours(network: Learned, tmp_path: Path) -> None:
-    from finlab.deploy.design_files import adopted
+    from finlab.swim.design_files import adopted
 
     layout = replace(finlab.load_layout("bluerov2"), interaction=network)
     with pytest.raises(FinlabError, match="did not come along"):

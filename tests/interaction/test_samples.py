@@ -14,13 +14,13 @@ import finlab
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.interaction.constants import fit_constants
-from finlab.fit.interaction.drawn_samples import drawn
 from finlab.fit.interaction.samples import Samples, read_samples, read_table, write_samples
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, save_layout
 from finlab.layout.effectiveness import body_force
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
+from finlab.research.interaction.drawn_samples import drawn
 
 OTHER = Jets(2.1, 2.4, 28.0, 0.8, 1.0, 0.2, 0.15, 0.45)
 

@@ -8,7 +8,7 @@ import pytest
 from finlab.errors import LayoutError
 from finlab.layout import Fin, Layout, Limits, layout_effectiveness
 from finlab.layout.effectiveness import force_effectiveness
-from finlab.random_layouts import TRAINING_BOX, random_layout
+from finlab.research.random_layouts import TRAINING_BOX, random_layout
 
 THREE = Layout(
     "three", tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"]))

@@ -19,9 +19,9 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError, FinlabError
 from finlab.layout import Layout
-from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
 from finlab.physics.objective import costs
+from finlab.research.networks.trained import TrainedWeights
 from webapp.session import Session
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Attended, Bell, Deferred, Pool, Pools, Slot

@@ -7,12 +7,12 @@ import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.hull import contradicts, displaced, estimated, hull_of
-from finlab.hull.hydrodynamics import solid_of, water_density
 from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
-from finlab.vehicle.fossen import GRAVITY
+from finlab.swim.hull import contradicts, displaced, estimated, hull_of
+from finlab.swim.hull.hydrodynamics import solid_of, water_density
+from finlab.swim.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
 from webapp.markup.words import damage_words

@@ -13,12 +13,12 @@ import trimesh
 
 from finlab.actuators.fin.force_table_file import write_table
 from finlab.assets import shipped_layouts
-from finlab.deploy.design_files import stored_table
 from finlab.errors import FinlabError
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
+from finlab.swim.design_files import stored_table
 from tests.webapp.stand_in import AtOnce
 from webapp.session import Session, files
 from webapp.tasks.designs import Designs

@@ -10,11 +10,11 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.hull import hull_of
-from finlab.hull.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, simplified, turned
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from finlab.layout.layout import MAX_ACTUATORS
+from finlab.swim.hull import hull_of
+from finlab.swim.hull.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, simplified, turned
 from tests.webapp.stand_in import turn_fin
 from webapp.markup.score_card import warnings
 from webapp.session import Session, layout_edits

@@ -13,11 +13,11 @@ from finlab.actuators.fin.fin_model import DOUBT
 from finlab.actuators.fin.force_table_file import table_bytes
 from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation import Allocator
-from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import packed
 from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
+from finlab.swim.design_files import read_archive, stored_table
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
 from tests.webapp.stand_in import LoneBell, context_of, until

@@ -12,9 +12,9 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from finlab.assets import shipped_layouts
-from finlab.hull import Surface, hull_of
-from finlab.hull.mesh_file import Mesh
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
+from finlab.swim.hull import Surface, hull_of
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.markup.reach import reach_marks
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion

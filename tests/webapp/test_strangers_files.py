@@ -18,9 +18,9 @@ from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.exchange import Exchange
 from finlab.exchange.convert import WRITERS
 from finlab.files import yaml_text
-from finlab.hull import hull_of
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
+from finlab.swim.hull import hull_of
 from webapp.session import files
 
 SECRET = "root:x:0:0"

@@ -11,9 +11,9 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.errors import FinlabError
-from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Damage, Layout, load_layout
-from finlab.sim import Fault, make_trajectory
+from finlab.research.evaluation.experiments.hard_days import HARD_DAYS
+from finlab.swim.simulation import Fault, make_trajectory
 from tests.webapp.stand_in import AtOnce, context_of, until
 from tests.webapp.test_swimming import SHORT, now
 from webapp.markup.outcomes import pace_words, swim_card

@@ -10,7 +10,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.sim import Trajectory, make_trajectory
+from finlab.swim.simulation import Trajectory, make_trajectory
 from tests.webapp.stand_in import LoneBell, context_of, load_stand_in, until
 from webapp.markup.outcomes import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner

@@ -18,8 +18,8 @@ from finlab.assets import shipped_layouts
 from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
-from finlab.networks.learned_method import LearnedMethod
-from finlab.vehicle.fossen import GRAVITY
+from finlab.research.networks.learned_method import LearnedMethod
+from finlab.swim.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.verdict import (

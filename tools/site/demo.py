@@ -17,7 +17,7 @@ from finlab.allocation.policy import Policy
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 from finlab.physics.objective import yardstick
-from finlab.vehicle.fossen import complete_body
+from finlab.swim.vehicle.fossen import complete_body
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = "bluerov2_heavy", "A", "turtle_hybrid", "catamaran"

@@ -8,8 +8,8 @@ from markupsafe import Markup
 
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.score_card import QuickCheck
-from finlab.hull import hull_of
 from finlab.layout import Layout
+from finlab.swim.hull import hull_of
 from webapp.markup.answer import swatch
 from webapp.markup.words import html, in_app, listed, row, three_digits
 from webapp.scene.actuator_shapes import SPAN

@@ -14,9 +14,9 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage
-from finlab.vehicle.fossen import complete_body
-from finlab.vehicle.righting import righting_words
-from finlab.vehicle.vehicle import Vehicle
+from finlab.swim.vehicle.fossen import complete_body
+from finlab.swim.vehicle.righting import righting_words
+from finlab.swim.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS
 
 SAFE = (Markup, int, float, np.float64)

@@ -5,9 +5,9 @@ from functools import partial
 from math import isfinite, nan
 from typing import Any
 
-from finlab.hull import contradicts, displaced, lift_of
 from finlab.layout import Body, Layout
-from finlab.vehicle.fossen import GRAVITY
+from finlab.swim.hull import contradicts, displaced, lift_of
+from finlab.swim.vehicle.fossen import GRAVITY
 from webapp.markup.words import html, three_digits
 from webapp.page import Page
 

@@ -8,9 +8,9 @@ from markupsafe import Markup
 
 from finlab.allocation.methods import METHODS, method_class
 from finlab.analysis.score_card import quick_check
-from finlab.deploy.design_files import LAYOUTS
 from finlab.exchange import FOREIGN
 from finlab.layout import Layout
+from finlab.swim.design_files import LAYOUTS
 from webapp.handles import add_html, button
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.words import html, marker, righting_sentences

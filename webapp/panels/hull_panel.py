@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
-from finlab.hull import contradicts, displaced, hull_of, lift_of
-from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
-from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
-from finlab.vehicle.fossen import GRAVITY
+from finlab.swim.hull import contradicts, displaced, hull_of, lift_of
+from finlab.swim.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
+from finlab.swim.hull.surface import UNITS
+from finlab.swim.vehicle.fossen import GRAVITY
 from webapp.markup.words import html, three_digits
 from webapp.page import Page
 from webapp.session.files import reshaped_hull, stored_hull

@@ -8,8 +8,8 @@ import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.mdn.method import WHOLE
 from finlab.physics.objective import REACHED
+from finlab.research.mdn.method import WHOLE
 from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.verdict import Verdict, verdict_of

@@ -12,9 +12,9 @@ import viser
 from viser.transforms import SO3
 
 from finlab.arrays import Array
-from finlab.hull import Surface
-from finlab.hull.mesh_file import Mesh
 from finlab.layout import Actuator
+from finlab.swim.hull import Surface
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_shapes import NOTHING, joined, tube

@@ -9,8 +9,8 @@ from trimesh.convex import convex_hull
 from trimesh.util import append_faces
 
 from finlab.arrays import Array
-from finlab.hull.mesh_file import Mesh
-from finlab.hull.surface import grid_faces, revolved, triangles
+from finlab.swim.hull.mesh_file import Mesh
+from finlab.swim.hull.surface import grid_faces, revolved, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""

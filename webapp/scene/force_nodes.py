@@ -11,8 +11,8 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.hull.mesh_file import Mesh
 from finlab.layout import Layout
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
 from webapp.theme import Rgb, fin_color
 

@@ -4,11 +4,11 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.hull.mesh_file import Mesh
 from finlab.interaction.interaction import jets_of
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, tube
 from webapp.scene.stage import Shape, part_size

@@ -11,9 +11,9 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet, Improvement, Progress
 from finlab.arrays import Array
-from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
+from finlab.swim.hull.surface import has_inside, hull_of
 from webapp.board import Board
 from webapp.handles import put
 from webapp.intents import Intents

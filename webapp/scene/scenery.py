@@ -9,7 +9,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.hull.mesh_file import Mesh
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.board import Board
 from webapp.handles import put
 from webapp.intents import Intents

@@ -9,10 +9,10 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.hull import Surface, hull_of
-from finlab.hull.mesh_file import Mesh
-from finlab.hull.surface import STATIONS, shape_mesh
 from finlab.layout import Layout
+from finlab.swim.hull import Surface, hull_of
+from finlab.swim.hull.mesh_file import Mesh
+from finlab.swim.hull.surface import STATIONS, shape_mesh
 from webapp.handles import put
 from webapp.scene.actuator_shapes import NOTHING
 from webapp.theme import LIGHT, Rgb, look

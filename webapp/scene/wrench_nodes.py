@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
-from finlab.hull.mesh_file import Mesh
+from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring

@@ -8,11 +8,11 @@ from typing import Any
 from finlab.actuators.actuator import key_words
 from finlab.axes import Vector
 from finlab.errors import FinlabError
-from finlab.hull import estimated
 from finlab.interaction.jets import Jets
 from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
+from finlab.swim.hull import estimated
 from webapp.session import layout_edits
 from webapp.session.core import Core
 from webapp.session.layout_edits import followed, partner, unlinked

@@ -21,12 +21,12 @@ from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import FinlabError, LayoutError
 from finlab.files import yaml_text
 from finlab.files.guarded import packed as pack
-from finlab.hull.mesh_file import Mesh, SizeError, stl_of
-from finlab.hull.surface import UNITS, Surface
 from finlab.layout import Layout, layout_to_dict, load_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import plant_of
+from finlab.swim.hull.mesh_file import Mesh, SizeError, stl_of
+from finlab.swim.hull.surface import UNITS, Surface
 
 FRAGMENT = "design="
 """What the part behind the # begins with."""

@@ -12,10 +12,10 @@ from finlab.analysis.moves import is_mirrored
 from finlab.arrays import Array
 from finlab.axes import Vector, rotation, wrapped
 from finlab.errors import FinlabError
-from finlab.hull import hull_of
 from finlab.layout import Actuator, Body, Fin, Layout
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.layout import MAX_ACTUATORS
+from finlab.swim.hull import hull_of
 from webapp.session.state import Links, chosen, number, numbers
 
 UNTOUCHED = 1e-6

@@ -15,8 +15,8 @@ from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
-from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
+from finlab.research.paper.pipeline import PaperSettings
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")

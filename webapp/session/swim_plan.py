@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import CONTROLLERS, make_controller, steerable_loss
 from finlab.errors import FinlabError
-from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
-from finlab.sim import SHIPPED, Fault, Trajectory, make_trajectory
+from finlab.research.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
+from finlab.swim.control import CONTROLLERS, make_controller, steerable_loss
+from finlab.swim.simulation import SHIPPED, Fault, Trajectory, make_trajectory
 from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(

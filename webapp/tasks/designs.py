@@ -9,12 +9,12 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.deploy.bundle import graph_text, make_bundle
-from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
-from finlab.hull import hull_of
+from finlab.swim.design_files import Opened
+from finlab.swim.hull import hull_of
 from webapp.handles import Presses
 from webapp.session import Session, files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked

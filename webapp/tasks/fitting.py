@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from finlab.actuators.fin.table_law import read_table
 from finlab.actuators.thrust_model import PowerTable
-from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker
 from finlab.layout import Actuator, Fin
+from finlab.swim.design_files import stored_table
 from webapp.session.files import table_folder
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Slot, Work

@@ -10,8 +10,8 @@ import numpy as np
 from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.hull import hull_of
 from finlab.layout import Layout
+from finlab.swim.hull import hull_of
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
 from webapp.session.looking import GOAL_WORDS, SearchRequest
 from webapp.session.state import State

@@ -16,9 +16,9 @@ from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.networks.checkpoint import network_features, resolve_checkpoint
-from finlab.paper.network import NetworkConfig
 from finlab.physics import plant_of
+from finlab.research.networks.checkpoint import network_features, resolve_checkpoint
+from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
 from webapp.markup.words import OWN, fins_words
 from webapp.session.state import DRAWING, State, chosen

@@ -8,9 +8,9 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import FaultMonitor, make_controller
-from finlab.sim import ClosedLoop, RunLog, Tick
-from finlab.sim.log import lies_over, log_of_ticks
+from finlab.swim.control import FaultMonitor, make_controller
+from finlab.swim.simulation import ClosedLoop, RunLog, Tick
+from finlab.swim.simulation.log import lies_over, log_of_ticks
 from webapp.session.swim_plan import Plan
 
 POINTS = 300

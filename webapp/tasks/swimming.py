@@ -8,7 +8,7 @@ from functools import partial
 
 from finlab.errors import FinlabError
 from finlab.layout.damage import Kind
-from finlab.sim import RunLog
+from finlab.swim.simulation import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.context import Context

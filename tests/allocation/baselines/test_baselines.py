@@ -10,10 +10,10 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.linear import PaperSqp, PaperSqpSettings, box_qp
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
-from finlab.networks.trained import Normalization
 from finlab.physics import Plant, plant_of
 from finlab.physics.objective import yardstick
-from finlab.random_layouts import random_layout
+from finlab.research.networks.trained import Normalization
+from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot, normalized_error
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))

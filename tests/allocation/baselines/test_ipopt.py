@@ -11,7 +11,7 @@ from finlab.allocation import Allocator
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
-from finlab.random_layouts import random_layout
+from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
 from tests.mixed_robots import load, random_flow, random_plant, random_robot, within

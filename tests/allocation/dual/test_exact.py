@@ -13,7 +13,7 @@ from finlab.allocation.allocation import CHUNK
 from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
-from finlab.random_layouts import random_layout
+from finlab.research.random_layouts import random_layout
 from tests.allocation.test_levenberg_marquardt import HOSTILE as SIMPLE
 from tests.any_robot import AnyRobot, normalized_error
 

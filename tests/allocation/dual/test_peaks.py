@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.evaluation.splits import make_case
+from finlab.research.evaluation.splits import make_case
 
 
 @pytest.mark.parametrize(("split", "layout", "target"), [("fins-mixed", 5, 6), ("any-shaft", 1, 7)])

@@ -12,7 +12,7 @@ from finlab.allocation import Allocation
 from finlab.allocation.modes import force_sizes, mode_signature, same_signature
 from finlab.layout import Layout
 from finlab.physics import Plant
-from finlab.random_layouts import random_layout
+from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5

@@ -10,10 +10,10 @@ from scipy.optimize import minimize
 
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
-from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, cost_meter
+from finlab.research.evaluation.splits import make_split
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
 from tests.random_fins import KINDS, random_robot

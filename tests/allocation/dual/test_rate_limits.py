@@ -11,10 +11,10 @@ from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.axes import wrapped
 from finlab.errors import CommandError
-from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo, load_layout
 from finlab.physics import Plant
-from finlab.vehicle.fin_motion import LagStep
+from finlab.research.evaluation.method_specs import load_method_spec
+from finlab.swim.vehicle.fin_motion import LagStep
 from tests.any_robot import AnyRobot
 
 TICKS = np.arange(150) * 0.1

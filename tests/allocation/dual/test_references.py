@@ -11,8 +11,8 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.allocation.dual.robot import DualRobot
 from finlab.axes import AXES
-from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
+from finlab.research.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
 from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
 from tests.own_plant import OwnPlant

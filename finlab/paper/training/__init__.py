@@ -1,3 +1,0 @@
-"""Training of the paper's two networks: forward samples, surrogate, allocator; by torch."""
-
-import finlab.training as _  # noqa: F401

@@ -1,0 +1,237 @@
+"""Robots whose jets hit each other and the hull: what answers miss by a plant that no method was told."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from copy import copy
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab.allocation.dual.method import Dual, DualSettings
+from finlab.allocation.policy import CLOSEST
+from finlab.arrays import NEARLY, ROUNDS, Array
+from finlab.fit.interaction.constants import fit_constants
+from finlab.fit.interaction.samples import Samples, left_by_laws
+from finlab.interaction.interaction import Interaction
+from finlab.interaction.jets import Jets
+from finlab.interaction.learned import Learned
+from finlab.layout import Layout
+from finlab.layout.effectiveness import body_force
+from finlab.layout.places import places_of
+from finlab.physics import Plant
+from finlab.physics.objective import yardstick
+from finlab.research.evaluation.document import Column, Row
+from finlab.research.evaluation.experiment import Experiment, progress
+from finlab.research.evaluation.method_specs import own_function
+from finlab.research.interaction.drawn_samples import Judge, drawn, with_jets
+from finlab.research.random_layouts import random_jet_robot, random_shaft_fin
+
+GROUPS = {
+    "unseen robots": ((4, 8), None),
+    "6 to 8 fins": ((6, 8), [random_shaft_fin]),
+    "9 and 10 actuators": ((9, 10), None),
+}
+"""Robots that no training has seen: their actuators, least to most, and kinds."""
+OTHER = Jets(2.2, 2.6, 30.0, 0.75, 0.95, 0.22, 0.12, 0.48)
+"""Constants of the plant where none is given; those of no method."""
+FITTED = 20
+"""Own samples that the formula is fitted to."""
+
+
+def run(
+    plant: str | None = None,
+    robots: int = 20,
+    targets: int = 6,
+    layouts: int = 4000,
+    steps: int = 1800,
+    network: str | None = None,
+    own: tuple[int, ...] = (30, 100, 300, 1000),
+    seed: int = 0,
+) -> Iterator[Row]:
+    """One row for each group of robots and each model of what actuators do to each other.
+
+    Args:
+        plant: judge and teacher, as file.py:function or module:function of a layout and commands (K, n, 3)
+            that gives wrenches (K, 6); the formula of jets with other constants when left out.
+        robots: of each group.
+        targets: on each robot, wrenches of random commands by the plant.
+        layouts: that the networks learn from, 20 samples each with 2 % noise.
+        steps: of the training of the network.
+        network: file of `finlab train interaction` in place of one that is trained now.
+        own: samples of each robot that a ridge regression is given.
+        seed: of all draws.
+    """
+    judge = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
+    with tempfile.TemporaryDirectory() as folder:
+        models = _models(judge, layouts, steps, network, own, seed, Path(folder))
+        for group, (count, kinds) in GROUPS.items():
+            cases = []
+            for k in range(robots):
+                rng = np.random.default_rng([32_000, seed, k])
+                layout = random_jet_robot(rng, f"robot_{k + 1}", count, kinds)
+                wrench = judge(layout, Plant(layout).sample(rng, (targets,)))
+                command = Plant(layout).sample(rng, (max(own, default=0) + 1 or 1,))
+                noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
+                measured = judge(layout, command) + noise * rng.normal(size=(len(command), 6))
+                cases.append((layout, wrench, Samples(layout, command, measured)))
+            for name, model in models.items():
+                yield {"robots": group, "model": name} | _row(judge, model, cases, name)
+
+
+Model = Callable[[Samples], Interaction | None]
+"""From own samples of a robot to what answers are told of it."""
+
+
+def _models(
+    judge: Judge, layouts: int, steps: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
+) -> dict[str, Model]:
+    from finlab.research.interaction.surrogate_form import trained_surrogate
+    from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
+
+    samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
+    if network is None:
+        train(samples, folder, recipe(steps), seed)
+    file = network or str(folder / WEIGHTS_FILE)
+    node = trained_surrogate(samples, seed)
+    models: dict[str, Model] = {
+        "laws alone": lambda _: None,
+        f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
+            places_of(own.layout)
+        ),
+        "network, no own samples": lambda own: Learned(file).of(places_of(own.layout)),
+        "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
+    }
+    for count in own:
+        models[f"ridge, {count} own samples"] = partial(Ridge, count)
+    return models | {"oracle": lambda own: Learned(file).of(places_of(own.layout))}
+
+
+def _some(samples: Samples, count: int) -> Samples:
+    return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
+
+
+def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str) -> Row:
+    each = list[tuple[float, float, float]]()
+    for layout, wrenches, samples in progress(cases, "robot", name):
+        scale = yardstick(layout)
+        method = Dual(layout, DualSettings(), scale)
+        told: Any = model(samples)
+        method.plant = copy(method.plant)
+        method.plant.interaction = told
+        command = method.solve(wrenches, policy=CLOSEST).command
+        if name == "oracle":
+            command = np.array([_exact(judge, method, w, u) for w, u in zip(wrenches, command, strict=True)])
+        missed = (judge(layout, command) - wrenches) / scale
+        force = body_force(method.plant.force(command), layout.frames)
+        deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
+        watts = method.plant.power(command).sum(axis=1)
+        each += zip(*(np.linalg.norm(part, axis=-1) for part in (missed, deviation)), watts, strict=True)
+    error, expected, power = (np.array(column) for column in zip(*each, strict=True))
+    known = float(np.sqrt((expected**2).mean()))
+    return {
+        "n": len(each),
+        "error_mean": float(error.mean()),
+        "error_median": float(np.median(error)),
+        "error_p95": float(np.percentile(error, 95)),
+        "expected_over_true": known / float(np.sqrt((error**2).mean())) if known else None,
+        "power_mean": float(power.mean()),
+    }
+
+
+def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
+    """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton steps."""
+    plant, width = method.plant, np.maximum(method.plant.width, NEARLY)
+    best, least = command, np.inf
+    for _ in range(ROUNDS):
+        steps = 1e-4 * np.eye(command.size).reshape(-1, *command.shape) * width
+        given = judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
+        error = float(np.linalg.norm(given[0] - wrench / method.scale))
+        if error < least:
+            best, least = command, error
+        if error <= NEARLY:
+            break
+        slope = ((given[1:] - given[0]) / 1e-4).T
+        change = np.linalg.lstsq(slope, wrench / method.scale - given[0], rcond=1e-6)[0]
+        command = plant.feasible(command + np.clip(change, -0.2, 0.2).reshape(command.shape) * width)
+    return best
+
+
+class _ByDifferences(Interaction):
+    """An interaction by a function of all forces, with derivatives by differences."""
+
+    def __init__(self, function: Callable[[Array], Array]) -> None:
+        """Takes a function from forces (K, n, 3) [N] to wrenches (K, 6) [N, N m]."""
+        self._function = function
+
+    def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        return self._function(force.reshape(-1, *force.shape[-2:])).reshape(*force.shape[:-2], 6)
+
+    def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        flat = force.reshape(-1, *force.shape[-2:])
+        count, step = flat[0].size, 1e-4
+        moved = flat[:, None] + step * np.eye(count).reshape(count, *flat.shape[1:])
+        here = self._function(flat)
+        slope = (
+            self._function(moved.reshape(-1, *flat.shape[1:])).reshape(len(flat), count, 6) - here[:, None]
+        ) / step
+        return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
+
+    def deviation(self, force: Array) -> Array:
+        return np.zeros((*force.shape[:-2], 6))
+
+
+class Ridge(_ByDifferences):
+    """What the laws leave of own samples, by ridge regression on forces, their sizes and products of these,
+    with the penalty that leaves least of samples left out one by one."""
+
+    def __init__(self, count: int, samples: Samples) -> None:
+        """Takes how many of the samples count, and the samples."""
+        force, left, scale = left_by_laws(_some(samples, count))
+        unit = float(np.abs(force).max())
+
+        def features(force: Array) -> Array:
+            scaled = force / unit
+            size = np.linalg.norm(scaled, axis=-1)
+            flat = scaled.reshape(len(force), -1)
+            pairs = flat[:, :, None] * size[:, None, :]
+            return np.concatenate(
+                [np.ones((len(force), 1)), flat, size, pairs.reshape(len(force), -1)], axis=1
+            )
+
+        known = features(force)
+        left_u, values, right = np.linalg.svd(known, full_matrices=False)
+        best, weights = np.inf, np.zeros((known.shape[1], 6))
+        for penalty in np.geomspace(1e-4, 10.0, 12) * values[0]:
+            kept = values**2 / (values**2 + penalty**2)
+            leverage = np.minimum(((left_u**2) * kept).sum(axis=1), 0.999)
+            alone = (left - (left_u * kept) @ (left_u.T @ left)) / (1.0 - leverage)[:, None]
+            if (alone**2).sum() < best:
+                best = float((alone**2).sum())
+                weights = right.T @ ((values / (values**2 + penalty**2))[:, None] * (left_u.T @ left))
+        super().__init__(lambda force: features(force) @ weights * scale)
+
+
+experiment = Experiment(
+    name="interaction",
+    question="Where jets hit each other and the hull: what do answers miss that know the laws alone, a "
+    "formula, a network, or the robot's own samples?",
+    columns=(
+        Column("robots", "robots", "text"),
+        Column("model", "told", "text"),
+        Column("n", "targets", "count"),
+        Column("error_mean", "error, mean", "error"),
+        Column("error_median", "median", "error"),
+        Column("error_p95", "95 %", "error"),
+        Column("expected_over_true", "expected / true", "three"),
+        Column("power_mean", "power [W]", "three"),
+    ),
+    run=run,
+    note=(
+        "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets are wrenches "
+        "of random commands by the plant. The oracle goes on from the network's answer by the plant itself."
+    ),
+    quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
+    full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},
+)

@@ -1,0 +1,84 @@
+"""`finlab eval report`: run experiments and write one page and all rows."""
+
+import json
+import platform
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import scipy
+from threadpoolctl import threadpool_limits
+
+import finlab
+from finlab.errors import DataError
+from finlab.research.evaluation.document import Block, Row, to_markdown
+from finlab.research.evaluation.experiment import EXPERIMENTS, check_names, load_experiment, progress
+from finlab.whole_file import make_folder, write_whole
+
+PAGE, TABLES = "report.md", "tables.json"  # what a report's folder holds
+SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
+ABOUT = (
+    "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
+    "learned one fin law from samples, were given these, so errors show how well methods solve, not how "
+    "well a model fits a fin in the water. No robot swam and no fin was measured for this report: fin laws "
+    "are means over a cycle in still water, bodies, water and sensors are simulated. Methods and "
+    f"controllers were developed on other seeds than {SEED}."
+)
+Size = Literal["quick", "full"]
+
+
+def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)) -> Path:
+    """Make the report. Page and rows are written after each experiment, so that they are there if it is
+    stopped; each runs on one thread, so that times are of one core. Returns the page in the folder `out`,
+    which is made if need be. Raises DataError: an unknown name of an experiment, or a file that cannot be
+    written."""
+    check_names("sections", names, ("all", *EXPERIMENTS))
+    make_folder(out)
+    chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
+    start, rows, blocks = time.process_time(), dict[str, list[Row]](), list[Block]()
+    commit = _commit()
+    command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
+    command += "" if "all" in names else f" --sections {','.join(chosen)}"
+    command += f" --seed {seed}" if seed != SEED else ""
+    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
+    head = ["# finlab evaluation", f"Allocation methods and simulated swims, side by side.{note}", ABOUT]
+    for name in progress(chosen, "experiment", "report"):
+        experiment = load_experiment(name)
+        options = dict(experiment.quick if size == "quick" else experiment.full)
+        options |= {"seed": seed} if "seed" in experiment.options() else {}
+        with threadpool_limits(1):
+            rows[name] = experiment.rows(**options)
+        blocks += [*experiment.words(), *experiment.results(rows[name])]
+        blocks.append(f"Made by `{experiment.command(options)}` at {commit}.")
+        minutes = (time.process_time() - start) / 60.0
+        made = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
+        write_whole(out / PAGE, to_markdown(*head, *blocks, *_end(made)), DataError)
+        write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
+    return out / PAGE
+
+
+def _commit() -> str:
+    """The commit of the source tree, and whether it was changed since; of an installation the version."""
+    version = f"version {finlab.__version__}"
+    tree = Path(finlab.__file__).parents[1]
+    if not (tree / ".git").exists():
+        return version
+    describe = ["describe", "--always", "--abbrev=12", "--exclude=*"]
+    line = ["git", "-C", str(tree), *describe, "--dirty= and changes"]
+    described = subprocess.run(line, capture_output=True, text=True)
+    return version if described.returncode else f"commit {described.stdout.strip()}"
+
+
+def _end(made: str) -> list[str]:
+    versions = {"finlab": finlab, "numpy": np, "scipy": scipy}
+    lines = [
+        made,
+        f"On {platform.machine()}, python {platform.python_version()}, "
+        + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
+        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent "
+        "actuation allocator for fin-actuated marine robots",
+    ]
+    return ["## How this was made", "\n".join(f"- {line}" for line in lines)]

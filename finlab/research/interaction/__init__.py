@@ -1,0 +1,1 @@
+"""Networks that learn what actuators do to each other: drawn samples and training. They need torch."""

@@ -1,0 +1,227 @@
+"""The teacher: descents from many random forces, the ways they find to deliver a target, and their files."""
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from finlab.arrays import AnyArray, Array
+from finlab.errors import DataError
+from finlab.physics.objective import yardstick
+from finlab.physics.plant import Plant
+from finlab.research.mdn.answers import LAST, EffortRobot, distinct, effort_robot
+from finlab.research.mdn.descent import EffortProblem, descend, realize, wrench
+from finlab.research.mdn.features import VECTORS, features
+from finlab.research.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
+from finlab.whole_file import write_whole
+
+STARTS = 32
+"""Random forces from which each target is tried."""
+STEPS = 35
+"""Quadratic problems solved from every start."""
+MODES = 8
+"""Most ways that are distinguished."""
+APART = 0.08
+"""Mean difference over the fins, in roots of shares, from which two answers are two ways."""
+DEAREST = 1.2
+"""Cost over the cheapest one's up to which an answer is worth telling."""
+EXACT = 0.01
+"""Largest residual beside the target or, for small ones, a hundredth of what all fins can give."""
+
+
+@dataclass(frozen=True)
+class AnswerSettings:
+    """What the teacher answers: files of random targets on random robots."""
+
+    files: int = 48
+    """Files, the first of which is held out."""
+    fins: int = 18
+    """Random fins per file with nominal limits, and as many with limits of their own."""
+    robots: int = 240
+    """Robots per file that are made of them."""
+    targets: int = 48
+    """Targets for each robot."""
+    sharpness: float = 0.03
+    """By how much dearer a way may be, as a share of the cost, for its weight to fall to a third."""
+
+
+class Ways(NamedTuple):
+    """Up to L ways to deliver each of N targets with n fins, cheapest first."""
+
+    force: AnyArray
+    """Planar forces (N, L, n) [N], complex."""
+    cost: Array
+    """Their costs (N, L); infinite where there are no more ways."""
+
+
+def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
+    """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES` ways
+    each."""
+    rows, maximum = len(target), problem.fins.maximum
+    n = len(maximum)
+    # A start's small forces are as good as at rest, so few or many fins work.
+    size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
+    start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
+    each = np.repeat(target, STARTS, axis=0)
+    *_, reached = descend(problem, each, start, STEPS)
+    _, cost = realize(problem, reached)
+    strength = np.linalg.norm(np.repeat(maximum, 2)[:, None] * problem.effectiveness)
+    allowed = EXACT * np.minimum(np.linalg.norm(each, axis=1) + 1e-2 * strength, strength)
+    missed = np.linalg.norm(each - wrench(problem, reached.force), axis=1)
+    cost = np.where(missed <= allowed, cost, np.inf).reshape(rows, STARTS)
+    force = reached.force.reshape(rows, STARTS, n)
+    cost = np.where(cost > DEAREST * cost.min(1, keepdims=True), np.inf, cost)
+    chosen, rank = distinct(cost, root_share(force, maximum), MODES, APART)
+    return Ways(force[np.arange(rows)[:, None], chosen], np.where(rank < LAST, rank, np.inf))
+
+
+def root_share(force: AnyArray, largest: Array) -> AnyArray:
+    """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count, too."""
+    share = force / largest
+    return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
+
+
+def shares_of_ways(ways: Ways, sharpness: float) -> Array:
+    """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness best))."""
+    best = ways.cost[:, :1]
+    with np.errstate(invalid="ignore"):
+        weight = np.exp(-(ways.cost / np.maximum(best, 1e-12) - 1.0) / sharpness)
+    weight = np.where(np.isfinite(ways.cost), weight, 0.0)
+    return np.asarray(weight / np.maximum(weight.sum(1, keepdims=True), 1e-12))
+
+
+DATA_SEED = 130_000
+"""Leads the seed of every file; no evaluation's seed begins like this."""
+LEAST_WEIGHT = 1e-3
+"""Weight below which a way is not learned from."""
+IDS = slice(17, 19)
+"""Where among the static features the numbers are that tell equal fins apart."""
+MIRRORED = [place + 1 for place in VECTORS]
+"""Vertical parts of the vectors among the static features."""
+
+
+def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int) -> Path:
+    """Make file `number` unless it is there; it depends on the seed and its number alone."""
+    path = folder / f"answers-{number:04d}.npz"
+    if path.exists():
+        return path
+    rng = np.random.default_rng([DATA_SEED, seed, number])
+    kinds = random_kinds(rng, settings.fins)
+    counts, often = np.array(list(FIN_COUNTS)), np.array(list(FIN_COUNTS.values()), float)
+    groups: dict[int, list[dict[str, Array]]] = {}
+    for _ in range(settings.robots):
+        n = int(rng.choice(counts, p=often / often.sum()))
+        layout = random_fin_robot(rng, kinds, n)
+        robot = effort_robot(Plant(layout), yardstick(layout))
+        groups.setdefault(n, []).append(_answers(rng, robot, settings))
+    arrays = {
+        f"{n}.{name}": np.stack([robot[name] for robot in robots])
+        for n, robots in groups.items()
+        for name in robots[0]
+    }
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, **arrays)
+    write_whole(path, content.getvalue(), DataError)
+    return path
+
+
+def _answers(rng: np.random.Generator, robot: EffortRobot, settings: AnswerSettings) -> dict[str, Array]:
+    """One robot, its targets and the ways to deliver them, as the network sees them."""
+    target, view = random_targets(rng, robot, settings.targets), robot.view
+    ways = ways_to_deliver(rng, robot.forces, target)
+    return {
+        "static": view.static.astype(np.float32),
+        "blocks": view.blocks.astype(np.complex64),
+        "asked": (target @ view.solver).astype(np.complex64),
+        "way": root_share(ways.force, view.largest).astype(np.complex64),
+        "weight": shares_of_ways(ways, settings.sharpness).astype(np.float32),
+    }
+
+
+def read_answers(path: Path) -> dict[int, dict[str, Array]]:
+    """The arrays of a file by number of fins; robots (R, ...), targets (R, T, ...), ways (R, T, L, n)."""
+    groups: dict[int, dict[str, Array]] = {}
+    with np.load(path, allow_pickle=False) as file:
+        for key in file.files:
+            n, name = key.split(".")
+            groups.setdefault(int(n), {})[name] = file[key]
+    return groups
+
+
+class Batch(NamedTuple):
+    """B targets, each on a robot of n fins, with up to L ways to deliver it."""
+
+    nodes: Tensor
+    """(B, n, 26)."""
+    pairs: Tensor
+    """(B, n, n, 4)."""
+    way: Tensor
+    """Forces as roots of shares, in the frames of the features (B, L, n, 2)."""
+    weight: Tensor
+    """Of the ways (B, L); they add up to 1."""
+
+
+class Answers:
+    """All robots, targets and ways of some files, in memory; batches are drawn from them."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        parts: dict[int, list[dict[str, AnyArray]]] = {}
+        for path in paths:
+            for n, arrays in read_answers(path).items():
+                parts.setdefault(n, []).append(arrays)
+        self._groups: dict[int, dict[str, AnyArray]] = {}
+        for n, some in parts.items():
+            joined = {name: np.concatenate([part[name] for part in some]) for name in some[0]}
+            robot, target = np.nonzero(joined["weight"].sum(-1) > 0.5)
+            flat = {name: joined[name][robot, target] for name in ("asked", "way", "weight")}
+            self._groups[n] = {**joined, **flat, "robot": robot}
+
+    def __len__(self) -> int:
+        """Number of targets."""
+        return sum(len(group["asked"]) for group in self._groups.values())
+
+    def draw(self, rng: np.random.Generator, size: int) -> Batch:
+        """A random batch; robots are seen as they are or as their mirror image, with fins in any order."""
+        counts = np.array([len(group["asked"]) for group in self._groups.values()])
+        n = list(self._groups)[int(rng.choice(len(counts), p=counts / counts.sum()))]
+        group = self._groups[n]
+        row = rng.integers(len(group["asked"]), size=size)
+        robot = group["robot"][row]
+        static, (a, b) = group["static"][robot], np.moveaxis(group["blocks"][robot], 1, 0)
+        wanted, way, weight = (group[name][row] for name in ("asked", "way", "weight"))
+        order = rng.random((size, n)).argsort(axis=1)
+        static[..., IDS] = np.take_along_axis(static[..., IDS], order[..., None], axis=1)
+        mirrored = rng.random(size) < 0.5
+        a, b, wanted, way = (_mirrored(values, mirrored) for values in (a, b, wanted, way))
+        static[:, :, MIRRORED] *= np.where(mirrored, -1.0, 1.0)[:, None, None].astype(np.float32)
+        seen = features(wanted, static, a, b)
+        way = way * seen.frame.conj()[:, None]
+        parts = np.stack([way.real, way.imag], axis=-1)
+        weight = np.where(weight < LEAST_WEIGHT, 0.0, weight)
+        arrays = (seen.nodes, seen.pairs, parts, weight / weight.sum(1, keepdims=True))
+        return Batch(*(torch.from_numpy(np.asarray(part, dtype=np.float32)) for part in arrays))
+
+
+def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:
+    """Complex values (B, ...), conjugate where `rows` (B,) is true."""
+    return np.where(rows.reshape(-1, *(1,) * (values.ndim - 1)), values.conj(), values)
+
+
+def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> Array:
+    """Normalized targets (count, 6): half are wrenches of uniform commands, a quarter of commands where some
+    fins rest, a quarter one to three axes together, as far as no fin gives more than its largest force."""
+    plant, quarter = robot.plant, count // 4
+    command = plant.sample(rng, (count - quarter,))
+    rests = rng.random((quarter, plant.n_fins)) > rng.uniform(0.3, 1.0, (quarter, 1))
+    command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])
+    full = robot.forces.effectiveness * np.repeat(robot.view.largest, 2)[:, None]
+    axes = rng.random((quarter, 6)).argsort(axis=1) < rng.integers(1, 4, (quarter, 1))
+    wanted = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
+    share = wanted @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
+    largest = np.hypot(share[:, 0::2], share[:, 1::2]).max(1, keepdims=True)
+    share *= rng.uniform(0.03, 0.9, (quarter, 1)) / np.maximum(largest, 1e-9)
+    return np.concatenate([robot.commands.wrench(command), share @ full])

@@ -1,0 +1,141 @@
+"""The paper's network: node features and a target wrench in, a mixture over each fin's commands out.
+
+GATv2 layers (Brody, Alon, Yahav, ICLR 2022) on complete graphs of fins, then Transformer layers, then a
+mixture of diagonal Gaussians per fin. Graphs are small and complete, so that a dense form with a mask serves
+in place of lists of edges. Commands are in coordinates in which every range of limits is [-1, 1].
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from finlab.arrays import Values, library_of
+from finlab.layout.graph_file import POSITION_SCALE, SCALES
+from finlab.research.networks import layers
+from finlab.research.networks.layers import Weights
+from finlab.research.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
+
+RAW_SIZE = 10
+"""Number of node features (paper: x_i in R^10)."""
+
+
+def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
+    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3), scaled."""
+    xp = library_of(position)
+    limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
+    angle = mounting_angle[..., None] / math.pi
+    return xp.concatenate([position / POSITION_SCALE, angle, xp.stack(limits, axis=-1)], axis=-1)
+
+
+LOG_STD_BOUND = 3.0
+"""Largest size of the components' log standard deviation (paper, implementation details)."""
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """The paper's network: its sizes, the arrays that follow from them, and what it gives with these."""
+
+    features: ClassVar[str] = "raw"
+    joint: ClassVar[bool] = False
+    """Whether one component is chosen for all fins together."""
+    shipped: ClassVar[str] = "paper"
+    width: int = 128
+    heads: int = 4
+    graph_layers: int = 2
+    transformer_layers: int = 3
+    feedforward: int = 512
+    """Hidden width of the Transformer's feed-forward blocks; not printed."""
+    n_components: int = 8
+    """Number M of mixture components."""
+
+    def shapes(self) -> Shapes:
+        """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
+        check_sizes(*vars(self).values(), heads=(self.width, self.heads))
+        width, m = self.width, self.n_components
+        shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)
+        shapes |= linear_shapes("join", 2 * width, width)
+        for name in self._named("graph", self.graph_layers):
+            shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
+            shapes |= linear_shapes(f"{name}.source", width, width)
+            shapes |= linear_shapes(f"{name}.target", width, width)
+        for name in self._named("transformer.layers", self.transformer_layers):
+            look = f"{name}.self_attn"
+            shapes |= {f"{look}.in_proj_weight": (3 * width, width), f"{look}.in_proj_bias": (3 * width,)}
+            shapes |= linear_shapes(f"{look}.out_proj", width, width)
+            shapes |= linear_shapes(f"{name}.linear1", width, self.feedforward)
+            shapes |= linear_shapes(f"{name}.linear2", self.feedforward, width)
+            shapes |= norm_shapes(f"{name}.norm1", width) | norm_shapes(f"{name}.norm2", width)
+        return (
+            shapes
+            | norm_shapes("norm", width)
+            | linear_shapes("head", width, 6 * m)
+            | linear_shapes("weight", width, m)
+        )
+
+    def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
+        """The mixtures that a network with these weights gives for node features (B, n, 10) and normalized,
+        centred targets (B, 6). Where robots have fewer than n fins, `mask` (B, n) is the padding mask, True
+        where there is one: GATv2's edges keep to these, and so do the keys of self-attention."""
+        return self.mixture(w, self.encoded(w, x, target, mask))
+
+    def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:
+        """What the encoding phase makes of them: features (B, n, width) of each fin."""
+        xp = library_of(x)
+        hidden = layers.linear(w, "enter", x)
+        for name in self._named("graph", self.graph_layers):
+            hidden = hidden + layers.elu(layers.graph_attention(w, name, hidden, mask=mask))
+        wrench = layers.linear(w, "wrench", target)[:, None]
+        wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
+        hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
+        for name in self._named("transformer.layers", self.transformer_layers):
+            seen = layers.layer_norm(w, f"{name}.norm1", hidden)
+            hidden = hidden + layers.self_attention(w, f"{name}.self_attn", self.heads, seen, mask)
+            seen = layers.layer_norm(w, f"{name}.norm2", hidden)
+            hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", seen)
+        return layers.layer_norm(w, "norm", hidden)
+
+    def mixture(self, w: Weights, hidden: Values) -> "Mixture":
+        """The mixtures of fins with features (B, n, width)."""
+        raw, logits = (layers.linear(w, end, hidden) for end in ("head", "weight"))
+        raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
+        return Mixture(logits, raw[..., :3], LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:]))
+
+    @staticmethod
+    def _named(kind: str, count: int) -> list[str]:
+        return [f"{kind}.{i}" for i in range(count)]
+
+
+class Mixture(NamedTuple):
+    """Mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets: Eq. 2."""
+
+    logits: Values
+    """Unnormalized log weights (B, n, M)."""
+    mean: Values
+    """Means (B, n, M, 3)."""
+    log_std: Values
+    """Log standard deviations (B, n, M, 3)."""
+
+    def expected(self) -> Values:
+        """Mean command (B, n, 3) of the whole mixture."""
+        return (layers.softmax(self.logits)[..., None] * self.mean).sum(2)
+
+    def log_prob(self, x: Values) -> Values:
+        """Log likelihoods (B, K, n) of commands (B, K, n, 3); zero directions are numbers as in the paper,
+        no angles."""
+        xp = library_of(x)
+        deviation = (x[:, :, :, None] - self.mean[:, None]) * xp.exp(-self.log_std)[:, None]
+        log_normal = -(0.5 * deviation * deviation + self.log_std[:, None]).sum(-1)
+        log_weight = layers.log_softmax(self.logits)[:, None] - 1.5 * math.log(2.0 * math.pi)
+        return layers.log_sum_exp(log_weight + log_normal)
+
+    def sample(self, uniform: Values, normal: Values, temperature: float = 1.0) -> Values:
+        """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the power 1/T, the
+        Gaussians keep their deviations (Eq. 3).
+
+        Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the rest.
+        """
+        weight = layers.softmax(layers.log_softmax(self.logits) * (1.0 / max(temperature, 1e-6)))
+        cumulative = weight.cumsum(-1)[..., None, :-1]
+        choice = (uniform[..., None] > cumulative).sum(-1)[..., None]
+        mean, log_std = (layers.take(part, choice, 2) for part in (self.mean, self.log_std))
+        return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)

@@ -1,0 +1,141 @@
+"""Named recipes: `paper` (the printed numbers, our choices elsewhere), `short` (20 minutes on two cores) and
+`smoke` (seconds); and the model card of what they make."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from finlab.errors import DataError
+from finlab.research.networks.trained import TrainedWeights
+from finlab.research.paper.network import NetworkConfig
+from finlab.research.paper.surrogate import SurrogateConfig
+from finlab.research.paper.training.samples import DataSettings
+from finlab.research.training.loop import LoopSettings
+from finlab.whole_file import write_whole
+
+
+@dataclass(frozen=True)
+class PaperLoop(LoopSettings):
+    """How one of the two networks is trained."""
+
+    one_layout: bool = False
+    """Whether a step sees commands of one random layout, as printed of the surrogate, or of many."""
+
+
+@dataclass(frozen=True)
+class AllocatorTraining(PaperLoop):
+    """How the network is trained: L = L_imit + beta L_guide + lambda L_ent (Eq. 7)."""
+
+    guidance: float = 1000.0
+    """Final weight beta; not printed."""
+    guidance_start: float = 0.01
+    """Weight beta at the first step; not printed."""
+    ramp: float = 0.5
+    """Share of the steps over which beta grows linearly; not printed."""
+    entropy: float = 0.01
+    """Weight lambda; not printed."""
+
+    def beta(self, step: int) -> float:
+        """Weight beta of the guidance in a step: it rises linearly over `ramp`, then stays."""
+        ramp = min(1.0, step / max(1.0, self.ramp * self.steps))
+        return self.guidance_start + ramp * (self.guidance - self.guidance_start)
+
+
+@dataclass(frozen=True)
+class PaperRecipe:
+    """The paper's two networks, and what they learn from."""
+
+    data: DataSettings
+    surrogate_training: PaperLoop
+    allocator_training: AllocatorTraining
+    surrogate: SurrogateConfig = field(default_factory=SurrogateConfig)
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+
+
+RECIPES = {
+    "paper": PaperRecipe(
+        DataSettings(),
+        PaperLoop(115_000, 4096, 1e-3, warmup=100, ema=0.99, one_layout=True),
+        AllocatorTraining(115 * (5_000_000 // 16_384), 16_384, 1e-4, cosine=False),  # 115 epochs
+    ),
+    "short": PaperRecipe(
+        DataSettings(20_000, 200),
+        # Many small steps and a third hidden layer learn more in the same time than few large ones.
+        PaperLoop(48_000, 256, 2e-3, warmup=100, ema=0.99),
+        # With a guidance of 10 and twice the rate, narrow components made a run diverge half-way.
+        AllocatorTraining(8_000, 256, 5e-4, warmup=100, ema=0.99, guidance=3.0),
+        SurrogateConfig(hidden=(512, 64, 64)),
+    ),
+    "smoke": PaperRecipe(
+        DataSettings(200, 200),
+        PaperLoop(3000, 256, 3e-3, warmup=20, ema=0.9),
+        AllocatorTraining(150, 128, 2e-3, warmup=10, ema=0.9, guidance=1.0),
+        SurrogateConfig(hidden=(64, 32, 32)),
+        NetworkConfig(
+            width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=64, n_components=4
+        ),
+    ),
+}
+"""Name -> recipe of `finlab train surrogate` and `finlab train allocator`."""
+
+
+def recipe(preset: str) -> PaperRecipe:
+    """A recipe by its name. Raises DataError: there is none of that name."""
+    if preset not in RECIPES:
+        raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r:.40}")
+    return RECIPES[preset]
+
+
+CARD_FILE = "README.md"
+PRINTED = {
+    "surrogate data layouts": "1000",
+    "surrogate data commands": "5000",
+    "surrogate training one layout": "True",
+    "allocator data layouts": "1000",
+    "allocator data commands": "5000",
+    "allocator training batch size": "16384",
+    "allocator training learning rate": "0.0001, as it is",
+    "allocator training guidance": "from a small weight to a final one",
+    "allocator samples": "575 million (115 epochs)",
+    "network width": "128",
+    "network heads": "4",
+    "network graph layers": "2",
+    "network transformer layers": "3",
+    "network n components": "8",
+    "surrogate sizes hidden": "512",
+}
+"""What the paper prints of the numbers below; of the others nothing."""
+CHOICES = """
+Choices that the paper leaves open, in the surrogate: further hidden layers, SiLU between layers, outputs in
+units of 4 N, wide first weights, tanh in the pooled descriptor. In the network: residual connections around
+GATv2, a linear layer from node and wrench to the Transformer's width, normalization before each block, log
+sigma through a tanh. In training: one sample per target in the guidance, whose gradient passes the clamp and
+does not reach the mixture's weights; entropy as the mean over fins; gradients clipped at norm 1; matrix
+products in bfloat16 where the device is faster with it. Of inference: see `PaperSettings`.
+
+`log.csv` and `curves.png` show the training; `config.json` holds the same numbers.
+"""
+
+
+def write_card(folder: Path, weights: TrainedWeights) -> None:
+    """Write the model card of a checkpoint of the paper's kind. Raises DataError: it cannot be written."""
+    parts = [*weights.training.items(), ("network", weights.network_sizes)]
+    parts += [("surrogate sizes", weights.surrogate_sizes), *weights.metrics.items()]
+    rows = [row for name, part in parts for row in _rows(name, part)]
+    table = "\n".join(f"| {name} | {PRINTED.get(name, '')} | {value} |" for name, value in rows)
+    what = "Surrogate" if weights.network_sizes is None else "Network and surrogate"
+    text = (
+        f"# Model card: `{weights.name}`\n\n{what} of method `paper`, preset `{weights.preset}`.\n"
+        f"Weights: SHA-256 {weights.sha256}.\n\n| | printed | done |\n|---|---|---|\n{table}\n{CHOICES}"
+    )
+    write_whole(folder / CARD_FILE, text, DataError)
+
+
+def _rows(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Each number below a name, with its path."""
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _rows(f"{name} {key}".replace("_", " "), part)
+    elif value is not None:
+        yield name, value

@@ -1,0 +1,227 @@
+"""The paper's data set (data generation): random layouts, uniform commands, and the wrenches they cause.
+
+This is all the knowledge of physics that training needs: no inverse is ever solved for. A set is a folder of
+parts and a `data.json` that says how it was drawn and holds the wrenches' mean and standard deviation.
+"""
+
+import io
+import json
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from finlab.arrays import AnyArray
+from finlab.errors import DataError
+from finlab.files import parse_json
+from finlab.files.guarded import decoded, read_file
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics import Plant
+from finlab.research.executor import cores, map_parts
+from finlab.research.networks.trained import Normalization
+from finlab.research.random_layouts import TRAINING_FINS, random_layout
+from finlab.research.training.loop import seeded_generator
+from finlab.whole_file import make_folder, sweep_parts, write_whole
+
+DATA_SEED = 20_000
+"""Leads the seed of every layout; no evaluation's seed begins like this."""
+N_FINS = TRAINING_FINS[1]
+"""Fins that every robot is padded to."""
+PART = 250_000
+"""Samples of a part."""
+LEAST_STD = 1e-6
+"""Least standard deviation of an axis (paper: std floor)."""
+DATA_FILE = "data.json"
+FORMAT, VERSION = "finlab-data", 1
+ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
+"""Arrays of a part that each layout has once."""
+FIELDS = (*ROBOT, "command", "wrench")
+"""All arrays of a part, layouts first; see `Batch`."""
+
+
+@dataclass(frozen=True)
+class DataSettings:
+    """How a data set is drawn."""
+
+    layouts: int = 1000
+    commands: int = 5000
+    """Commands on each layout."""
+    seed: int = 0
+    varied_limits: float = 0.5
+    """Share of the layouts whose fins have limits of their own; not printed."""
+    fin_model: FinModelSpec = FinModelSpec()
+    """Fin model that causes the wrenches."""
+
+    @property
+    def together(self) -> int:
+        """Layouts of a part."""
+        return max(1, PART // self.commands)
+
+    def as_values(self) -> dict[str, Any]:
+        """The settings as in `data.json`."""
+        model = {"type": self.fin_model.type, **dict(self.fin_model.parameters)}
+        return asdict(replace(self, fin_model=FinModelSpec())) | {"fin_model": model}
+
+
+def generate(folder: Path, settings: DataSettings) -> None:
+    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay. Raises
+    DataError: the folder holds a set that was drawn otherwise, or a file cannot be written."""
+    make_folder(folder)
+    sweep_parts(folder)
+    if (folder / DATA_FILE).exists() and about(folder)["settings"] != settings.as_values():
+        raise DataError(f"{folder}: holds a data set that was drawn otherwise; take an empty folder")
+    _write_about(folder, settings, None)
+    count = -(-settings.layouts // settings.together)
+    missing = [number for number in range(count) if not part_file(folder, number).exists()]
+    drawn = map_parts(partial(drawn_part, settings), missing, "data", jobs=cores())
+    for number, content in zip(missing, drawn, strict=True):
+        write_whole(part_file(folder, number), content, DataError)
+    rows = (read_part(part_file(folder, k))["wrench"].reshape(-1, 6).astype(np.float64) for k in range(count))
+    sums = [(wrench.sum(0), (wrench**2).sum(0)) for wrench in rows]
+    total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
+    deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
+    _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
+
+
+def drawn_part(settings: DataSettings, number: int) -> bytes:
+    """The content of the file of part `number`: the arrays `FIELDS` as npz."""
+    first = number * settings.together
+    some = range(first, min(first + settings.together, settings.layouts))
+    robots = [samples_of(settings, k) for k in some]
+    content = io.BytesIO()
+    arrays = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+    np.savez(content, allow_pickle=False, **arrays)
+    return content.getvalue()
+
+
+def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
+    """One layout padded with zeros, and its commands; they depend on the seed and the number alone."""
+    rng = np.random.default_rng([DATA_SEED, settings.seed, number])
+    varied = rng.random() < settings.varied_limits
+    layout = random_layout(rng, limits="varied" if varied else "nominal")
+    layout = Layout(layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins))
+    plant = Plant(layout)
+    command = plant.sample(rng, (settings.commands,))
+    more = N_FINS - layout.n
+
+    def padded(values: AnyArray, axis: int = 0) -> AnyArray:
+        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(np.float32)
+
+    return {
+        **{name: padded(getattr(layout, name)) for name in ROBOT[:-1]},
+        "mask": np.arange(N_FINS) < layout.n,
+        "command": padded(command, 1),
+        "wrench": plant.wrench(command).astype(np.float32),
+    }
+
+
+def part_file(folder: Path, number: int) -> Path:
+    """Where part `number` lies in the folder of a data set."""
+    return folder / f"part-{number:05d}.npz"
+
+
+def read_part(path: Path) -> dict[str, AnyArray]:
+    """The arrays of a part by name, R layouts, then commands (R, C, n, 3) and wrenches (R, C, 6) [N, N m].
+
+    Raises DataError: it is missing or damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in FIELDS}
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        raise DataError(f"{path}: no part of a data set ({error}); remove it and generate again") from error
+
+
+def about(folder: Path) -> dict[str, Any]:
+    """What `data.json` says: settings and normalization. Raises DataError: there is none."""
+    path = folder / DATA_FILE
+    text = decoded(read_file(path, 1_000_000, "a data set's file", DataError), str(path), "JSON", DataError)
+    about = parse_json(text, str(path), DataError)
+    if not isinstance(about, dict) or (about.get("format"), about.get("version")) != (FORMAT, VERSION):
+        raise DataError(f"{path}: not a finlab data set (expected format {FORMAT!r}, version {VERSION})")
+    return about
+
+
+def _write_about(folder: Path, settings: DataSettings, normalization: Normalization | None) -> None:
+    values = normalization and {name: part.tolist() for name, part in normalization._asdict().items()}
+    about = {"format": FORMAT, "version": VERSION, "settings": settings.as_values(), "normalization": values}
+    write_whole(folder / DATA_FILE, json.dumps(about, indent=2) + "\n", DataError)
+
+
+class Batch(NamedTuple):
+    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all zeros."""
+
+    position: Tensor
+    """(B, n, 3), body frame [m]."""
+    mounting_angle: Tensor
+    """(B, n) [rad]."""
+    lower: Tensor
+    """(B, n, 3) [rad, Hz, rad]."""
+    upper: Tensor
+    """(B, n, 3) [rad, Hz, rad]."""
+    mask: Tensor
+    """(B, n) bool, True where there is a fin."""
+    command: Tensor
+    """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
+    wrench: Tensor
+    """(B, 6) that the command causes [N, N m]."""
+
+
+class DataSet:
+    """A data set in the memory of a device, and its batches."""
+
+    def __init__(self, folder: Path, device: torch.device) -> None:
+        """Read a data set. Raises DataError: it is missing, unfinished or damaged."""
+        said = about(folder)
+        try:
+            self.settings: dict[str, Any] = said["settings"]
+            """As in `data.json`."""
+            self.layouts, self.commands = (int(self.settings[name]) for name in ("layouts", "commands"))
+            self.normalization = Normalization.parse(said["normalization"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(f"{folder}: an unfinished data set; run `finlab data generate` again") from error
+        count = -(-self.layouts // DataSettings(commands=self.commands).together)
+        parts = [read_part(part_file(folder, k)) for k in range(count)]
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
+        if joined["wrench"].shape != (self.layouts, self.commands, 6):
+            raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
+        self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
+        self._device, self._epoch = device, -1
+        self._order = torch.empty(0)
+
+    def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
+        """Some rows of batch number `step` of `size` samples, a function of step and seed: random commands
+        of one layout (paper, surrogate pretraining), a new one in each step, or of all, reordered in each
+        epoch. Raises DataError: there are fewer samples than a batch has."""
+        count = self.layouts if one_layout else self.layouts * self.commands
+        if not one_layout and size > count:
+            raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")
+        epoch, place = divmod(step, count if one_layout else count // size)
+        if epoch != self._epoch:
+            draw = seeded_generator(seed, epoch, self._device)
+            self._epoch, self._order = epoch, torch.randperm(count, generator=draw, device=self._device)
+        if one_layout:
+            draw = seeded_generator(seed, 1_000_000 + step, self._device)
+            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[rows]
+            layout = self._order[place].expand(len(command))
+        else:
+            chosen = self._order[place * size : (place + 1) * size][rows]
+            layout, command = chosen // self.commands, chosen % self.commands
+        *robots, commands, wrench = self._parts
+        mixed = commands[layout, command], wrench[layout, command]
+        return Batch._make([*(part[layout] for part in robots), *mixed])
+
+
+@lru_cache(maxsize=1)
+def fresh_batch(settings: DataSettings) -> Batch:
+    """All samples of a data set, in memory alone."""
+    robots = [samples_of(settings, k) for k in range(settings.layouts)]
+    times = [len(robot["wrench"]) for robot in robots]
+    joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+    once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
+    flat = {name: np.concatenate(joined[name]) for name in FIELDS[5:]}
+    return Batch(*(torch.from_numpy(part) for part in (once | flat).values()))

@@ -1,0 +1,186 @@
+"""`finlab train surrogate` and `finlab train allocator`: the physics surrogate is trained first and on its
+own, then the network with the surrogate frozen."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from finlab.errors import DataError
+from finlab.layout import FinModelSpec
+from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint, write_checkpoint
+from finlab.research.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.research.paper.surrogate import SurrogateConfig
+from finlab.research.paper.training import modules
+from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
+from finlab.research.paper.training.samples import N_FINS, Batch, DataSet, DataSettings, fresh_batch, generate
+from finlab.research.training.device import Workplace, workplace
+from finlab.research.training.loop import Terms, Training, Weights, first_weights, seeded_generator
+
+NOISE_SEED = 1_000_000
+"""Added to the seed of the noise, so that it is unrelated to the order of the data."""
+JUDGES = DataSettings(layouts=500, commands=20, seed=7_000)
+"""Samples that no training sees, from which the error of a surrogate is measured."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What both trainings have to know, beside the recipe."""
+
+    preset: str
+    """One of `RECIPES`."""
+    output: Path
+    """Folder for checkpoint, model card, log, curves and state, made if need be."""
+    data: Path | None = None
+    """Folder of a data set; None for the recipe's, made in `output/data`."""
+    seed: int = 0
+    """Of the first weights, the noise and the order of the data."""
+    steps: int | None = None
+    """In place of the recipe's."""
+    resume: bool = False
+    """Whether to go on from the state in `output`."""
+    device: str | None = None
+
+
+class Bench:
+    """A data set in the memory of this process's device, and its share of every batch."""
+
+    def __init__(self, place: Workplace, samples: DataSet, settings: PaperLoop, seed: int) -> None:
+        self.place, self.samples, self.settings, self.seed = place, samples, settings, seed
+        self.rows = place.share(settings.batch_size)
+
+    def batch(self, step: int) -> Batch:
+        """The share of batch number `step`."""
+        settings = self.settings
+        return self.samples.batch(step, settings.batch_size, self.seed, settings.one_layout, self.rows)
+
+    def noise(self, step: int) -> tuple[Tensor, Tensor]:
+        """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1, 3)."""
+        device, shape = self.place.device, (self.settings.batch_size, N_FINS, 1)
+        generator = seeded_generator(NOISE_SEED + self.seed, step, device)
+        uniform = torch.rand(shape, generator=generator, device=device)
+        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[self.rows]
+
+    def tensors(self, *values: Any) -> list[Tensor]:
+        """Arrays on the device."""
+        return [torch.tensor(value, dtype=torch.float32, device=self.place.device) for value in values]
+
+
+def train_surrogate(options: Options) -> TrainedWeights:
+    """Train a preset's surrogate and write a checkpoint folder without an allocator network. Raises
+    DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written;
+    CommandError: there is no such device."""
+    made = recipe(options.preset)
+
+    def terms_of(weights: Weights, bench: Bench) -> Terms:
+        (std,) = bench.tensors(bench.samples.normalization.std)
+        wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
+
+        def terms(step: int) -> dict[str, Tensor]:
+            batch = bench.batch(step)
+            with bench.place.autocast():
+                return {"loss": modules.physics(wrench, batch, std).mean()}
+
+        return terms
+
+    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+        trained = TrainedWeights(
+            name="",
+            normalization=samples.normalization,
+            surrogate_sizes={"kind": "mlp", "hidden": list(made.surrogate.hidden)},
+            surrogate=state,
+            fin_model=samples.settings["fin_model"],
+        )
+        batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(trained.fin_model)))
+        std = torch.tensor(trained.normalization.std, dtype=torch.float32)
+        error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
+        return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
+
+    begin = partial(modules.surrogate_weights, made.surrogate)
+    return _train("surrogate", options, made.surrogate_training, begin, terms_of, checkpoint)
+
+
+def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
+    """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole checkpoint folder.
+
+    Without other data that in the surrogate's folder is learned from, if there is any. Raises
+    CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in `train_surrogate`."""
+    made, base = recipe(options.preset), read_checkpoint(resolve_checkpoint(surrogate))
+    settings, network = made.allocator_training, made.network
+    surrogate_of(base)  # reports what is missing before data are made
+    if options.data is None and (surrogate / "data").is_dir():
+        options = replace(options, data=surrogate / "data")
+
+    def terms_of(weights: Weights, bench: Bench) -> Terms:
+        if bench.samples.settings["fin_model"] != base.fin_model:
+            raise DataError(f"{options.data}: its wrenches are of another fin model than the surrogate's")
+        mean, std = bench.tensors(*base.normalization)
+        frozen = surrogate_of(base, device=bench.place.device)
+        ramp = replace(settings, steps=bench.settings.steps)
+
+        def terms(step: int) -> dict[str, Tensor]:
+            batch = bench.batch(step)
+            with bench.place.autocast():
+                wanted = (batch.wrench - mean) / std
+                hidden = network.encoded(weights, modules.features(batch), wanted, batch.mask)
+            mixture = network.mixture(weights, hidden.float())
+            with bench.place.autocast():
+                guide = modules.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
+            imitate = modules.imitation(mixture, batch).mean()
+            entropy = modules.negative_entropy(mixture, batch.mask).mean()
+            loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
+            return {"loss": loss, "imitation": imitate, "guidance": guide, "entropy": entropy}
+
+        return terms
+
+    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+        return replace(base, network_sizes=sizes_for_file(network), network=state)
+
+    begin = partial(first_weights, network.shapes())
+    return _train("allocator", options, settings, begin, terms_of, checkpoint, base.sha256)
+
+
+def _train(
+    verb: str,
+    options: Options,
+    settings: PaperLoop,
+    begin: Callable[[int, torch.device], Weights],
+    terms_of: Callable[[Weights, Bench], Terms],
+    checkpoint: Callable[[DataSet, State], TrainedWeights],
+    surrogate: str = "",
+) -> TrainedWeights:
+    """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
+    settings, output = replace(settings, steps=options.steps or settings.steps), options.output
+    with workplace(options.device, settings.batch_size) as place:
+        if options.data is None and place.rank == 0:
+            generate(output / "data", recipe(options.preset).data)
+        place.wait()
+        samples = DataSet(options.data or output / "data", place.device)
+        weights = begin(options.seed, place.device)
+        identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
+        identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
+
+        def save(state: State, progress: dict[str, Any]) -> None:
+            made = checkpoint(samples, state)
+            history = {**made.training, verb: identity | progress}
+            made = replace(made, name=output.name, preset=options.preset, training=history)
+            write_card(output, write_checkpoint(output, made))
+
+        training = Training(weights, settings, output, identity, place)
+        if options.resume:
+            training.resume()
+        bench = Bench(place, samples, settings, options.seed)
+        training.run(terms_of(weights, bench), save)
+        return read_checkpoint(output)
+
+
+def surrogate_of(weights: TrainedWeights, **of_tensors: Any) -> modules.WrenchOf:
+    """The surrogate of a checkpoint, frozen, with options of `torch.tensor` for its weights. Raises
+    CheckpointError: it holds none."""
+    config = SurrogateConfig.of(weights)
+    tensors = {name: torch.tensor(value, **of_tensors) for name, value in weights.surrogate.items()}
+    return partial(modules.surrogate_wrench, config, tensors)

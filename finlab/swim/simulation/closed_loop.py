@@ -1,0 +1,372 @@
+"""A robot that swims: sensors, controller, allocator, actuators and body, one control period at a time."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.policy import Policy, PolicyName, as_policy
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.layout.damage import Damage, Kind
+from finlab.physics import plant_of
+from finlab.swim.control import (
+    Completion,
+    Controller,
+    Diagnosis,
+    FaultMonitor,
+    Foresighted,
+    Learner,
+    Measurement,
+    Setpoint,
+    TrackingController,
+)
+from finlab.swim.control.contract import NO_WRENCH
+from finlab.swim.simulation.devices import ActuatorForce, Sensors, SensorSettings
+from finlab.swim.simulation.log import RunLog, Tick, log_of_ticks
+from finlab.swim.simulation.task import Trajectory
+from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
+from finlab.swim.vehicle.actuator_motion import ActuatorMotion
+from finlab.swim.vehicle.attitude import quaternion_of
+from finlab.swim.vehicle.fin_motion import FinMotion
+from finlab.swim.vehicle.fossen import complete_body
+from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
+
+AHEAD = 10
+"""Ticks whose wrenches the allocator is given in advance."""
+
+
+class ClosedLoop:
+    """One robot under way. Make it, then call `step` until `done`, and `fail` and `mend` in between.
+
+        loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("lissajous"))
+        while not loop.done:
+            tick = loop.step()
+
+    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a run
+    steps it at the pace of the clock.
+
+    Args:
+        layout: the robot; what its body does not say is U-CAT's.
+        allocator: of the layout, by any method.
+        task: the path, such as `make_trajectory` gives.
+        controller: by default the tracking controller of the layout.
+        policy: what the allocator does with a wrench that is out of reach; by default its own
+            `policy_under_way`, of robots with rudders `closest`.
+        sensors: rates and noise; the defaults of `SensorSettings`.
+        current: velocity (3,) of the water in the world [m/s].
+        failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
+        announced: whether what happens is announced to the allocator; else a monitor has to notice.
+        monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
+        learner: finds out what the actuators really are; allocator and monitor then work with that.
+        truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
+            only what allocator, controller and monitor believe of it; it has the same actuators.
+        seed: of the sensors' noise and of the allocator.
+
+    Raises:
+        FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time that is
+            none, or a truth that has other actuators.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        allocator: Allocator,
+        task: Trajectory,
+        controller: Controller | None = None,
+        *,
+        policy: Policy | PolicyName | None = None,
+        sensors: SensorSettings | None = None,
+        current: Sequence[float] = (0.0, 0.0, 0.0),
+        failures: Sequence[Fault | tuple[str, float]] = (),
+        announced: bool = True,
+        monitor: FaultMonitor | None = None,
+        learner: Learner | None = None,
+        truth: Layout | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Puts the robot at rest at the start of its task."""
+        if allocator.layout != layout:
+            raise FinlabError(
+                f"allocator: expected one for layout {layout.name!r:.60}, got one for "
+                f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
+            )
+        events = [Fault(*failure).checked() for failure in failures]
+        layout.indices([event.name for event in events], "failures")
+        self.layout, self.allocator, self.task, self.seed = layout, allocator, task, seed
+        self.controller = controller = TrackingController(layout) if controller is None else controller
+        self._foresighted = controller if isinstance(controller, Foresighted) else None
+        # Rudders that the flow leaves weak must not stop the propeller.
+        under_way = "closest" if layout.by_flow else allocator.policy_under_way
+        self.policy = as_policy(under_way if policy is None else policy)
+        truth = layout if truth is None else checked_truth(layout, truth)
+        self.vehicle = Vehicle(complete_body(truth), current)
+        """The body that really swims, and the current; it may be replaced on the way."""
+        self.fin_motion = FinMotion(truth)
+        """The fins' motion: amplitude, frequency, zero direction and phase of each."""
+        self._forces = ActuatorForce(truth, self.fin_motion)
+        self.motion = self._forces.motion
+        """The motion of all actuators."""
+        self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
+        self._pending = sorted(events, key=lambda event: event.time_s)
+        self.announced, self.monitor, self.learner = announced, monitor, learner
+        self._begin()
+
+    def _begin(self) -> None:
+        """The state at the start, and what is known then."""
+        layout, n = self.layout, self.layout.n
+        self.broken: dict[str, Fault] = {}
+        """What is true: the actuators that are not whole now, by name."""
+        self._told: dict[str, Fault] = {}
+        self._held = np.full(n, np.nan)
+        self.verdict: Diagnosis | None = None
+        """What the monitor believed at the last step; None without one."""
+        self._completion: dict[tuple[str, ...], Completion] = {}
+        self._ticks: list[Tick] = []
+        self._setpoints: deque[Setpoint] = deque()  # of this tick and the next ones
+        self._command: Array | None = None
+        self._answered: Allocation | None = None  # what it came from, before a monitor's pushes
+        self.period_s = self.controller.period_s
+        """Length of a step [s]."""
+        self._plant = plant_of(layout)
+        self._flow: Array | None = None
+        self._believed, self._gave = ActuatorMotion(layout), NO_WRENCH
+        start, heading = self.task.start()
+        self.state = np.zeros(STATE_SIZE)
+        """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
+        self.state[:3], self.state[3:7] = start, quaternion_of(0.0, 0.0, heading)
+        self.controller.reset()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return len(self._ticks) * self.period_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the task is over."""
+        return self.time >= self.task.duration_s - 1e-9
+
+    @property
+    def controllable(self) -> bool:
+        """Whether the working actuators can give what the controller commands, in small."""
+        return self._complete().controllable
+
+    @property
+    def log(self) -> RunLog:
+        """The record so far."""
+        return log_of_ticks(
+            self._ticks,
+            layout=self.layout.name,
+            names=self.layout.names,
+            method=self.allocator.method,
+            controller=self.controller.name,
+            task=self.task.name,
+            water="current" if any(self.vehicle.current) else "still",
+            seed=self.seed,
+        )
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the actuators that are lost now, whoever knows of it."""
+        return tuple(name for name, fault in self.broken.items() if fault.kind == "lost")
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Names of the actuators that were announced as broken."""
+        return tuple(self._told)
+
+    @property
+    def damage(self) -> Damage:
+        """What the allocator is given: what was announced, or what the monitor has found."""
+        if self.verdict is not None:
+            return self.verdict.damage
+        return damage_of(self.layout, self._told, self._held)
+
+    def fail(
+        self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
+    ) -> None:
+        """Something becomes of an actuator, now. Raises LayoutError: there is no actuator of that name, or it
+        is the last that works; FinlabError: the kind or the share is none.
+
+        Args:
+            name: of the actuator.
+            kind: lost (it gives nothing; a fin hangs still), torn (it gives a share of its
+                force), stuck (a fin beats but no longer turns, nor does an azimuth; a rudder stays as it is,
+                and so does the force of a thruster) or whole.
+            share: of the force that a torn actuator gives.
+            announced: whether the allocator knows at once; by default as the swim was made.
+        """
+        fault = Fault(name, self.time, kind, share).checked()
+        index = self.layout.index(name)
+        if kind == "lost":
+            self.layout.without([*(other for other in self.lost if other != name), name])
+        self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
+        if kind == "stuck" and index in self.motion.of_fins:
+            self.fin_motion.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
+        tells = self.announced if announced is None else announced
+        for known in (self.broken, self._told) if tells else (self.broken,):
+            known.pop(name, None)
+            if kind != "whole":
+                known[name] = fault
+        if tells and self.monitor is not None:
+            strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
+            self.verdict = self.monitor.tell(name, strength, self._held[index])
+
+    def mend(self, name: str, *, announced: bool | None = None) -> None:
+        """An actuator works again as it should; a `LayoutError` where there is none of that name."""
+        self.fail(name, "whole", announced=announced)
+
+    def step(self) -> Tick:
+        """Swims for one control period and returns what happened."""
+        time = self.time
+        while self._pending and self._pending[0].time_s <= time + 1e-9:
+            event = self._pending.pop(0)
+            self.fail(event.name, event.kind, event.share)
+        now = self._sensors.measure(time, self.state)
+        if self.monitor is not None:
+            self.verdict = self.monitor.step(now, self._command)
+        if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
+            self._flow = np.concatenate([now.velocity, now.rates])
+        setpoint = self.task.setpoint(time)
+        complete = self._complete()
+        wanted = complete(self.controller.wrench(now, setpoint, self._given()))
+        answer = self.allocator.allocate(
+            wanted,
+            damage=self.damage,
+            flow=self._flow,
+            previous=self._answered,
+            reference=self._reference(time, complete),
+            policy=self.policy,
+            seed=self.seed,
+        )
+        self._answered, command = answer, self._sent(answer.command)
+        if self.monitor is not None:
+            command = self.monitor.probed(command)
+        tick = self._move(now, setpoint, wanted, command, answer.solve_ms)
+        self._command = command
+        self._ticks.append(tick)
+        learned = None if self.learner is None else self.learner.step(tick.measured, tick.command)
+        if learned is not None:
+            self._believe(learned)
+        return tick
+
+    def _believe(self, layout: Layout) -> None:
+        """From now on allocator and monitor take the robot for this one."""
+        self.allocator, self._plant = self.allocator.on(layout), plant_of(layout)
+        self._told = {name: fault for name, fault in self._told.items() if fault.kind != "torn"}
+        if self.monitor is not None:
+            self.monitor.adopt(layout)
+        self._completion.clear()
+
+    def run(self) -> RunLog:
+        """Swims to the end of the task."""
+        while not self.done:
+            self.step()
+        return self.log
+
+    def _reference(self, time: float, complete: Completion) -> Array | None:
+        """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can tell."""
+        if self._foresighted is None:
+            return None
+        while len(self._setpoints) <= AHEAD:
+            # What comes after the end is not swum: a path that ends under way is swum to its end.
+            after = min(time + len(self._setpoints) * self.period_s, self.task.duration_s)
+            self._setpoints.append(self.task.setpoint(after))
+        expected = self._foresighted.ahead(self._setpoints)
+        self._setpoints.popleft()
+        return complete(expected)
+
+    def _given(self) -> Array:
+        """Wrench (6,) over the last period, if the actuators that are not taken for lost do what they were
+        commanded [N, N m]."""
+        if self._command is None:
+            return NO_WRENCH
+        believed = self._believed
+        believed.step(self._command, self.period_s)
+        force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
+        force[list(self.layout.indices(self.damage.lost))] = 0.0
+        before, self._gave = self._gave, self._plant.wrench_of(force, flow=self._flow)
+        return 0.5 * (before + self._gave)
+
+    def _complete(self) -> Completion:
+        """What completes the controller's wrench for the actuators that work now."""
+        lost = tuple(self.damage.lost)
+        if lost not in self._completion:
+            controller = self.controller
+            self._completion[lost] = Completion(self.allocator.layout, lost, controller.axes, controller.free)
+        return self._completion[lost]
+
+    def _alive(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) are not lost."""
+        lost = self.lost
+        return np.array([name not in lost for name in self.layout.names])
+
+    def _sent(self, command: Array) -> Array:
+        """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
+        if not self.damage.weak:
+            return command
+        result = command.copy()
+        for name, share in self.damage.weak.items():
+            index = self.layout.index(name)
+            result[index, self.layout.actuators[index].THRUST or 0] /= share
+        return result
+
+    def _moved(self, command: Array) -> Array:
+        """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not turn."""
+        result = command.copy()
+        result[~self._alive()] = np.nan
+        return result if np.isnan(self._held).all() else self.motion.turned_to(result, self._held)
+
+    def _move(
+        self, now: Measurement, setpoint: Setpoint, wanted: Array, command: Array, solve_ms: float
+    ) -> Tick:
+        """Actuators and body over one period with a constant command."""
+        time, before, n = self.time, self.state, self.layout.n
+        n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
+        dt = self.period_s / n_steps
+        sent = command if self.learner is None else command * self.learner.factor
+        moved, share = self._moved(sent), np.ones(n)
+        for fault in self.broken.values():
+            if fault.kind == "torn":
+                share[self.layout.index(fault.name)] = fault.share
+        mean, power = np.zeros((n, 6)), np.zeros((2, n))
+        for k in range(n_steps):
+            water = self.vehicle.velocity_in_water(self.state)
+            push = self._forces.step(moved, dt, water, share)
+            wrenches = self._forces.wrenches(push.force, water)
+            self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
+            if k + 1 < n_steps:  # the sample at the end belongs to the next period
+                self._sensors.sample(time + (k + 1) * dt, self.state)
+            mean += wrenches
+            power += push.power
+        mean, power = mean / n_steps, power / n_steps
+        beliefs = (np.full(n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
+        return Tick(
+            time=time,
+            position=before[:3].copy(),
+            quaternion=before[3:7].copy(),
+            motion=before[7:].copy(),
+            flow=np.array(self.vehicle.current),
+            measured=now.as_array(),
+            reference=setpoint.position,
+            reference_surge=setpoint.surge,
+            asked=wanted,
+            allocated=self._plant.wrench(command, flow=self._flow),
+            delivered=mean.sum(axis=0),
+            command=sent,
+            fin_motion=self.motion.command,
+            force=mean[:, :3],
+            inertial_power=power[0],
+            driving_power=power[1],
+            alive=self._alive(),
+            fault_probability=beliefs[0],
+            strength=beliefs[1],
+            strength_std=beliefs[2],
+            solve_ms=solve_ms,
+        )

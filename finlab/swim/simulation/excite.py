@@ -1,0 +1,254 @@
+"""A swim from which a robot can be learned: every axis and actuator is varied, depth and attitude are kept.
+
+The controller holds the place softly and adds a sum of sines on each axis, each axis with periods of its own.
+The allocator gives that wrench with forces that also push against each other, and draws each fin's amplitude
+anew every few seconds, so that the law of each fin shows. No axis is shaken farther than it may go. Where the
+robot leaves its bounds, the excitation fades until it is back.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.method import Method, Networks
+from finlab.allocation.settings import Settings, number
+from finlab.allocation.solution import Solution
+from finlab.arrays import Array
+from finlab.axes import wrapped
+from finlab.errors import DataError, FinlabError
+from finlab.layout import Layout
+from finlab.layout.effectiveness import layout_effectiveness
+from finlab.physics import plant_of
+from finlab.swim.control import Measurement, Setpoint
+from finlab.swim.simulation.closed_loop import ClosedLoop
+from finlab.swim.simulation.devices import SensorSettings
+from finlab.swim.simulation.task import station
+from finlab.swim.vehicle.fossen import complete_body, dynamics_of
+
+LONGEST_S = 300.0
+"""Longest swim [s]."""
+SHORTEST_S = 30.0
+"""Shortest one [s]: once through the slowest sine."""
+SHARE = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
+"""Amplitude of the excitation on each axis, as a share of what all actuators together could give at most."""
+PERIODS_S = (
+    (31.0, 13.0, 7.0),
+    (23.0, 11.0, 6.1),
+    (17.0, 9.1, 5.3),
+    (8.3, 4.9, 3.1),
+    (12.1, 6.7, 4.1),
+    (19.0, 9.7, 4.5),
+)
+"""Periods of the sines of each axis [s]; no two axes share one."""
+INNER_SHARE = 0.3
+"""Amplitude of the forces that cancel, as a share of the largest force of an actuator."""
+REDRAW_S = 3.1
+"""Time after which each fin has another amplitude [s]."""
+TURN_RAD_S = 0.8
+"""Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat gives."""
+BOUNDS = (1.5, 0.5, 0.35)
+"""Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
+MOST_USED = 3.0
+"""Times these bounds at which the swim is given up."""
+REACHED = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
+"""Bounds of each axis [m, rad]; that of yaw is no more than a wish."""
+SHAKEN_TO = 0.5
+"""Share of them to which the sines of an axis take the robot at most."""
+HOLDS = 0.3
+"""Share of what all actuators could give that holds the robot at a bound, where a loop may be so fast."""
+SLOWEST, FASTEST = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4]), np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0])
+"""Of the loops that hold place and attitude [rad/s]."""
+DEPTH_M = 1.5
+"""Where the robot is held [m]."""
+PERIOD_S = 0.1
+"""Of the controller [s]."""
+
+
+class ExcitingController:
+    """Holds a place and heading softly, and shakes all six axes."""
+
+    name = "excitation"
+    axes: tuple[str, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+    free: tuple[str, ...] = ()
+    period_s = PERIOD_S
+
+    def __init__(self, layout: Layout, seed: int = 0) -> None:
+        # Each axis as far as all actuators could push it, were they all aimed at it.
+        most = np.abs(layout_effectiveness(layout) * largest_forces(layout))
+        most = np.add.reduceat(most**2, np.unique(_owners(layout), return_index=True)[1], axis=1) ** 0.5
+        most = most.sum(axis=1)
+        rng = np.random.default_rng(seed)
+        self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
+        dynamics = dynamics_of(complete_body(layout))
+        inertia = np.array(dynamics.inertia)
+        pace = np.clip(np.sqrt(HOLDS * most / (inertia * REACHED)), SLOWEST, FASTEST)
+        # Damping of about 0.8.
+        least = np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
+        self._stiff, self._damp = inertia * pace**2, inertia * np.maximum(1.6 * pace, least)
+        swing = 2.0 * math.pi / np.array(PERIODS_S).T
+        damp = 1j * swing * (self._damp + np.array(dynamics.linear))
+        moved = 1.0 / np.abs(self._stiff - inertia * swing**2 + damp)
+        self._size = np.minimum(np.array(SHARE) * most, SHAKEN_TO * REACHED / moved.mean(axis=0))
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
+        """Returns the wrench (6,) [N, N m]."""
+        away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
+        c, s = math.cos(measurement.yaw), math.sin(measurement.yaw)
+        error = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0])
+        error[3:] = wrapped(-np.array([measurement.roll, measurement.pitch, measurement.yaw]))
+        speed = np.concatenate([measurement.velocity, measurement.rates])
+        tilt = max(abs(measurement.roll), abs(measurement.pitch))
+        used = max(math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
+        if used > MOST_USED:
+            raise FinlabError(
+                f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
+                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, "
+                f"tilted by {math.degrees(tilt):.0f} deg; check its body, "
+                "above all center_of_buoyancy_m and buoyancy_n"
+            )
+        shaken = min(1.0, max(0.0, 2.0 - 2.0 * used)) * self.excitation(measurement.time)
+        return np.asarray(self._stiff * error - self._damp * speed + shaken)
+
+    def excitation(self, time: float) -> Array:
+        """The sum of sines (6,) at a time [s], at most the amplitude of each axis."""
+        angle = 2 * math.pi * time / np.array(PERIODS_S) + self._phase
+        return np.asarray(self._size * np.sin(angle).mean(axis=1))
+
+
+@dataclass(frozen=True)
+class ExcitingSettings(Settings):
+    """Where its randomness comes from."""
+
+    seed: int = number(0, 0, 2**63, "of the forces and amplitudes that are drawn")
+
+
+class Exciting(Method):
+    """Gives a wrench with forces that also push against each other, and with amplitudes drawn at random."""
+
+    name = "excitation"
+    settings_class = ExcitingSettings
+    settings: ExcitingSettings
+
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
+        self._rng = np.random.default_rng(self.settings.seed)
+        self._owner, self._most = _owners(layout), largest_forces(layout)
+        # Each gives its share of what it can.
+        share = self._most / self._most.max()
+        columns = layout_effectiveness(layout) * share
+        self._to_force = share[:, None] * np.linalg.pinv(columns, rcond=1e-6)
+        _, values, right = np.linalg.svd(columns)
+        rank = int((values > 1e-6 * values[0]).sum())
+        self._inner = right[rank:] * self._most
+        self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
+        self._calls = 0
+        self._is_fin = layout.is_fin
+        self._direction: Array | None = None
+        if layout.n_fins:
+            self._plant = plant_of(layout.fins_alone)
+            self._largest = self._most[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
+            self._grid = self._plant.grid((13, 41, 1))
+            self._amplitude = self._plant.upper[:, 0]
+
+    def solve(self, targets: Array, **asked: Any) -> Solution:
+        """See `Method`; each target is a tick of the controller."""
+        return Solution(np.stack([self._command(target) for target in targets]))
+
+    def _command(self, target: Array) -> Array:
+        """The next command (n, 3); each call is a tick of the controller."""
+        time, k = self._calls * PERIOD_S, np.arange(len(self._inner))
+        swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
+        swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
+        force = self._to_force @ target + (INNER_SHARE * swing @ self._inner if len(k) else 0.0)
+        command = np.zeros((self.layout.n, 3))
+        for i, part in enumerate(self.layout.actuators):
+            command[i] = part.pushing(force[self._owner == i])
+        command = self.plant.feasible(command)
+        if self._is_fin.any():
+            own = force[np.isin(self._owner, np.flatnonzero(self._is_fin))].reshape(-1, 2)
+            command[self._is_fin] = self._beat(own)
+        self._calls += 1
+        return command
+
+    def _beat(self, force: Array) -> Array:
+        """Commands (n, 3) of the fins for forces (n, 2) [N] along zero and shaft x zero."""
+        if self._calls % round(REDRAW_S / PERIOD_S) == 0:
+            share = self._rng.uniform(0.2, 1.0, self._plant.n_fins)
+            lower, upper = self._plant.lower[:, 0], self._plant.upper[:, 0]
+            self._amplitude = lower + share * (upper - lower)
+        size, direction = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        if self._direction is not None:
+            most = TURN_RAD_S * PERIOD_S
+            turn = wrapped(direction - self._direction)
+            # What is not yet turned gives only its part along the force; across and against it, nothing.
+            direction = self._direction + np.clip(turn, -most, most)
+            size = size * np.maximum(np.cos(turn - np.clip(turn, -most, most)), 0.0)
+        self._direction = direction
+        tried = self._grid.copy()
+        tried[..., 2] = direction
+        tried = self._plant.feasible(tried)
+        miss = np.abs(np.linalg.norm(self._plant.forces(tried), axis=-1) - size) / self._largest
+        other = np.abs(tried[..., 0] - self._amplitude) / self._plant.upper[:, 0]
+        best = np.argmin(miss + 0.05 * other, axis=0)
+        return np.asarray(tried[best, np.arange(self._plant.n_fins)])
+
+
+def _owners(layout: Layout) -> NDArray[np.intp]:
+    """Which actuator each column of `layout_effectiveness` is of (m,)."""
+    return np.repeat(np.arange(layout.n), [len(part.PUSHES) for part in layout.actuators])
+
+
+def largest_forces(layout: Layout) -> Array:
+    """Returns the largest force [N] along each direction in which an actuator pushes (m,), at rest."""
+    plant = plant_of(layout)
+    size = np.linalg.norm(plant.forces(np.stack([plant.lower, plant.upper])), axis=-1).max(axis=0)
+    return np.asarray(size[_owners(layout)])
+
+
+def excitation(
+    layout: Layout,
+    duration_s: float = LONGEST_S,
+    *,
+    truth: Layout | None = None,
+    sensors: SensorSettings | None = None,
+    current: Sequence[float] = (0.0, 0.0, 0.0),
+    seed: int = 0,
+) -> ClosedLoop:
+    """The swim, ready to be run. Raises DataError: the duration is too short to tell anything, or longer than
+    five minutes; FinlabError: it has rudders, which give nothing on the spot.
+
+    Args:
+        layout: the robot.
+        duration_s: how long [s].
+        truth: the robot that really swims, where it is not as drawn.
+        sensors: rates and noise; the defaults of `SensorSettings`.
+        current: velocity (3,) of the water in the world [m/s].
+        seed: of the excitation and of the sensors' noise.
+    """
+    if layout.by_flow:
+        raise FinlabError(
+            f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a wide path, "
+            "such as --trajectory circle --scale 25, and fit that log"
+        )
+    if not SHORTEST_S <= duration_s <= LONGEST_S:
+        raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")
+    return ClosedLoop(
+        layout,
+        Allocator(layout, Exciting, seed=seed),
+        station(duration_s, DEPTH_M, "excitation"),
+        ExcitingController(layout, seed),
+        truth=truth,
+        sensors=sensors,
+        current=current,
+        seed=seed,
+    )

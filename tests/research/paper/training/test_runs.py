@@ -1,0 +1,140 @@
+"""The paper's training by the command line: whole, killed and resumed, by two processes."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.cli import main
+from finlab.research.networks.checkpoint import read_checkpoint
+from tests.terminal import refused
+
+PATIENT = (
+    "import finlab.research.training.loop as loop; loop.SAVE_EVERY_S = 0.1; "
+    "from finlab.cli import main; import sys; "
+)
+"""A command that saves its state ten times a second."""
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "data"
+    assert main(["data", "generate", "-o", str(folder), "--layouts", "60", "--commands", "80"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def trained(data: Path) -> Path:
+    """Folder with a trained `surrogate` and `allocator`."""
+    place = data.parent
+    surrogate, allocator = str(place / "surrogate"), str(place / "allocator")
+    smoke = ["--data", str(data), "--preset", "smoke", "--steps", "30"]
+    assert main(["train", "surrogate", "-o", surrogate, *smoke]) == 0
+    assert main(["train", "allocator", "-o", allocator, "--surrogate", surrogate, *smoke]) == 0
+    return place
+
+
+def losses(folder: Path) -> list[float]:
+    with (folder / "log.csv").open(newline="") as file:
+        return [float(row["loss"]) for row in csv.DictReader(file)]
+
+
+def test_what_is_trained_allocates_and_is_described(
+    trained: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--method", "paper", "--json"]
+    assert main([*command, "--checkpoint", str(trained / "allocator")]) == 0
+    assert json.loads(capsys.readouterr().out)["checkpoint"] == "allocator"
+    surrogate, whole = (read_checkpoint(trained / name) for name in ("surrogate", "allocator"))
+    assert whole.training["allocator"]["surrogate_sha256"] == surrogate.sha256
+    assert all(
+        np.array_equal(whole.surrogate[name], surrogate.surrogate[name]) for name in surrogate.surrogate
+    )
+    assert surrogate.metrics["surrogate"]["wrench_error_norm"] > 0.0
+    for name, made in (("surrogate", surrogate), ("allocator", whole)):
+        files = {path.name for path in (trained / name).iterdir()}
+        assert {"README.md", "log.csv", "curves.png", "resume.pt", "config.json"} <= files
+        card = (trained / name / "README.md").read_text()
+        assert made.sha256 in card and "| surrogate data layouts | 1000 | 60 |" in card
+        assert losses(trained / name)[-1] < losses(trained / name)[0]
+
+
+def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(trained: Path, tmp_path: Path) -> None:
+    out = str(tmp_path / "killed")
+    options = ["--surrogate", str(trained / "surrogate"), "--data", str(trained / "data")]
+    verb = ["train", "allocator", "-o", out, *options, "--preset", "smoke", "--steps", "30", "--resume"]
+    code = PATIENT + "sys.exit(main(sys.argv[1:]))"
+    for _ in range(2):
+        process = subprocess.Popen([sys.executable, "-c", code, *verb])
+        before = _time_of(tmp_path / "killed" / "resume.pt")
+        while _time_of(tmp_path / "killed" / "resume.pt") == before and process.poll() is None:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    assert main(verb) == 0
+    killed, whole = (read_checkpoint(path) for path in (tmp_path / "killed", trained / "allocator"))
+    assert killed.training["allocator"]["steps_done"] == 30
+    for name, value in whole.network.items():
+        np.testing.assert_allclose(killed.network[name], value, atol=1e-6)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def _time_of(path: Path) -> float:
+    return path.stat().st_mtime if path.exists() else 0.0
+
+
+def test_a_killed_generation_leaves_whole_parts_and_no_processes(tmp_path: Path) -> None:
+    verb = ["data", "generate", "-o", str(tmp_path), "--layouts", "200", "--commands", "50000"]
+    process = subprocess.Popen([sys.executable, "-m", "finlab", *verb], start_new_session=True)
+    while not list(tmp_path.glob("part-*.npz")) and process.poll() is None:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    for path in tmp_path.glob("part-*.npz"):
+        with np.load(path) as part:
+            assert part["wrench"].shape == (5, 50_000, 6)
+    ends = time.monotonic() + 10.0
+    while time.monotonic() < ends:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    pytest.fail("processes outlived the one that started them")
+
+
+def test_two_processes_have_the_losses_of_one(trained: Path, tmp_path: Path) -> None:
+    command = ["-m", "finlab", "train", "allocator", "-o", str(tmp_path), "--data", str(trained / "data")]
+    command += ["--preset", "smoke", "--steps", "30", "--device", "cpu"]
+    command += ["--surrogate", str(trained / "surrogate")]
+    launch = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
+    done = subprocess.run([*launch, *command], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_allclose(losses(tmp_path), losses(trained / "allocator"), rtol=1e-3)
+    assert read_checkpoint(tmp_path).training["allocator"]["processes"] == 2
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["data", "generate", "--layouts", "0"], "layouts: expected a number of at least 1, got 0"),
+        (["data", "generate", "--varied-limits", "2"], "a share from 0 to 1"),
+        (
+            ["train", "surrogate", "--preset", "long"],
+            "preset: expected one of paper, short, smoke, got 'long'",
+        ),
+        (["train", "surrogate", "--data", "nowhere"], "nowhere/data.json"),
+        (["train", "surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
+        (["train", "allocator", "--surrogate", "default"], "holds no surrogate"),
+    ],
+)
+def test_refuses_in_one_sentence(argv: list[str], message: str, tmp_path: Path) -> None:
+    assert message in refused([*argv, "-o", str(tmp_path / "out")])
