@@ -11,10 +11,10 @@ import pytest
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
-from tests.fit.robot.swims import swim
 
 from finlab.layout import load_layout
 from finlab.swim.identification.swim import STEP_S, read_swim, replay
+from tests.swim.identification.swims import swim
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "10_swim_from_rosbag.py"
 SECONDS = 32.0

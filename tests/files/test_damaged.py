@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import trimesh
-from tests.fit.robot.swims import write_csv as write_swim
 
 from finlab.actuators.fin.table_law import read_table
 from finlab.allocation import Allocator
@@ -36,6 +35,7 @@ from finlab.swim.simulation import load_log
 from finlab.swim.simulation.log import Tick, log_of_ticks
 from finlab.swim.simulation.task import make_trajectory
 from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.swim.identification.swims import write_csv as write_swim
 from webapp.session.files import packed as design
 from webapp.session.files import read_layout, unpacked
 

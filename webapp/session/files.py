@@ -16,7 +16,6 @@ from functools import cache
 from pathlib import Path
 
 from finlab.assets import shipped_layouts
-from finlab.deploy import design_files
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import FinlabError, LayoutError
 from finlab.files import yaml_text
@@ -25,6 +24,7 @@ from finlab.layout import Layout, layout_to_dict, load_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import plant_of
+from finlab.swim import design_files
 from finlab.swim.hull.mesh_file import Mesh, SizeError, stl_of
 from finlab.swim.hull.surface import UNITS, Surface
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.paper.asked_in_torch import wrench_in_torch
 
 from finlab.assets import shipped_layouts
 from finlab.axes import is_full_turn
@@ -27,6 +26,7 @@ from finlab.research.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.training.loop import first_weights
 from tests.any_robot import AnyRobot, normalized_error
+from tests.research.paper.asked_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-from tests.paper.asked_in_torch import wrench_in_torch
 
 from finlab.errors import CheckpointError
 from finlab.layout import Layout, Limits
@@ -11,6 +10,7 @@ from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpo
 from finlab.research.networks.trained import Normalization, TrainedWeights
 from finlab.research.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from finlab.research.random_layouts import random_layout
+from tests.research.paper.asked_in_torch import wrench_in_torch
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.fit.robot.swims import swim, write_csv
 
 from finlab.axes import wrapped
 from finlab.cli import main
@@ -17,6 +16,7 @@ from finlab.swim.identification.swim import Swim, only_new, read_swim, replay
 from finlab.swim.simulation.excite import excitation
 from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
+from tests.swim.identification.swims import swim, write_csv
 
 CENTER = np.array([0.015, -0.01, 0.005])
 STRENGTH = {"front_right": 0.8, "front_left": 1.15, "back_left": 1.0}

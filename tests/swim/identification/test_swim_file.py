@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.fit.robot.swims import write_csv
 
 from finlab.errors import DataError
 from finlab.layout import Layout, load_layout
 from finlab.swim.identification.swim import read_swim, smoothed
+from tests.swim.identification.swims import write_csv
 
 STEPS = 400
 

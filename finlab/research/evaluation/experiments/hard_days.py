@@ -53,9 +53,9 @@ class HardDay:
     `body` is the true one where it is another than the layout's, `truth` holds options of
     `finlab.swim.simulation.perturbed`, and `current` is the velocity of the water in the world [m/s]. `weak`
     is the share of its thrust that one fin gives, each in its turn, without an announcement; `lost` is how
-    many fins are lost half-way, each and each pair in its turn, and where this is not `announced`, a `FaultMonitor` has to
-    find it. `jets` are what actuators truly do to each other, which methods are told where they are
-    `jets_known`.
+    many fins are lost half-way, each and each pair in its turn, and where this is not `announced`, a
+    `FaultMonitor` has to find it. `jets` are what actuators truly do to each other, which methods are
+    told where they are `jets_known`.
     """
 
     name: str
