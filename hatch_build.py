@@ -65,9 +65,11 @@ def compile_core(folder: Path) -> Path:
         command = [*words, *FLAGS, f"-I{CORE}", *sources, "-o", str(made), "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True)
-            said, failed = done.stderr or done.stdout, done.returncode != 0
+            said = done.stderr or done.stdout
+            failed = done.returncode != 0
         except OSError as error:
-            said, failed = str(error), True
+            said = str(error)
+            failed = True
         if failed:
             sys.exit(
                 f"{said}\nthe core of finlab did not compile by {shlex.join(command)}; install a C compiler "

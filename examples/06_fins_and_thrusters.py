@@ -34,7 +34,8 @@ for policy in ("closest", "direction"):
 lifts = np.linspace(0.0, 60.0, 121)
 batch = allocator.allocate_batch(np.outer(lifts, [0, 0, 1, 0, 0, 0]))
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-fins, thrusters = np.flatnonzero(layout.is_fin), np.flatnonzero(~layout.is_fin)
+fins = np.flatnonzero(layout.is_fin)
+thrusters = np.flatnonzero(~layout.is_fin)
 axes.stackplot(
     lifts, *(batch.forces[:, rows, 2].sum(axis=1) for rows in (fins, thrusters)), labels=("fins", "thrusters")
 )

@@ -22,7 +22,8 @@ class Bridge:
         self.publish = publish
 
     def on_wrench(self, message: Message) -> None:
-        force, torque = message.wrench.force, message.wrench.torque
+        force = message.wrench.force
+        torque = message.wrench.torque
         wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
         self.answer = self.allocator.allocate(wrench)
         self.publish(Message(flippers=[*map(flipper, self.answer.names, self.answer.command)]))
@@ -40,7 +41,8 @@ def flipper(name: str, beat: tuple[float, float, float]) -> dict[str, float]:
 
 # %%
 def wrench_stamped(fx: float, fz: float, tz: float) -> Message:
-    force, torque = Message(x=fx, y=0.0, z=fz), Message(x=0.0, y=0.0, z=tz)
+    force = Message(x=fx, y=0.0, z=fz)
+    torque = Message(x=0.0, y=0.0, z=tz)
     return Message(wrench=Message(force=force, torque=torque))
 
 

@@ -24,7 +24,8 @@ built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))
 
 # %%
 with TemporaryDirectory() as folder:
-    log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
+    log = Path(folder) / "log.npz"
+    path = Path(folder) / "mine.yaml"
     excitation(drawn, 60.0, truth=built).run().save(log)
     fit = fit_robot(drawn, [read_swim(log, drawn)], other_law=False)
     print("\n".join(summary(fit)))

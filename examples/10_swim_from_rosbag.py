@@ -18,11 +18,13 @@ POSE = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
 
 def row_of(message: Any) -> list[float]:
     """Position, attitude angles, velocity and rates of an odometry message."""
-    at, q = message.pose.pose.position, message.pose.pose.orientation
+    at = message.pose.pose.position
+    q = message.pose.pose.orientation
     roll = math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (q.w * q.y - q.z * q.x))))
     yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
-    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    linear = message.twist.twist.linear
+    angular = message.twist.twist.angular
     speed = [part for v in (linear, angular) for part in (v.x, v.y, v.z)]
     return [at.x, at.y, at.z, roll, pitch, yaw, *speed]
 

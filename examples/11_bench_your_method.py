@@ -18,7 +18,8 @@ from finlab.research.evaluation.experiments.wrench import experiment
 def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Commands (N, n, 3) [rad, Hz, rad] for wrenches (N, 6)."""
     plant = plant_of(layout)
-    low, high = plant.lower.ravel(), plant.upper.ravel()
+    low = plant.lower.ravel()
+    high = plant.upper.ravel()
 
     def missing(u: np.ndarray, target: np.ndarray) -> Any:
         return (plant.wrench(u.reshape(-1, 3)) - target) / sigma
@@ -26,7 +27,8 @@ def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> n
     def slopes(u: np.ndarray, target: np.ndarray) -> Any:
         return plant.linearize(u.reshape(-1, 3))[1] / sigma[:, None]
 
-    start, limits = (low + high) / 2, (low, high)
+    start = (low + high) / 2
+    limits = (low, high)
     found = [least_squares(missing, start, slopes, limits, args=(t,), max_nfev=30).x for t in targets]
     return np.reshape(found, (len(targets), -1, 3))
 

@@ -13,18 +13,24 @@ from finlab.arrays import Array
 
 B = np.array([[1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-0.4, 0.4, 0.0, 0.9]])
 """Wrench (Fx, Fy, Tz) of 1 N of the thrusters at y = 0.4 and -0.4 m, and of the azimuth at x = 0.9 m."""
-FORWARD, REVERSE = 0.997, 1.449  # watts over N^1.5
-MOST, LEAST = 51.44, 39.91  # N, forward and in reverse
+# watts over N^1.5
+FORWARD = 0.997
+REVERSE = 1.449
+# N, forward and in reverse
+MOST = 51.44
+LEAST = 39.91
 
 
 def answers(price: Array) -> tuple[Array, Array, float]:
     """Forces (4,) [N] that are worth most at prices (4,) [W/N], their derivative (4, 4) and their watts."""
     size = np.array([*np.abs(price[:2]), *2 * [np.hypot(*price[2:])]]) + 1e-12
     back = np.array([*(price[:2] < 0.0), False, False])
-    scale, most = np.where(back, REVERSE, FORWARD), np.where(back, LEAST, MOST)
+    scale = np.where(back, REVERSE, FORWARD)
+    most = np.where(back, LEAST, MOST)
     free = (size / (1.5 * scale)) ** 2  # the marginal watts of k F^1.5 are 1.5 k F^0.5
     force = np.minimum(free, most)
-    along, unit = np.where(free < most, 2.0 * force / size, 0.0), price / size
+    along = np.where(free < most, 2.0 * force / size, 0.0)
+    unit = price / size
     derivative = np.diag(along)
     ahead = np.outer(unit[2:], unit[2:])
     derivative[2:, 2:] = along[2] * ahead + force[2] / size[2] * (np.eye(2) - ahead)
@@ -33,7 +39,9 @@ def answers(price: Array) -> tuple[Array, Array, float]:
 
 def solve(wrench: ArrayLike) -> tuple[Array, float, float]:
     """Forces (4,) [N] for a wrench (3,), their watts, and the watts that no answer can undercut."""
-    target, ridge, best = np.asarray(wrench, np.float64), 1e-2, -np.inf
+    target = np.asarray(wrench, np.float64)
+    ridge = 1e-2
+    best = -np.inf
     guess = np.linalg.pinv(B) @ target
     prices = np.linalg.lstsq(B.T, 1.5 * np.sign(guess) * np.sqrt(np.abs(guess)), rcond=None)[0]
     for _ in range(100):
@@ -41,7 +49,9 @@ def solve(wrench: ArrayLike) -> tuple[Array, float, float]:
         missing = target - B @ force
         value = watts + prices @ missing  # of the dual: never above the watts of any answer
         if value > best or np.linalg.norm(missing) < 1e-9:
-            kept, best, ridge = (prices, missing, B @ derivative @ B.T, force, watts), value, 0.1 * ridge
+            kept = (prices, missing, B @ derivative @ B.T, force, watts)
+            best = value
+            ridge = 0.1 * ridge
         else:
             ridge *= 10.0
         start, missing, hessian, force, watts = kept

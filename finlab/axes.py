@@ -75,7 +75,8 @@ def unit_vector(key: str, vector: Vector | None) -> Vector:
 def axes_across(first: tuple[str, Vector | None], second: tuple[str, Vector | None]) -> tuple[Vector, Vector]:
     """Returns two directions, each with its key, as unit vectors at a right angle; the first stays as it is.
     Raises LayoutError: one is missing or no unit vector, or they do not stand across each other."""
-    a, b = unit_vector(*first), unit_vector(*second)
+    a = unit_vector(*first)
+    b = unit_vector(*second)
     along = sum(x * y for x, y in zip(a, b, strict=True))
     if abs(along) > ROUNDED:
         degrees = math.degrees(math.acos(max(-1.0, min(1.0, along))))
@@ -93,7 +94,8 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 MIRROR = np.array([1.0, -1.0, 1.0])
 """The plane y = 0 as a mirror."""
-AHEAD, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+AHEAD = np.array([1.0, 0.0, 0.0])
+UP = np.array([0.0, 0.0, 1.0])
 SHORT = 1e-6
 """Length below which a vector has no direction, and an axis no part along another one."""
 DIGITS = 12
@@ -123,7 +125,8 @@ def least_turn(old: Array, new: Array, spare: Array) -> Array:
 
 def arc_words(low: float, high: float) -> str:
     """Returns an arc [rad] in degrees, in words."""
-    low, high = math.degrees(low), math.degrees(high)
+    low = math.degrees(low)
+    high = math.degrees(high)
     return "any direction" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f} deg"
 
 

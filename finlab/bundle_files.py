@@ -19,13 +19,15 @@ from finlab.files.guarded import is_regular, read_file, unpacked
 FORMAT = "finlab-bundle"
 VERSION = 9
 """Version of the bundle; a reader knows exactly one."""
-ROBOT, ABOUT = "robot.json", "bundle.json"
+ROBOT = "robot.json"
+ABOUT = "bundle.json"
 NETWORKS = "checkpoint/"
 """Folder of a checkpoint that does not come with finlab."""
 TABLES = "tables/"
 """Folder of the fins' force tables, and of a learned interaction, each named by the SHA-256 of its
 content."""
-README, CHECKSUMS = "README.md", "SHA256SUMS"
+README = "README.md"
+CHECKSUMS = "SHA256SUMS"
 LARGEST = {
     ROBOT: 1_000_000,
     ABOUT: 100_000,

@@ -44,7 +44,8 @@ class AnyRobot:
     def with_settings(self, **changes: Any) -> "AnyRobot":
         other = copy(self)
         settings = checked_settings(self.choice.kind, {**vars(self.settings), **changes})
-        other.choice, other._made = replace(self.choice, settings=settings), {}
+        other.choice = replace(self.choice, settings=settings)
+        other._made = {}
         return other
 
     def on(self, layout: Layout) -> Allocator:

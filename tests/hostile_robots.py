@@ -67,7 +67,8 @@ def _places(rng: np.random.Generator, geometry: str, n: int) -> tuple[Array, Arr
     elif geometry == "origin":
         position[:] = 0.0
     elif geometry == "coincident":
-        position[:], angle[:] = position[0], angle[0]
+        position[:] = position[0]
+        angle[:] = angle[0]
     elif geometry == "collinear":
         position = np.linspace(-1.0, 1.0, n)[:, None] * position[0]
     elif geometry == "parallel":

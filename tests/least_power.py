@@ -49,13 +49,15 @@ class OwnSet:
         turn = 2 if actuator.kind == "fin" else 0
         self.full = actuator.turns_fully and arc is None
         first, last = arc or (low[turn], high[turn])
-        self.middle, self.half = 0.5 * (first + last), 0.5 * (last - first)
+        self.middle = 0.5 * (first + last)
+        self.half = 0.5 * (last - first)
         self.rays = [_Ray(sizes, costs)]
 
     @staticmethod
     def _ray(actuator: OwnActuator, sign: float, low: float, high: float) -> "_Ray":
         low, high = (low, high) if sign > 0.0 else (-high, -low)
-        least, most = max(low, 0.0), max(high, 0.0)
+        least = max(low, 0.0)
+        most = max(high, 0.0)
         least = max(least, actuator.dead_band) if most >= actuator.dead_band else most
         sizes = least + SHARES * (most - least)
         if low <= 0.0 and least > 0.0:
@@ -79,7 +81,8 @@ class OwnSet:
         if self.actuator.kind == "rudder":
             best = int((self.curve @ price - self.taken).argmax())
             return self.curve[best], float(self.curve[best] @ price - self.taken[best])
-        size, towards = float(np.hypot(*price)), math.atan2(price[1], price[0])
+        size = float(np.hypot(*price))
+        towards = math.atan2(price[1], price[0])
         lean = self.actuator.lean
         phi = self._direction(towards - lean)
         uneven = float(self.actuator.unevenness(phi))
@@ -108,7 +111,8 @@ class _Ray:
     """Costs over sizes along one direction, and the convex hull of them."""
 
     def __init__(self, sizes: Array, costs: Array) -> None:
-        self.sizes, self.costs = sizes, costs
+        self.sizes = sizes
+        self.costs = costs
 
         def slope(a: int, b: int) -> float:
             return float((costs[b] - costs[a]) / (sizes[b] - sizes[a]))
@@ -120,18 +124,22 @@ class _Ray:
             while len(keep) > 1 and slope(keep[-2], keep[-1]) >= slope(keep[-1], k):
                 keep.pop()
             keep.append(k)
-        self.corner, self.worth = sizes[keep], costs[keep]
+        self.corner = sizes[keep]
+        self.worth = costs[keep]
         self.slopes = np.diff(self.worth) / np.diff(self.corner)
 
     def answer(self, price: float) -> tuple[float, float]:
         """The size that earns most at a price, and what it earns."""
         k = int(np.searchsorted(self.slopes, price))
-        size, earned = float(self.corner[k]), float(price * self.corner[k] - self.worth[k])
+        size = float(self.corner[k])
+        earned = float(price * self.corner[k] - self.worth[k])
         if not 0 < k < len(self.slopes):
             return size, earned
         # Between three corners the cost is a parabola.
-        below, above = self.slopes[k - 1], self.slopes[k]
-        left, right = self.corner[k - 1] - size, self.corner[k + 1] - size
+        below = self.slopes[k - 1]
+        above = self.slopes[k]
+        left = self.corner[k - 1] - size
+        right = self.corner[k + 1] - size
         if right > -3.0 * left or -left > 3.0 * right:
             return size, earned  # the end of a piece that is not convex
         bend = (above - below) / (right - left)
@@ -224,7 +232,9 @@ def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[flo
     top = sum(max(ray.costs.max() for ray in each.rays) for each in sets)
 
     def loss(multiplier: Array) -> tuple[float, Array]:
-        price, gap, value = top * multiplier @ effectiveness, target.copy(), top * float(multiplier @ target)
+        price = top * multiplier @ effectiveness
+        gap = target.copy()
+        value = top * float(multiplier @ target)
         for each, a, b in zip(sets, starts[:-1], starts[1:], strict=True):
             force, earned = each.answer(price[a:b])
             value -= earned
@@ -235,12 +245,15 @@ def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[flo
         if intermediate_result.fun < -1.001:
             raise StopIteration
 
-    best, start = -np.inf, np.linalg.pinv(effectiveness.T) @ (np.linalg.pinv(effectiveness) @ target)
+    best = -np.inf
+    start = np.linalg.pinv(effectiveness.T) @ (np.linalg.pinv(effectiveness) @ target)
     start *= 1.0 / max(np.abs(start).max(), 1e-12) * 0.1
     for _ in range(3):
         options = {"gtol": 1e-9, "maxiter": 300}
         end = minimize(loss, start, jac=True, method="BFGS", options=options, callback=proved)
-        gain, best, start = -end.fun - best, max(best, -end.fun), end.x
+        gain = -end.fun - best
+        best = max(best, -end.fun)
+        start = end.x
         if best > 1.001:
             best = np.inf
         if gain < 1e-9 or best == np.inf:
@@ -252,7 +265,8 @@ def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[flo
 
 def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) -> float | None:
     """The fewest watts (or None) that SLSQP finds for a wrench (6,) over sizes and directions of forces."""
-    rng, sets = np.random.default_rng(seed), _sets(plant)
+    rng = np.random.default_rng(seed)
+    sets = _sets(plant)
     scale = plant.scales
     low, high = _ends(sets)
     splines = [
@@ -288,7 +302,8 @@ def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) 
         return total
 
     pulled = [_polar(sets, _dual(plant, halves, wrench)[1]) for halves in _halves(plant, 2)]
-    best, unit = None, max(sum(float(each.rays[0].costs.max()) for each in sets), 1e-9)
+    best = None
+    unit = max(sum(float(each.rays[0].costs.max()) for each in sets), 1e-9)
     for k in range(len(pulled) + starts):
         x0 = bounds[:, 0] + rng.random(len(bounds)) * (bounds[:, 1] - bounds[:, 0])
         if k < len(pulled):
@@ -308,14 +323,16 @@ def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) 
 
 def _ends(sets: tuple[OwnSet, ...]) -> tuple[list[Array], list[Array]]:
     """Least and largest size and direction by actuator; thrusters have a force alone."""
-    low, high = [], []
+    low = []
+    high = []
     for each in sets:
         if each.actuator.kind in ("thruster", "rudder"):
             ends = each.actuator.limits
             low.append(ends[0][:1])
             high.append(ends[1][:1])
             continue
-        sizes, span = each.rays[0].sizes, 3.0 * math.pi if each.full else each.half
+        sizes = each.rays[0].sizes
+        span = 3.0 * math.pi if each.full else each.half
         low.append(np.array([sizes[0], each.middle - span]))
         high.append(np.array([sizes[-1], each.middle + span]))
     return low, high
@@ -401,7 +418,8 @@ def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
     unit = np.maximum(most, 1e-9)
     cost = np.concatenate([np.zeros(m), np.array(price) * unit**exponent])
     reached = sparse.csc_matrix(np.hstack([columns * unit, np.zeros((6, m))]))
-    eye, zero = sparse.identity(m), sparse.csc_matrix((m, m))
+    eye = sparse.identity(m)
+    zero = sparse.csc_matrix((m, m))
     rows: list[sparse.spmatrix] = [reached, sparse.hstack([eye, zero]), sparse.hstack([-eye, zero])]
     right = [wrench / scale, (most > 0.0).astype(float), np.zeros(m)]
     cones = [clarabel.ZeroConeT(6), clarabel.NonnegativeConeT(2 * m)]
@@ -414,7 +432,8 @@ def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
     nothing = sparse.csc_matrix((2 * m, 2 * m))
-    scaled, matrix = cost / cost.max(), sparse.csc_matrix(sparse.vstack(rows))
+    scaled = cost / cost.max()
+    matrix = sparse.csc_matrix(sparse.vstack(rows))
     answer = clarabel.DefaultSolver(nothing, scaled, matrix, np.concatenate(right), cones, settings).solve()
     if "Solved" not in str(answer.status):
         raise ValueError(f"Clarabel: {answer.status}")

@@ -213,7 +213,8 @@ def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any
 
 
 def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
-    around, zero = rng.uniform(-math.pi, math.pi), [1.0, 0.0, 0.0]
+    around = rng.uniform(-math.pi, math.pi)
+    zero = [1.0, 0.0, 0.0]
     shaft = [0.0, math.cos(around), math.sin(around)]
     most = float(rng.uniform(10.0, 20.0))
     spec: dict[str, Any] = {"name": name, "type": "rudder", "position_m": _position(rng), "shaft": shaft}
@@ -265,7 +266,8 @@ def _wide_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, An
 def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
     """A fin whose least force is up to 5 % of its largest: it beats no slower than some frequency."""
     spec = _fin(rng, name, scale)
-    share, limits = float(rng.uniform(0.005, 0.05)), spec["limits"]
+    share = float(rng.uniform(0.005, 0.05))
+    limits = spec["limits"]
     limits["amplitude_rad"][0] = 0.3
     for frequency in np.linspace(0.1, 1.5, 141):
         limits["frequency_hz"][0] = float(frequency)

@@ -39,7 +39,9 @@ class OwnActuator:
     def __init__(
         self, spec: Mapping[str, Any], flow: ArrayLike | None = None, box: tuple[Array, Array] | None = None
     ) -> None:
-        self.spec, self.name, self._box = spec, str(spec["name"]), box
+        self.spec = spec
+        self.name = str(spec["name"])
+        self._box = box
         self.flow = np.zeros(6) if flow is None else np.asarray(flow, np.float64)
         self.kind = "azimuth" if spec["type"] == "tilt" else str(spec["type"])
         self.model = dict(spec.get("model", {"type": "drag"}))
@@ -103,7 +105,8 @@ class OwnActuator:
 
     def thrust(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
         """Thrust [N] of a fin, its unevenness left out."""
-        a, f = np.asarray(amplitude, np.float64), np.asarray(frequency, np.float64)
+        a = np.asarray(amplitude, np.float64)
+        f = np.asarray(frequency, np.float64)
         if self.model["type"] == "drag":
             scale = 2.0 * DENSITY * self._of("drag_coefficient") * self._of("area") * self._of("lever") ** 2
             return scale * (2.0 * math.pi * f) ** 2 * (1.0 - np.cos(2.0 * a))
@@ -127,13 +130,16 @@ class OwnActuator:
 
     def beating(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
         """Mean watts of a plate that beats about one edge; what braking gives back is lost."""
-        a, f = np.asarray(amplitude, np.float64), np.asarray(frequency, np.float64)
-        length, width = 0.2, 0.1
+        a = np.asarray(amplitude, np.float64)
+        f = np.asarray(frequency, np.float64)
+        length = 0.2
+        width = 0.1
         if self.model["type"] == "drag":
             length = 2.0 * self._of("lever")
             width = self._of("area") / length
         elif self.model["type"] == "lighthill":
-            length, width = self._of("length"), self._of("width")
+            length = self._of("length")
+            width = self._of("width")
         own = 0.0097 * (length / 0.2) ** 3 * (width / 0.1)
         inertia = own + math.pi / 4.0 * DENSITY * width**2 * length**3 / 3.0
         drag = DENSITY * 2.0 * width * length**4 / 8.0
@@ -148,7 +154,8 @@ class OwnActuator:
         """Force (..., 2) [N] in the own plane and watts (...,) of deflections [rad] in the flow."""
         spec = self.spec
         through = self.flow[:3] + np.cross(self.flow[3:], self.position)
-        ahead, aside = float(through @ self.first), float(through @ self.second)
+        ahead = float(through @ self.first)
+        aside = float(through @ self.second)
         speed = math.hypot(ahead, aside)
         if speed == 0.0:
             return np.zeros((*deflection.shape, 2)), np.zeros(deflection.shape)
@@ -188,7 +195,8 @@ class OwnActuator:
         if self.kind == "rudder":
             return self.foil(command[..., 0])[0]
         if self.kind == "azimuth":
-            size, angle = command[..., 1], command[..., 0]
+            size = command[..., 1]
+            angle = command[..., 0]
         else:
             size = self.thrust(command[..., 0], command[..., 1]) * self.unevenness(command[..., 2])
             angle = command[..., 2] + self.lean
@@ -222,14 +230,16 @@ class OwnActuator:
         spec = self.spec
         if self.kind == "fin":
             return np.array([spec.get("servo", {}).get(key, value) for key, value in SERVO.items()])
-        force, turn = spec.get("rate_n_s", np.inf), math.radians(spec.get("turn_rate_deg_s", np.inf))
+        force = spec.get("rate_n_s", np.inf)
+        turn = math.radians(spec.get("turn_rate_deg_s", np.inf))
         if self.kind == "rudder":
             return np.array([math.radians(spec.get("rate_deg_s", np.inf)), np.inf, np.inf])
         return np.array([turn, force, np.inf] if self.kind == "azimuth" else [force, np.inf, np.inf])
 
     def rate_excess(self, previous: Array, command: Array, period_s: float) -> float:
         """By what share of its largest step a command (3,) goes beyond what may follow a previous one."""
-        change, turn = command - previous, {"fin": 2, "azimuth": 0}.get(self.kind)
+        change = command - previous
+        turn = {"fin": 2, "azimuth": 0}.get(self.kind)
         if turn is not None and self.turns_fully:
             change[turn] = (change[turn] + math.pi) % (2.0 * math.pi) - math.pi
         return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
@@ -237,13 +247,17 @@ class OwnActuator:
     def after(self, previous: Array, period_s: float) -> "OwnActuator":
         """The actuator with only the commands that may follow a previous one (3,) after a time [s]."""
         low, high = self.limits
-        step, turn = self.rates * period_s, {"fin": 2, "azimuth": 0}.get(self.kind)
-        near, far = np.maximum(low, previous - step), np.minimum(high, previous + step)
+        step = self.rates * period_s
+        turn = {"fin": 2, "azimuth": 0}.get(self.kind)
+        near = np.maximum(low, previous - step)
+        far = np.minimum(high, previous + step)
         if turn is not None and self.turns_fully:
             whole = step[turn] >= math.pi
-            near[turn], far[turn] = low[turn], high[turn]
+            near[turn] = low[turn]
+            far[turn] = high[turn]
             if not whole:
-                near[turn], far[turn] = previous[turn] - step[turn], previous[turn] + step[turn]
+                near[turn] = previous[turn] - step[turn]
+                far[turn] = previous[turn] + step[turn]
         return OwnActuator(self.spec, self.flow, (near, far))
 
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
@@ -255,7 +269,8 @@ class OwnActuator:
         elif self.kind == "azimuth":
             top[1] = low[1] + share * (high - low)[1]
         elif low[0] < 0.0 < high[0]:
-            low, top = share * low, share * high
+            low = share * low
+            top = share * high
         else:
             top[0] = low[0] + share * (high - low)[0]
         return low + rng.random((count, 3)) * (top - low)
@@ -265,7 +280,8 @@ class OwnPlant:
     """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by default."""
 
     def __init__(self, layout: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
-        self.layout, self.flow = layout, flow
+        self.layout = layout
+        self.flow = flow
         self.actuators = tuple(OwnActuator(spec, flow) for spec in layout["actuators"])
 
     @cached_property
@@ -314,7 +330,8 @@ class OwnPlant:
     def scales(self) -> Array:
         """Two scales of the robot, one for forces [N] and one for torques [N m], as six numbers: roots of the
         sums of squares of what each actuator alone can push and turn at most."""
-        forces, torques = [], []
+        forces = []
+        torques = []
         for each in self.actuators:
             edge = edge_forces(each, 181)
             wrench = edge @ each.effectiveness.T
@@ -328,7 +345,8 @@ class OwnPlant:
             return np.array(result.command, np.float64)
         rows = []
         for each in self.actuators:
-            given, row = result.commands.get(each.name), np.full(3, np.nan)
+            given = result.commands.get(each.name)
+            row = np.full(3, np.nan)
             if given is not None:
                 values = [getattr(given, key) for key in COMMAND_KEYS[each.kind]]
                 row = np.zeros(3)

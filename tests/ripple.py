@@ -29,9 +29,11 @@ class RippleForce(ActuatorForce):
 
     def of_fins(self, dt: float) -> Array:
         """See `ActuatorForce`."""
-        motion, length = self._beat, self.blade.length
+        motion = self._beat
+        length = self.blade.length
         force = super().of_fins(dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
-        angle, speed = motion.angle + math.pi, motion.speed_and_acceleration()[0]
+        angle = motion.angle + math.pi
+        speed = motion.speed_and_acceleration()[0]
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
         drag = self.blade.drag_per_length * length**3 / 3.0 * speed * np.abs(speed)

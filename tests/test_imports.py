@@ -126,7 +126,8 @@ def _allowed(module: str, here: str, there: str) -> bool:
     """Whether the plan has a module of one room import another room."""
     if here == there:
         return True
-    own, other = _wing(here), _wing(there)
+    own = _wing(here)
+    other = _wing(there)
     if own == "cli":
         return other == "core" or other in VERBS.get(module.replace(".", "/").removeprefix("finlab/"), set())
     if own == other:

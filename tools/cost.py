@@ -124,7 +124,8 @@ def _answers(
     """Costs and normalized errors, each (N,)."""
     answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)
     works = [name not in case.lost for name in case.layout.names]
-    command, plant = answer.command[:, works], plant_of(case.healthy)
+    command = answer.command[:, works]
+    plant = plant_of(case.healthy)
     error = np.linalg.norm((plant.wrench(command) - case.targets) / sigma, axis=-1)
     # An answer outside its limits is none, whatever it would cost.
     error[((command < plant.lower) | (command > plant.upper)).any((1, 2))] = np.inf
@@ -132,7 +133,8 @@ def _answers(
 
 
 def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -> Row:
-    tracked, known = error <= TRACKED, np.isfinite(best)
+    tracked = error <= TRACKED
+    known = np.isfinite(best)
     both = known & tracked
     row: Row = {"n": len(cost), "solved_by_starts": int(known.sum()), "tracked": float(tracked.mean())}
     if not both.any():

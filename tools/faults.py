@@ -198,7 +198,8 @@ def _without_calls(code: str) -> str:
     text = code[-400:]
     shorter = re.sub(r"\([^()]*\)", "", text)
     while shorter != text:
-        text, shorter = shorter, re.sub(r"\([^()]*\)", "", shorter)
+        text = shorter
+        shorter = re.sub(r"\([^()]*\)", "", shorter)
     return text
 
 

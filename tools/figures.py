@@ -33,7 +33,9 @@ def main(names: list[str]) -> int:
         return 2
     for page in [PAGES[name] for name in names or PAGES]:
         for mark, name, keys in re.findall(MARK, page.read_text(encoding="utf-8")):
-            made, text = table_of(name, keys.split()), page.read_text(encoding="utf-8")  # changed meanwhile
+            # changed meanwhile
+            made = table_of(name, keys.split())
+            text = page.read_text(encoding="utf-8")
             before, _, rest = text.partition(mark)
             page.write_text(before + mark + made + END + rest.partition(END)[2], encoding="utf-8")
             print(page.relative_to(ROOT), flush=True)
@@ -42,7 +44,8 @@ def main(names: list[str]) -> int:
 
 def table_of(name: str, keys: list[str]) -> str:
     """The command and the table, in Markdown, of an experiment's quick sizes."""
-    experiment, began = load_experiment(name), time.monotonic()
+    experiment = load_experiment(name)
+    began = time.monotonic()
     begin(name)
     typed = dict(key.split("=") for key in keys if "=" in key)
     chosen = {**experiment.quick, **{name: _value(value) for name, value in typed.items()}}

@@ -143,7 +143,8 @@ class App:
         self._drop(client.client_id)
 
     def _drop(self, client_id: int) -> None:
-        view, key = self.views.pop(client_id, None), self._keys.pop(client_id, None)
+        view = self.views.pop(client_id, None)
+        key = self._keys.pop(client_id, None)
         if view is not None:
             view.close()
         if key is not None:

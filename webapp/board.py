@@ -26,9 +26,13 @@ class Rule:
 
     def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
         """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
-        self.group, self.make, self.handle, self.key = group, make, handle, key
+        self.group = group
+        self.make = make
+        self.handle = handle
+        self.key = key
         self.names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
-        self.is_due, self.last = True, UNKNOWN
+        self.is_due = True
+        self.last = UNKNOWN
 
     def write(self, facts: Facts) -> None:
         """Make it again, and send what has changed."""
@@ -51,8 +55,11 @@ class Group:
     def __init__(self, fail: Fail, fault: Callable[[Exception], None]) -> None:
         """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears why."""
         self.rules: list[Rule] = []
-        self.there, self.is_due, self._failed = True, True, False
-        self._fail, self._fault = fail, fault
+        self.there = True
+        self.is_due = True
+        self._failed = False
+        self._fail = fail
+        self._fault = fault
 
     def write(self, facts: Facts) -> None:
         """Make again what is due."""
@@ -135,15 +142,19 @@ class Board:
 
     def refresh(self, facts: Facts) -> None:
         """Write what has changed where it can be seen; the rest waits until it can."""
-        before, self.facts = self.facts, facts
+        before = self.facts
+        self.facts = facts
         self._seen = facts
         if before is None:
             for group in self.groups:
                 for rule in group.rules:
-                    rule.last, rule.is_due, group.is_due = UNKNOWN, True, True
+                    rule.last = UNKNOWN
+                    rule.is_due = True
+                    group.is_due = True
         else:
             for name, rules in self._of_fact.items():
-                old, new = before[name], facts[name]
+                old = before[name]
+                new = facts[name]
                 if old is not new and not (type(old) in PLAIN and old == new):
                     for rule in rules:
                         rule.is_due = rule.group.is_due = True

@@ -14,7 +14,9 @@ from webapp.tasks.slot import Slot
 def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale) -> Facts:
     """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
     newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
-    state, swimming, swimmer = session.state, jobs.swimming, jobs.swimming.swimmer
+    state = session.state
+    swimming = jobs.swimming
+    swimmer = jobs.swimming.swimmer
     tasks: dict[str, Slot[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
     tasks |= {"better": jobs.improver, "fitted": jobs.fitting, "judged": jobs.log}
     known: Facts = {}

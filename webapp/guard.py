@@ -57,7 +57,8 @@ class Guard:
     def check(self, path: str, headers: dict[str, str]) -> Response | None:
         """What to answer a request that is not let through, or that brings the token along; else None.
         `path` has the query, `headers` names in lower case."""
-        host, origin = headers.get("host", "").lower(), headers.get("origin")
+        host = headers.get("host", "").lower()
+        origin = headers.get("origin")
         if is_loopback(self.host) and not is_loopback(_name(host)):
             # Another site's name that was made to point at this machine.
             return answer(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")

@@ -98,7 +98,9 @@ class Presses:
 
     def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None], bell: Bell) -> None:
         """Listen to the page; `do` carries out what was meant."""
-        self._gui, self._do, self._bell = gui, do, bell
+        self._gui = gui
+        self._do = do
+        self._bell = bell
         self._acts: dict[str, Act] = {}
         self._last = 0
         hidden = "<style>[data-fl~=presses] + div {{ display: none; }}</style>{}"
@@ -156,6 +158,7 @@ class Asking:
         run_script(self._gui, f"finlabCards.ask(...{card});")
 
     def _answer(self, key: str, _text: str) -> None:
-        acts, self._acts = self._acts, []
+        acts = self._acts
+        self._acts = []
         if key.isdecimal() and int(key) < len(acts):
             acts[int(key)]()

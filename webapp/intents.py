@@ -20,7 +20,8 @@ class Intents:
 
     def __init__(self, client: viser.ClientHandle, bell: Bell) -> None:
         """`bell` wakes the page after each."""
-        self._client, self._bell = client, bell
+        self._client = client
+        self._bell = bell
         self._note: viser.NotificationHandle | None = None
         self._faults: set[str] = set()
         self.is_new = False

@@ -33,7 +33,10 @@ class Page:
 
     def __init__(self, client: viser.ClientHandle, context: Context, intents: Intents) -> None:
         """A page without panels; what a user does goes to `intents`."""
-        self.client, self.gui, self.do, self.notify = client, client.gui, intents.do, intents.notify
+        self.client = client
+        self.gui = client.gui
+        self.do = intents.do
+        self.notify = intents.notify
         session = self.session = context.session
         solver = self.solver = context.solver
         self.jobs = Jobs(context)

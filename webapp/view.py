@@ -48,12 +48,17 @@ class View:
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """Build the page and begin; called on `loop`, which is viser's. Threads of `pools` compute."""
-        self.client, self.session = client, session
+        self.client = client
+        self.session = session
         self.bell = Bell(loop)
         self.intents = Intents(client, self.bell)
         page = self.page = Page(client, Context(session, solver, pools, self.bell), self.intents)
-        self.do, self.jobs, self.board, self.scenery = page.do, page.jobs, page.board, page.scenery
-        self.designs, self.deferred = page.designs, page.deferred
+        self.do = page.do
+        self.jobs = page.jobs
+        self.board = page.board
+        self.scenery = page.scenery
+        self.designs = page.designs
+        self.deferred = page.deferred
         self.frame = Frame(page)
         page.presses.start()
         self._revision: int | None = None
@@ -155,7 +160,9 @@ class View:
         self._is_due = False
 
     def _write_words(self) -> None:
-        intents, board, session = self.intents, self.board, self.session
+        intents = self.intents
+        board = self.board
+        session = self.session
         if intents.is_distrusted:
             board.distrust()
             intents.is_distrusted = False
@@ -163,7 +170,8 @@ class View:
             board.doubt(handle)
         intents.doubted.clear()
         try:
-            seen, guide = self.jobs.answering.seen(), session.guide
+            seen = self.jobs.answering.seen()
+            guide = session.guide
             if guide.stop is not None and seen.shown is not None and not seen.busy:
                 guide.take(seen.shown)
             self.scenery.follow_guide()

@@ -112,7 +112,8 @@ async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]
     A page that is just reconnecting may drop the question, so it is repeated, after each time [s] of
     `patience` but the last one. TimeoutError: it did not answer at all. RuntimeError: it forbids storage.
     """
-    connection, question = client._websock_connection, f"finlab-{secrets.token_hex(8)}"
+    connection = client._websock_connection
+    question = f"finlab-{secrets.token_hex(8)}"
     answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
 
     def hear(client_id: int, message: Any) -> None:
@@ -169,7 +170,8 @@ def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
 def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) -> None:
     """Hold what a page sends against what it announced, where viser trusts it until the last part, and what
     is on its way from it against `most` bytes; `refuse` hears why a file is dropped."""
-    interface, states = gui._websock_interface, gui._current_file_upload_states
+    interface = gui._websock_interface
+    states = gui._current_file_upload_states
 
     def drop(message: Any, size: int, sentence: str) -> None:
         states.pop(message.transfer_uuid, None)
@@ -178,7 +180,9 @@ def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) 
         refuse(sentence)
 
     def begin(client: Any, message: Any) -> None:
-        name, size, parts = str(message.filename)[-80:], message.size_bytes, message.part_count
+        name = str(message.filename)[-80:]
+        size = message.size_bytes
+        parts = message.part_count
         if type(size) is not int or type(parts) is not int or not 0 <= parts <= max(size, 0):
             drop(message, 0, f"{name}: is announced with {size!r:.20} bytes in {parts!r:.20} parts")
         elif size + sum(state["total_bytes"] for state in states.values()) > most:

@@ -347,7 +347,8 @@ class Actuator(Checked, ABC):
             changes[self.ARC] = tuple(-end + 0.0 for end in reversed(getattr(self, self.ARC)))
         if hasattr(self, "torque_per_newton"):
             changes["torque_per_newton"] = -self.torque_per_newton + 0.0
-        frame, place = np.array(self.frame) * axes.MIRROR, np.array(self.position) * axes.MIRROR
+        frame = np.array(self.frame) * axes.MIRROR
+        place = np.array(self.position) * axes.MIRROR
         return self.turned(frame, place, **changes)
 
     def facing(self, towards: axes.Vector) -> Self:
@@ -356,7 +357,9 @@ class Actuator(Checked, ABC):
         length = math.hypot(*towards)
         if not axes.SHORT < length < math.inf:
             raise FinlabError(f"direction of {self.name}: expected a vector with a length, got {towards}")
-        wanted, frame, k = np.array(towards) / length, np.array(self.frame), self.POINTED
+        wanted = np.array(towards) / length
+        frame = np.array(self.frame)
+        k = self.POINTED
         if np.abs(wanted - frame[k]).max() < axes.SHORT:
             return self
         frame = frame @ axes.least_turn(frame[k], wanted, frame[2 if k == 0 else 0]).T
@@ -372,7 +375,9 @@ class Actuator(Checked, ABC):
         stands across it. Raises FinlabError: the vector points along the direction."""
         if len(self.AXES) == 1:
             return self
-        frame, wanted, k = np.array(self.frame), np.array(towards, dtype=np.float64), self.POINTED
+        frame = np.array(self.frame)
+        wanted = np.array(towards, dtype=np.float64)
+        k = self.POINTED
         if not axes.SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
             raise FinlabError(f"{self.name}: expected a direction across its {self.AXES[k]}, got {towards}")
         frame[1 - k] = axes.across(frame[k], wanted)

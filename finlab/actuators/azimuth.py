@@ -44,15 +44,19 @@ class AzimuthLaw(PropellerLaw):
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
         size = self.given(command)
-        force[..., 1], force[..., 2] = size * np.cos(command[..., 0]), size * np.sin(command[..., 0])
+        force[..., 1] = size * np.cos(command[..., 0])
+        force[..., 2] = size * np.sin(command[..., 0])
         return force
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         force = self.force(command)
         jacobian = np.zeros((*command.shape, 3))
-        jacobian[..., 0, 1], jacobian[..., 0, 2] = -force[..., 2], force[..., 1]
-        angle, free = command[..., 0], self.given(command) == command[..., 1]
-        jacobian[..., 1, 1], jacobian[..., 1, 2] = np.cos(angle) * free, np.sin(angle) * free
+        jacobian[..., 0, 1] = -force[..., 2]
+        jacobian[..., 0, 2] = force[..., 1]
+        angle = command[..., 0]
+        free = self.given(command) == command[..., 1]
+        jacobian[..., 1, 1] = np.cos(angle) * free
+        jacobian[..., 1, 2] = np.sin(angle) * free
         return force, jacobian
 
 
@@ -120,11 +124,22 @@ class Azimuth(Propeller):
         "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
         "turn_rate": ("turn_rate_deg_s", actuator.TurnRateDegrees),
     }
-    LAW, GROUP = AzimuthLaw, AzimuthGroup
-    NUMBERS, COMMAND = (("angle", "rad"), ("force", "N")), AzimuthCommand
-    LIMITS, RATES, AXES = ("arc", "force"), ("turn_rate", "rate"), ("turn_axis", "zero")
-    POINTED, PUSHES, LAGS, THRUST, ANGLE, ARC = 1, (1, 2), 1, 1, 0, "arc"
-    FAULTS, LOOKS, OTHER = ("weak", "stuck", "running"), "pod", "Turns about"
+    LAW = AzimuthLaw
+    GROUP = AzimuthGroup
+    NUMBERS = (("angle", "rad"), ("force", "N"))
+    COMMAND = AzimuthCommand
+    LIMITS = ("arc", "force")
+    RATES = ("turn_rate", "rate")
+    AXES = ("turn_axis", "zero")
+    POINTED = 1
+    PUSHES = (1, 2)
+    LAGS = 1
+    THRUST = 1
+    ANGLE = 0
+    ARC = "arc"
+    FAULTS = ("weak", "stuck", "running")
+    LOOKS = "pod"
+    OTHER = "Turns about"
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
     BOXES = (
         actuator.Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
@@ -194,8 +209,10 @@ class Azimuth(Propeller):
     @classmethod
     def sample(cls) -> Self:
         """See `Actuator`: a T200 of Blue Robotics at 16 V on a pod."""
-        up, rate = (0.0, 0.0, 1.0), math.radians(120)
-        force, model = (0.0, 51.44), PowerLaw(T200.forward)
+        up = (0.0, 0.0, 1.0)
+        rate = math.radians(120)
+        force = (0.0, 51.44)
+        model = PowerLaw(T200.forward)
         return cls(
             cls.type, (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), force, model, cls.SAMPLE_ARC, turn_rate=rate
         )
@@ -208,7 +225,8 @@ class Azimuth(Propeller):
         return row
 
     def damaged(self, faults: actuator.Faults) -> Self:
-        left, (low, high) = faults.weak, self.force
+        left = faults.weak
+        low, high = self.force
         force = self.force if left is None else actuator.weakened((max(low, left * low), high), left)
         angle = faults.stuck if faults.running is None else faults.running[0]
         held = replace(self, force=force, arc=actuator.held_limits(angle, self.arc))

@@ -44,8 +44,10 @@ class HermiteGrids:
         self.grids = grids
         knots = [axis for grid in grids for axis in closed_axes(grid)]
         counts = np.array([len(axis) for axis in knots])
-        first, last = np.array([axis[0] for axis in knots]), np.array([axis[-1] for axis in knots])
-        scale, shift = 1.0 / (last - first), 2.0 * np.arange(len(knots))
+        first = np.array([axis[0] for axis in knots])
+        last = np.array([axis[-1] for axis in knots])
+        scale = 1.0 / (last - first)
+        shift = 2.0 * np.arange(len(knots))
         # All axes are looked up together: on one line where axis k lies between 2 k and 2 k + 1.
         line = [(axis - axis[0]) * s + k for axis, s, k in zip(knots, scale, shift, strict=True)]
         self._line = np.concatenate(line)
@@ -103,7 +105,9 @@ class HermiteGrids:
         t = (held - start[..., 0]) * pace
         squared = t * t
         powers = np.zeros((*t.shape, orders, 4))
-        powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2] = 1.0, t, squared
+        powers[..., 0, 0] = 1.0
+        powers[..., 0, 1] = t
+        powers[..., 0, 2] = squared
         np.multiply(squared, t, out=powers[..., 0, 3])
         if orders == 2:
             pace = pace * (np.abs(held - value) <= ROUNDING)  # beyond the grid nothing changes any more
@@ -132,9 +136,12 @@ def shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
     gaps = np.diff(knots)
     before, after = (gaps[-1], gaps[0]) if periodic else (0.0, 0.0)
     pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])
-    early, late = gaps / pair[:-1], gaps / pair[1:]
-    none, one = np.zeros_like(gaps), np.ones_like(gaps)
-    linear, square = [-early, none, early, none], [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late]
+    early = gaps / pair[:-1]
+    late = gaps / pair[1:]
+    none = np.zeros_like(gaps)
+    one = np.ones_like(gaps)
+    linear = [-early, none, early, none]
+    square = [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late]
     cubic = [-early, 2.0 - late, early - 2.0, late]
     shapes = np.moveaxis(np.array([[none, one, none, none], linear, square, cubic]), -1, 0)
     places = np.stack([knots[:-1], 1.0 / gaps], axis=-1)
@@ -155,7 +162,9 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
     core, on as few knots as say it: the size or its root, over amplitude or its product with frequency."""
     share = np.random.default_rng(0).uniform(size=(300, 3))
     command = lower + share * (upper - lower)
-    wanted, best, least = size(command[:, 0], command[:, 1]), np.empty(0), np.inf
+    wanted = size(command[:, 0], command[:, 1])
+    best = np.empty(0)
+    least = np.inf
     for (cells, more), beat, root in product(_CELLS, (False, True), (True, False)):
         ends = (lower[0] * lower[1], upper[0] * upper[1]) if beat else (lower[0], upper[0])
         # Of the product alone, the frequency does not matter; powers of it bend most near 0.
@@ -175,7 +184,8 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
         got = HermiteGrids([Grid(known, values, False)])(at, 1)[:, 0, 0, 0, 0] ** (2 if root else 1)
         error = float(np.abs(got - wanted).max())
         if error < least:
-            least, best = error, grid_numbers([*axes, np.zeros(1)], value[..., None, None], 0.0, beat, root)
+            least = error
+            best = grid_numbers([*axes, np.zeros(1)], value[..., None, None], 0.0, beat, root)
         if error <= NOTHING * wanted.max():
             break
     return best
@@ -184,5 +194,6 @@ def size_numbers(size: Callable[[Array, Array], Array], lower: Array, upper: Arr
 def _knots(low: float, high: float, cells: int, power: float) -> Array:
     """Knots between two ends, as dense towards the lower one as a power of equal steps, and one more on
     either side: slopes at the ends are as good."""
-    width, share = max(high - low, NOTHING), (np.arange(cells + 2.0) / cells) ** power
+    width = max(high - low, NOTHING)
+    share = (np.arange(cells + 2.0) / cells) ** power
     return low + width * np.concatenate([[-share[1]], share])

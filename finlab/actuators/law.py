@@ -167,7 +167,8 @@ class PlanarLaw(FinLaw):
 
     def grid_numbers(self, lower: Array, upper: Array) -> Array:
         """See `FinLaw`: of the size."""
-        even, around = 1.0 + self.unevenness[0], self.unevenness[1]
+        even = 1.0 + self.unevenness[0]
+        around = self.unevenness[1]
         return size_numbers(lambda a, f: np.asarray(self.thrust(a, f, around) / even), lower, upper)
 
     @abstractmethod
@@ -182,7 +183,9 @@ class PlanarLaw(FinLaw):
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         xp = library_of(command)
-        amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
+        amplitude = command[..., 0]
+        frequency = command[..., 1]
+        zero_direction = command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
         if xp is np:
@@ -200,13 +203,16 @@ class PlanarLaw(FinLaw):
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         parts = command[..., 0], command[..., 1], command[..., 2]
         direction = parts[2] + self.offset
-        cos, sin = np.cos(direction), np.sin(direction)
+        cos = np.cos(direction)
+        sin = np.sin(direction)
         thrust = self.thrust(*parts)
         force = np.zeros((*thrust.shape, 3))
         jacobian = np.zeros((*thrust.shape, 3, 3))
-        force[..., 1], force[..., 2] = thrust * cos, thrust * sin
+        force[..., 1] = thrust * cos
+        force[..., 2] = thrust * sin
         for k, slope in enumerate(self.thrust_gradient(*parts)):
-            jacobian[..., k, 1], jacobian[..., k, 2] = slope * cos, slope * sin
+            jacobian[..., k, 1] = slope * cos
+            jacobian[..., k, 2] = slope * sin
         jacobian[..., 2, 1] -= force[..., 2]
         jacobian[..., 2, 2] += force[..., 1]
         return force, jacobian

@@ -145,7 +145,8 @@ def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
         return None
     force = np.asarray(force, np.float64)
     inputs, forces, _ = model.columns
-    first, last = np.searchsorted(forces, 0.0, "left"), np.searchsorted(forces, 0.0, "right")
+    first = np.searchsorted(forces, 0.0, "left")
+    last = np.searchsorted(forces, 0.0, "right")
     ahead = slice(max(last - 1, 0), None)
     astern = slice(0, first + 1)
     sent: Array = np.where(

@@ -64,7 +64,8 @@ class RadialTable:
 
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
-        per, (base, force, power) = share / cost, self.origin
+        per = share / cost
+        base, force, power = self.origin
         scaled = base, share * force, cost * power
         return RadialTable(
             self.top / per, self.force * share, self.slope * share * per, self.rest * cost, scaled
@@ -78,9 +79,12 @@ class RadialTable:
     def conjugate(self, price: Array) -> Array:
         """The most (...) [W] that a force is worth, less its power, at prices (...) [W/N] from 0 to `top`."""
         cell = np.clip(np.searchsorted(_GRID, price / self.top, side="right") - 1, 0, CELLS - 1)
-        width, share = self.top * np.diff(_GRID), price / self.top - _GRID[cell]
+        width = self.top * np.diff(_GRID)
+        share = price / self.top - _GRID[cell]
         t = share / np.diff(_GRID)[cell]
-        first, last, (m0, m1) = self.force[cell], self.force[cell + 1], self._bends[:, cell]
+        first = self.force[cell]
+        last = self.force[cell + 1]
+        (m0, m1) = self._bends[:, cell]
         rise = last - first
         part = first + t * (
             m0 / 2.0 + t * ((3.0 * rise - 2.0 * m0 - m1) / 3.0 + t * (m0 + m1 - 2.0 * rise) / 4.0)
@@ -113,7 +117,9 @@ class RadialTable:
         cell = np.minimum(np.arange(CELLS + 1) // step, CELLS // step - 1)
         width = np.diff(few[0])[cell]
         t = (_GRID - few[0][cell]) / width
-        m0, m1, rise = few[2][cell] * width, few[2][cell + 1] * width, np.diff(few[1])[cell]
+        m0 = few[2][cell] * width
+        m1 = few[2][cell + 1] * width
+        rise = np.diff(few[1])[cell]
         found = few[1][cell] + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
         return bool(np.abs(found - self.force).max() <= 0.1 * NOTHING * self.largest)
 
@@ -121,7 +127,8 @@ class RadialTable:
         """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before
         v."""
         price = price_grid(self.top) + 2.0 * weight * self.force
-        top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
+        top = float(price[-1])
+        rest = self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
 
 
@@ -137,7 +144,8 @@ def table_numbers(top: float, force: Array, slope: Array, rest: float) -> Array:
 
 def monotone_slopes(x: Array, y: Array) -> Array:
     """Slopes (K,) of a rising cubic spline through points (K,), third order where the data allow."""
-    width, chord = np.diff(x), np.diff(y) / np.diff(x)
+    width = np.diff(x)
+    chord = np.diff(y) / np.diff(x)
     slope = np.empty_like(y)
     slope[1:-1] = (width[1:] * chord[:-1] + width[:-1] * chord[1:]) / (width[1:] + width[:-1])
     slope[0] = chord[0] + (chord[0] - chord[1]) * width[0] / (width[0] + width[1])

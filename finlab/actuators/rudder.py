@@ -222,7 +222,8 @@ class RudderGroup(Group):
         responses: list[Response] = []
         ends = zip(*self._lift(self._limits).T.tolist(), strict=True)
         for i, (low, high) in enumerate(ends):
-            pressure, speed = float(self._met.pressure[i]), float(self._met.speed[i])
+            pressure = float(self._met.pressure[i])
+            speed = float(self._met.speed[i])
             if pressure < NOTHING:
                 table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
                 responses.append(Line(self._across[i], table, table, low=low, high=high))
@@ -335,10 +336,19 @@ class Rudder(actuator.Actuator):
         "stall": ("stall_deg", StallDegrees),
         "rate": ("rate_deg_s", actuator.TurnRateDegrees),
     }
-    LAW, GROUP = RudderLaw, RudderGroup
-    NUMBERS, COMMAND = (("deflection", "rad"),), RudderCommand
-    LIMITS, RATES, AXES, PUSHES = ("deflection",), ("rate",), ("shaft", "zero"), (2,)
-    ARC, BY_FLOW, FAULTS, LOOKS, OTHER = "deflection", True, ("torn",), "foil", "Leading edge"
+    LAW = RudderLaw
+    GROUP = RudderGroup
+    NUMBERS = (("deflection", "rad"),)
+    COMMAND = RudderCommand
+    LIMITS = ("deflection",)
+    RATES = ("rate",)
+    AXES = ("shaft", "zero")
+    PUSHES = (2,)
+    ARC = "deflection"
+    BY_FLOW = True
+    FAULTS = ("torn",)
+    LOOKS = "foil"
+    OTHER = "Leading edge"
     BOXES = (
         actuator.Box("Deflection [°]", "deflection", "Least and greatest.", 1.0, True, pair=True),
         actuator.Box("Rate [°/s]", "rate", "How fast it turns; 0: at once.", 5.0, True, True),
@@ -407,7 +417,8 @@ class Rudder(actuator.Actuator):
     @classmethod
     def sample(cls) -> Self:
         """See `Actuator`: a tail fin of REMUS 100."""
-        up, ends = (0.0, 0.0, 1.0), (-math.pi / 6, math.pi / 6)
+        up = (0.0, 0.0, 1.0)
+        ends = (-math.pi / 6, math.pi / 6)
         return cls("rudder", (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), 0.00665, ends, 2.21)
 
     def largest(self, speed: float) -> float:

@@ -140,7 +140,8 @@ def check_force(model: ThrustModel, force: tuple[float, float]) -> None:
     """Refuses limits of the force that a table does not cover. Raises LayoutError: a limit [N] lies beyond
     the table's rows."""
     if isinstance(model, PowerTable):
-        least, most = model.rows[0][1], model.rows[-1][1]
+        least = model.rows[0][1]
+        most = model.rows[-1][1]
         if not least <= force[0] <= force[1] <= most:
             raise LayoutError(
                 f"the table ends at {least:g} and {most:g} N, got {force[0]:g} .. {force[1]:g}", "force"
@@ -151,9 +152,11 @@ def side_points(force: Array, power: Array, sign: int) -> tuple[Array, Array]:
     """Returns sizes of force (K,) [N], from 0 on and rising, and the least power (K,) [W] known at each, of
     the forward (`sign` 1) or the reverse side (-1) of a table."""
     kept = sign * force >= 0.0
-    size, watts = (sign * force)[kept], power[kept]
+    size = (sign * force)[kept]
+    watts = power[kept]
     if not (size == 0.0).any():
-        size, watts = np.append(size, 0.0), np.append(watts, np.interp(0.0, force, power))
+        size = np.append(size, 0.0)
+        watts = np.append(watts, np.interp(0.0, force, power))
     places, inverse = np.unique(size, return_inverse=True)
     least = np.full(len(places), np.inf)
     np.minimum.at(least, inverse, watts)

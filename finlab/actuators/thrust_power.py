@@ -56,7 +56,8 @@ class Curve:
         slope = np.zeros_like(size)
         slope[1:-1] = (chord[:-1] * step[1:] + chord[1:] * step[:-1]) / (step[1:] + step[:-1])
         slope[-1] = max(1.5 * chord[-1] - 0.5 * slope[-2], chord[-1])
-        below, above = chord - slope[:-1], slope[1:] - chord
+        below = chord - slope[:-1]
+        above = slope[1:] - chord
         total = np.maximum(below + above, 1e-300)
         share = np.clip(np.where(above < below, above, total - below) / total, 1e-6, 1.0 - 1e-6)
         between = 2.0 * chord - slope[:-1] * share - slope[1:] * (1.0 - share)

@@ -100,10 +100,18 @@ class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
 class Thruster(Propeller):
     """A thruster with a fixed axis; its command is the force. Checked on construction."""
 
-    LAW, GROUP = ThrusterLaw, ThrusterGroup
-    NUMBERS, COMMAND = (("force", "N"),), ThrusterCommand
-    LIMITS, RATES, AXES, PUSHES = ("force",), ("rate",), ("axis",), (0,)
-    THRUST, TURNS, FAULTS, LOOKS = 0, False, ("weak", "stuck", "running"), "thruster"
+    LAW = ThrusterLaw
+    GROUP = ThrusterGroup
+    NUMBERS = (("force", "N"),)
+    COMMAND = ThrusterCommand
+    LIMITS = ("force",)
+    RATES = ("rate",)
+    AXES = ("axis",)
+    PUSHES = (0,)
+    THRUST = 0
+    TURNS = False
+    FAULTS = ("weak", "stuck", "running")
+    LOOKS = "thruster"
     BOXES = (
         Box("Force [N]", "force", "Least and most along the axis; astern it is negative.", 1.0, pair=True),
         *Propeller.BOXES,
@@ -158,7 +166,8 @@ class Thruster(Propeller):
         return cls("thruster", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-39.91, 51.44), T200)
 
     def damaged(self, faults: Faults) -> Self:
-        left, (low, high) = faults.weak, self.force
+        left = faults.weak
+        low, high = self.force
         weak = self if left is None else replace(self, force=(left * low, left * high))
         force = faults.stuck if faults.running is None else faults.running[0]
         return weak if force is None else weak.hung(force)

@@ -318,7 +318,8 @@ class Allocation(Answer[float]):
     @property
     def share(self) -> float:
         """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
-        target, wrench = np.nan_to_num(self.target / self.scale), self.wrench / self.scale
+        target = np.nan_to_num(self.target / self.scale)
+        wrench = self.wrench / self.scale
         size = float(target @ target)
         return 1.0 if size < 1e-14 else float(target @ wrench) / size
 

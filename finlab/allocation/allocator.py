@@ -76,7 +76,8 @@ class Question(NamedTuple):
         nothing to do."""
         robot, method, *_ = self.ready
         if method.takes_losses:
-            options["lost"], options["free"] = robot.lost, self.ready.free
+            options["lost"] = robot.lost
+            options["free"] = self.ready.free
         elif previous is not None:
             options["previous"] = previous[robot.alive]
         if method.takes_losses and previous is not None:
@@ -208,7 +209,8 @@ class Allocator:
         return made
 
     def _made(self, layout: Layout, choice: methods.MethodChoice) -> None:
-        self._layout, self._choice = layout, choice
+        self._layout = layout
+        self._choice = choice
         self._scale = yardstick(layout)
         self._whole = self._make(WHOLE)
         self._prepared: dict[object, Ready] = {}
@@ -308,7 +310,8 @@ class Allocator:
         known = damage_of(damage, lost)
         question = self._question(known, policy, flow, seed, free)
         ready = question.ready
-        robot, method = ready.robot, ready.method
+        robot = ready.robot
+        method = ready.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
@@ -442,7 +445,8 @@ class Allocator:
     def _make(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> Ready:
         """The robot in a state. A method that takes losses with the question is that of the state without
         any, and a loss prepares nothing."""
-        robot, choice = usable(self._layout, damage), self._choice
+        robot = usable(self._layout, damage)
+        choice = self._choice
         counts = self._layout.commanded if free is None else self._layout.commanded & ~free
         none_count = None if counts.all() else ~counts
         if choice.kind.takes_losses and (robot.damage.lost or free is not None):

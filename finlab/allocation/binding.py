@@ -33,11 +33,15 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
     """
     full, ended = (np.zeros(command.shape[:-1], bool) for _ in range(2))
     for i, part in enumerate(layout.actuators):
-        row, low, high = command[..., i, :], np.array(part.lower), np.array(part.upper)
-        pushes, angle = not part.BY_FLOW, -1 if part.ANGLE is None else part.ANGLE
+        row = command[..., i, :]
+        low = np.array(part.lower)
+        high = np.array(part.upper)
+        pushes = not part.BY_FLOW
+        angle = -1 if part.ANGLE is None else part.ANGLE
         angle = angle if pushes else 0  # all that a foil is told
         slack = WITHIN * (high - low) + ROUNDING
-        at_low, at_high = row <= low + slack, row >= high - slack
+        at_low = row <= low + slack
+        at_high = row >= high - slack
         sizes = np.arange(3) != angle
         if pushes:
             full[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)

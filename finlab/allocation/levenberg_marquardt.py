@@ -75,8 +75,10 @@ class CommandProblem:
     @cached_property
     def edges(self) -> tuple[AnyArray, AnyArray]:
         """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
-        low, high = self.lower + NOTHING, self.upper - NOTHING
-        low[self.full_turn, 2], high[self.full_turn, 2] = -np.inf, np.inf
+        low = self.lower + NOTHING
+        high = self.upper - NOTHING
+        low[self.full_turn, 2] = -np.inf
+        high[self.full_turn, 2] = np.inf
         return low, high
 
     def wrench(self, command: AnyArray) -> AnyArray:
@@ -100,7 +102,8 @@ class CommandProblem:
             return self.wrench_of(force), np.matmul(jacobian, self.effectiveness)
         acting = force if self.works is None else np.where(self.works[:, None], force, 0.0)
         offset, effectiveness = self.forces.effect(acting)
-        offset, effectiveness = offset / self.sigma, effectiveness / self.sigma
+        offset = offset / self.sigma
+        effectiveness = effectiveness / self.sigma
         if self.works is not None:
             effectiveness = np.where(self.works[:, None, None], effectiveness, 0.0)
         if self.counts is not None:
@@ -182,7 +185,8 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: 
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
     low, high = problem.edges
-    at_low, at_high = at.command <= low, at.command >= high
+    at_low = at.command <= low
+    at_high = at.command >= high
 
     def leaving(step: AnyArray) -> AnyArray:
         """Which commands (R, n, 3) at a limit a step takes out."""

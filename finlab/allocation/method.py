@@ -75,7 +75,10 @@ class Method(ABC):
         networks are of another kind; DataError: a fin's force table cannot be read; LayoutError: the robot
         has an actuator that the method does not take."""
         self.check_robot(layout)
-        self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
+        self.layout = layout
+        self.settings = settings
+        self.scale = scale
+        self.weights = weights
         self.plant = plant_of(layout).counting(layout.commanded)
         self.prepare()
 
@@ -155,7 +158,8 @@ class Method(ABC):
         6); after the last, the last. A command held for a period is late by half of it besides."""
         if self._late is None:
             return target
-        late, last = int(self._late), len(reference)
+        late = int(self._late)
+        last = len(reference)
         before = reference[min(late, last) - 1] if late and last else target
         after = reference[min(late + 1, last) - 1] if last else target
         return np.asarray(before + (self._late - late) * (after - before))

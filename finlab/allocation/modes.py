@@ -68,16 +68,19 @@ class Mode(PlainData):
 def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array) -> tuple[Mode, ...]:
     """The modes among K candidates, best first, in their order, by the size of each fin's force (K, n) [N] as
     `force_sizes` has it, and the lower and upper limits (n, 3)."""
-    modes, span = [], np.maximum(upper - lower, 1e-9)
+    modes = []
+    span = np.maximum(upper - lower, 1e-9)
     signatures = mode_signature(candidates.command, force)
     for members in cluster(signatures):
         first = members[0]
-        command, own = candidates.command[first], force[first]
+        command = candidates.command[first]
+        own = force[first]
         figures = float(candidates.err_norm[first]), float(candidates.effort[first])
         saturation = float(np.clip(np.nanmax(((command - lower) / span)[:, :2]), 0.0, 1.0))
         still = tuple(np.flatnonzero(own < STILL * own.max()).tolist())
         sources = tuple(dict.fromkeys([candidates.source[k] for k in members]))
-        signature, power = _row(signatures, first), float(candidates.power[first])
+        signature = _row(signatures, first)
+        power = float(candidates.power[first])
         modes.append(Mode(command, *figures, power, saturation, still, signature, sources))
     return tuple(modes)
 

@@ -52,12 +52,17 @@ class Rates:
 
     def box(self, previous: Array) -> Box:
         """What may follow a previous command (n, 3); an actuator with NaN is left free."""
-        lower, upper, step = self.plant.lower, self.plant.upper, self.step
+        lower = self.plant.lower
+        upper = self.plant.upper
+        step = self.step
         known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
         turns = self.plant.turns & known & (step < np.pi)
         center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
-        low, high = np.maximum(center - step, lower), np.minimum(center + step, upper)
-        low, high = np.where(turns, center - step, low), np.where(turns, center + step, high)
-        low, high = np.where(known, low, lower), np.where(known, high, upper)
+        low = np.maximum(center - step, lower)
+        high = np.minimum(center + step, upper)
+        low = np.where(turns, center - step, low)
+        high = np.where(turns, center + step, high)
+        low = np.where(known, low, lower)
+        high = np.where(known, high, upper)
         free = self.plant.turns & ~turns
         return Box(np.where(free, lower, low), np.where(free, upper, high), free, turns)

@@ -155,7 +155,8 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
     signed one; None for a lost actuator, whose row is NaN."""
     values: list[dict[str, object]] = []
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
-        own, axis = part.command(row), getattr(part, "axis", None)
+        own = part.command(row)
+        axis = getattr(part, "axis", None)
         along = force.tolist() if axis is None else float(force @ np.array(axis))
         plain = None if own is None else to_builtins(own)
         values.append({"name": part.name, "type": part.type, "force_n": along, "command": plain})
@@ -195,7 +196,8 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     if flow is None and not foils:
         return notes
     if flow is None:
-        names, one = ", ".join(part.name for part in foils), len(foils) == 1
+        names = ", ".join(part.name for part in foils)
+        one = len(foils) == 1
         them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
         return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
     if layout.interaction is not None:
@@ -242,7 +244,8 @@ def _restless(law: FinLaw, limits: Limits) -> list[str]:
     ends = zip(limits.lower, limits.upper, STEPS, strict=True)
     grid = np.meshgrid(*(np.linspace(low, high, count) for low, high, count in ends), indexing="ij")
     size = np.linalg.norm(law.force(np.stack(grid, axis=-1)), axis=-1)
-    least, most = float(size.min()), float(size.max())
+    least = float(size.min())
+    most = float(size.max())
     if least <= RESTLESS * most:
         return []
     return [

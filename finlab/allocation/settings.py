@@ -65,7 +65,8 @@ class Settings:
 
 def _checked(setting: "Field[Any]", value: Any) -> Any:
     """The value of a field, of the kind that is meant."""
-    choices, limits = setting.metadata.get("choices"), setting.metadata.get("range")
+    choices = setting.metadata.get("choices")
+    limits = setting.metadata.get("range")
     if limits is not None:
         return _within(setting, limits, value)
     if isinstance(value, bool) if choices is None else value in choices:

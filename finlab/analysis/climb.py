@@ -26,7 +26,8 @@ class Rules:
     """What vectors have to keep beside their bounds: distances between actuators, a rule of the caller."""
 
     def __init__(self, moves: Moves, rule: Rule | None) -> None:
-        self.moves, self._rule = moves, rule
+        self.moves = moves
+        self._rule = rule
         self._pairs = np.triu_indices(moves.layout.n, k=1)
         self._needed = np.minimum(self._apart(moves.start_position[None])[0], CLEARANCE)
 
@@ -61,7 +62,9 @@ class Climb:
 
     def __post_init__(self) -> None:
         moves = self.rules.moves
-        self._low, self._high, self._width = moves.lower, moves.upper, moves.upper - moves.lower
+        self._low = moves.lower
+        self._high = moves.upper
+        self._width = moves.upper - moves.lower
 
     def step(self) -> None:
         """Take one step, if it gains; else make the trust region smaller."""
@@ -76,14 +79,16 @@ class Climb:
         if vector is None:
             self.radius *= 0.3
             return
-        trial, slopes = self.hill.look(vector, self.at), None
+        trial = self.hill.look(vector, self.at)
+        slopes = None
         if len(self._slopes[0]) == 1:
             slopes = self.hill.slopes(trial)
             self._bend((vector - self.at.vector) / self._width, self._slopes[1][0] - slopes[1][0])
         won = trial.value - self.at.value
         if won > 0.1 * gain:
             self.radius = min(2.0 * self.radius, WIDEST) if won > 0.5 * gain else self.radius
-            self.at, self._slopes = trial, slopes
+            self.at = trial
+            self._slopes = slopes
         else:
             self.radius *= 0.4
             if slopes is None:  # faces that were seen there first count here, too
@@ -118,7 +123,8 @@ class Climb:
         if self._curve is None:
             self._curve = np.eye(len(step)) * max(float(turn @ step / (step @ step)), 1e-3)
         ahead = self._curve @ step
-        bent, got = float(step @ ahead), float(step @ turn)
+        bent = float(step @ ahead)
+        got = float(step @ turn)
         if got < 0.2 * bent:
             share = 0.8 * bent / (bent - got)
             turn = share * turn + (1.0 - share) * ahead
@@ -130,10 +136,8 @@ class Climb:
         high = np.minimum((self._high - self.at.vector) / self._width, self.radius)
         left = np.maximum(self.rules.gaps(self.at.vector[None])[0], 0.0)
         near = left < 4.0 * self.radius * self._width.max()
-        apart, left = (
-            difference(self.rules.gaps(nudged(self.rules.moves, self.at.vector))).T[near],
-            left[near],
-        )
+        apart = difference(self.rules.gaps(nudged(self.rules.moves, self.at.vector))).T[near]
+        left = left[near]
         if self._curve is not None:
             return self._bent(self._curve, slope[0], (low, high), apart, left)
         rows = np.concatenate([np.c_[-slope, np.ones(len(value))], np.c_[-apart, np.zeros(len(left))]])

@@ -102,7 +102,8 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[MotionAxis
     """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
     alone now where it has too few actuators to push both ways along all, wherever they go. Raises
     LayoutError: there are none."""
-    shapes, commanded = shapes_of(layout, flow), commanded_axes(layout)
+    shapes = shapes_of(layout, flow)
+    commanded = commanded_axes(layout)
     # What pushes one way only has to be one more than there are axes.
     one_way = any(shape.one_way for shape in shapes)
     if sum(shape.axes for shape in shapes) > len(commanded) - (not one_way):

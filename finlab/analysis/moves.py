@@ -85,7 +85,8 @@ def is_mirrored(part: Actuator, other: Actuator, tolerance: float = MIRROR_TOLER
     """Says whether two actuators of a type are each other's mirror image, within [m, rad]: fins with their
     shafts, others whichever way their axes count."""
     count = len(part.AXES)
-    image, axes = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
+    image = np.array(part.frame)[:count] * MIRROR
+    axes = np.array(other.frame)[:count]
     apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()
     turned = np.linalg.norm(np.cross(image, axes), axis=-1).max()
     same_way = part.type != "fin" or image[0] @ axes[0] > 0.0
@@ -127,7 +128,8 @@ class Moves:
         self._twin = np.array([layout.index(twins[name]) if name in twins else -1 for name in leaders])
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
         """All that move, twins included, in the layout's order."""
-        self._flow, self._shapes = flow, shapes_of(layout, flow)
+        self._flow = flow
+        self._shapes = shapes_of(layout, flow)
         self.start_position = layout.position
         """Where all actuators are now (n, 3) [m]."""
         self._angle = np.array([azimuth(part) for part in layout.actuators])
@@ -162,7 +164,9 @@ class Moves:
         kept = np.array([set(axes) <= set(each.alone) for each in held]).reshape(2, -1).all(axis=0)
         if kept.any():
             self._free[np.flatnonzero(self._free)[~kept]] = False
-            self.lower, self.upper, self.start = self.lower[kept], self.upper[kept], self.start[kept]
+            self.lower = self.lower[kept]
+            self.upper = self.upper[kept]
+            self.start = self.start[kept]
             self.step = self.step[kept]
 
     def positions(self, vectors: Array) -> Array:
@@ -177,7 +181,8 @@ class Moves:
             self.layout.frames[self._lead, 0], moved[..., 3] - self._angle[self._lead], moved[..., 4]
         )
         frames[:, self._lead] = frames[:, self._lead] @ turned
-        follows, twin = self._twin >= 0, self._twin[self._twin >= 0]
+        follows = self._twin >= 0
+        twin = self._twin[self._twin >= 0]
         frames[:, twin] = frames[:, twin] @ (turned[:, follows] * MIRROR * MIRROR[:, None])
         return self._placed(moved), frames
 
@@ -200,8 +205,10 @@ class Moves:
         numbers = self._numbers(vectors)
         for first, second in mirror_pairs(self.layout):
             if first in self.leaders and second in self.leaders:
-                one, other = self.leaders.index(first), self.leaders.index(second)
-                i, j = self._lead[one], self._lead[other]
+                one = self.leaders.index(first)
+                other = self.leaders.index(second)
+                i = self._lead[one]
+                j = self._lead[other]
                 way = np.sign(self.layout.frames[i, 0] * MIRROR @ self.layout.frames[j, 0])
                 image = (numbers[:, one, 3:] - [self._angle[i], 0.0]) * [-1.0, way] + [self._angle[j], 0.0]
                 numbers[:, other] = np.concatenate([numbers[:, one, :3] * MIRROR, image], axis=-1)
@@ -210,7 +217,8 @@ class Moves:
     def on_grid(self, vectors: Array) -> Array:
         """Returns vectors (P, D) whose numbers are multiples of their steps, within bounds."""
         step = np.where(self.step > 0.0, self.step, 1.0)
-        low, high = np.ceil(self.lower / step - 1e-9), np.floor(self.upper / step + 1e-9)
+        low = np.ceil(self.lower / step - 1e-9)
+        high = np.floor(self.upper / step + 1e-9)
         rounded = np.clip(np.round(vectors / step), low, high) * step
         return np.where((self.step > 0.0) & (low <= high), rounded, vectors)
 
@@ -248,7 +256,8 @@ def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
 def _about(axis: Array, angle: Array) -> Array:
     """Rodrigues' matrices (P, L, 3, 3), from the right of rows, of turns about unit axes by angles (P, L)."""
     cross = np.cross(np.eye(3), axis[:, None, :])
-    sine, rest = np.sin(angle)[..., None, None], 1.0 - np.cos(angle)[..., None, None]
+    sine = np.sin(angle)[..., None, None]
+    rest = 1.0 - np.cos(angle)[..., None, None]
     return np.asarray(np.eye(3) - sine * cross + rest * (cross @ cross))
 
 

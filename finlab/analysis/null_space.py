@@ -37,7 +37,8 @@ class NullSpace:
         counts = np.isfinite(answer.target)
         self._plant = plant_of(layout).at(answer.flow).counting(counts)
         compiled = Compiled(layout, self._plant, answer.scale).at(self._plant.inflow(None))
-        self._compiled, robot = compiled, compiled.robot
+        self._compiled = compiled
+        robot = compiled.robot
         self._command = answer.command[self._alive]
         self._problem = CommandProblem.of(self._plant, answer.scale)
         self._wrench = self._problem.wrench(self._command[None])
@@ -73,20 +74,23 @@ class NullSpace:
         force = self._forces(shift)
         part = np.linalg.norm(np.tensordot(way, self.basis, 1), axis=-1)
         room = (self._most + np.linalg.norm(force, axis=-1)) / np.maximum(part, 1e-12)
-        low, width = np.zeros(2 * count), room.min(axis=1)
+        low = np.zeros(2 * count)
+        width = room.min(axis=1)
         for _ in range(ROUNDS):
             size = low[:, None] + np.linspace(0.0, 1.0, TRIED) * width[:, None]
             tried = shift + size[..., None] * way[:, None]
             holds = self._has_commands(tried.reshape(size.size, len(shift))).reshape(size.shape)
             holds[:, 0] = True
             last = np.minimum(holds.cumprod(axis=1).sum(axis=1) - 1, TRIED - 2)
-            low, width = size[np.arange(len(size)), last], width / (TRIED - 1)
+            low = size[np.arange(len(size)), last]
+            width = width / (TRIED - 1)
         return np.asarray(shift[:count, None] + low.reshape(-1, 2) * [-1.0, 1.0])
 
     def mean(self, first: Array, second: Array) -> Array:
         """Returns the mean (n, 3) of two commands (n, 3), of angles that turn freely the shorter way round:
         what a model with one answer learns from both."""
-        change, turns = second - first, np.zeros(first.shape, bool)
+        change = second - first
+        turns = np.zeros(first.shape, bool)
         turns[self._alive] = self._plant.turns
         middle = first + 0.5 * np.where(turns, wrapped(change), change)
         return among_all(self._plant.feasible(middle[self._alive]), self._alive)
@@ -99,7 +103,8 @@ class NullSpace:
 
     def _has_commands(self, shift: Array) -> NDArray[np.bool_]:
         """Whether all actuators have commands for shifts (R, k)."""
-        wanted, command = self._forces(shift), self._begin(shift)
+        wanted = self._forces(shift)
+        command = self._begin(shift)
         got = self._compiled.forces_along(self._plant.force(command))
         free = np.where(self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0)  # drag comes with the lift
         off = np.linalg.norm((got - wanted) * free, axis=-1)

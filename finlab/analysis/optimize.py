@@ -24,9 +24,16 @@ Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 """A function and the parts of a piece of work -> its results, in their order."""
 CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
 STEPS = 10  # steps of a climb in a round
-DRAWS, RANK = 64, 6  # random vectors, of which at most so many times the starts are ranked
-STARTS, FEWEST, MOST = 2800, 3, 20  # climbs, times the square of the free numbers; at least and at most
-FIRST_STEPS, MOST_STEPS = 12, 60  # of each climb, and of those that go on
+# random vectors, of which at most so many times the starts are ranked
+DRAWS = 64
+RANK = 6
+# climbs, times the square of the free numbers; at least and at most
+STARTS = 2800
+FEWEST = 3
+MOST = 20
+# of each climb, and of those that go on
+FIRST_STEPS = 12
+MOST_STEPS = 60
 LITTLE = 1e-4  # share of the goal that a climb has to gain to count
 FINALISTS = 3  # of so many climbs the best one goes on
 
@@ -106,7 +113,9 @@ def optimize_layout(
         mapped: gives a function's results for parts of the work, in order, as `map` does in this process;
             `finlab.research.executor.map_parts` does on a cluster.
     """
-    bounds, water, start = bounds or {}, check_flow(flow), layout
+    bounds = bounds or {}
+    water = check_flow(flow)
+    start = layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
@@ -167,10 +176,17 @@ class _Search:
         cancelled: Callable[[], bool] | None,
         mapped: Mapped,
     ) -> None:
-        self._moves, self._rules, self._before, self._rounds = moves, rules, before, rounds
-        self._progress, self._cancelled = progress, cancelled or (lambda: False)
+        self._moves = moves
+        self._rules = rules
+        self._before = before
+        self._rounds = rounds
+        self._progress = progress
+        self._cancelled = cancelled or (lambda: False)
         self._mapped = mapped
-        self.vector, self.best, self.gained, self.stopped = moves.start, before, False, False
+        self.vector = moves.start
+        self.best = before
+        self.gained = False
+        self.stopped = False
         self._kept = rules.broken(moves.start[None])[0] <= 0.0
         if not self._kept:
             self.best = -np.inf
@@ -179,7 +195,8 @@ class _Search:
     def _note(self, value: float, vector: Array) -> None:
         """A vector that keeps all rules."""
         if value > self.best:
-            self.best, self.vector = value, vector
+            self.best = value
+            self.vector = vector
         if not self._kept or value > self._before + LITTLE * abs(self._before):
             self.gained = True
 
@@ -195,7 +212,8 @@ class _Search:
 
     def climb(self, hill: Hill, seed: int) -> None:
         """Climb a little from several starts, then on from the best of them; round what was found."""
-        best, self.stopped = self.best, self._cancelled()
+        best = self.best
+        self.stopped = self._cancelled()
         climbs = list[Climb]()
         for start in self._starts(hill, seed) if not self.stopped else ():
             climbs.append(Climb(hill, self._rules, start))
@@ -206,14 +224,17 @@ class _Search:
             for climb in climbs[: max(1, len(climbs) // FINALISTS)]:
                 self._climbed(climb, MOST_STEPS)
         if self._moves.step.any() and self.gained:
-            self.best, self.vector, self.gained = best, self._moves.start, False
+            self.best = best
+            self.vector = self._moves.start
+            self.gained = False
             for climb in sorted(climbs, key=lambda one: -one.at.value)[:3]:
                 self._note(*climb.rounded(self._moves))
 
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
         """The present vector and the best of some random ones, as they are and as symmetric as the robot is
         now, of those that keep all rules."""
-        moves, random = self._moves, np.random.default_rng(seed)
+        moves = self._moves
+        random = np.random.default_rng(seed)
         if self._kept:
             yield hill.look(moves.start)
         drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
@@ -240,7 +261,8 @@ class _Search:
 
     def evolve(self, measure: Goal, seed: int) -> None:
         """Differential evolution, for goals and rules without slopes."""
-        moves, least = self._moves, np.inf
+        moves = self._moves
+        least = np.inf
 
         def chunk_cost(vectors: Array) -> tuple[Array, float]:
             """Costs (P,), and the best measure of a variant that keeps all rules."""
@@ -250,7 +272,8 @@ class _Search:
 
         def cost(vectors: Array) -> Array:
             nonlocal least
-            rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
+            rows = vectors.reshape(len(moves.start), -1).T
+            costs = list[Array]()
             chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
             valued = iter(self._mapped(chunk_cost, chunks))
             for chunk in chunks:
@@ -260,7 +283,8 @@ class _Search:
                 costs.append(some)
                 self.best = max(self.best, fine)
                 if some.min() < least:
-                    least, self.vector = some.min(), chunk[np.argmin(some)]
+                    least = some.min()
+                    self.vector = chunk[np.argmin(some)]
             return np.concatenate(costs)
 
         self._done = 0

@@ -72,7 +72,8 @@ class ScoreCard:
         return text(card_blocks(self))
 
     def _repr_html_(self) -> str:
-        low, high = -np.array(self.authority.most_negative), np.array(self.authority.largest)
+        low = -np.array(self.authority.most_negative)
+        high = np.array(self.authority.largest)
         title = f"{self.layout}: largest wrench along each axis"
         return html(card_blocks(self), lambda: ranges_picture(title, AXES, low, high))
 

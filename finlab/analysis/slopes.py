@@ -79,7 +79,8 @@ class Directions:
     """The weakest direction, after the worst loss or with all working."""
 
     def __init__(self, moves: Moves, axes: Sequence[MotionAxis], after_loss: bool) -> None:
-        self._moves, self._places = moves, [WRENCH.index(axis) for axis in named_axes(axes)]
+        self._moves = moves
+        self._places = [WRENCH.index(axis) for axis in named_axes(axes)]
         self._lost = np.arange(moves.layout.n) if after_loss else None
         self._drawn = np.random.default_rng(0)
 
@@ -94,14 +95,16 @@ class Directions:
     def _left(self, sets: ForceSets) -> ForceSets:
         """Of P robots, what is left after each loss, if that counts."""
         if self._lost is not None:
-            robots, sets = len(sets.radius), sets.repeat(len(self._lost))
+            robots = len(sets.radius)
+            sets = sets.repeat(len(self._lost))
             sets.lose(np.arange(len(sets.radius)), np.tile(self._lost, robots))
         return sets
 
     def look(self, vector: Array, before: Look | None = None) -> Look:
         """Returns the goal at a vector (D,), with the faces that were seen at another."""
         sets = self._left(self._sets(vector[None]))
-        axes, robots = len(self._places), len(sets.radius)
+        axes = len(self._places)
+        robots = len(sets.radius)
         starts = self._drawn.standard_normal((robots, DRAWN if before else 2 * DRAWN, axes))
         if before is None:
             fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
@@ -138,7 +141,9 @@ class Power:
     """Minus the mean least power of some wrenches (N, 6)."""
 
     def __init__(self, moves: Moves, mission: ArrayLike, flow: Array | None) -> None:
-        self._moves, self._mission, self._flow = moves, np.asarray(mission, np.float64), flow
+        self._moves = moves
+        self._mission = np.asarray(mission, np.float64)
+        self._flow = flow
 
     def guess(self, vectors: Array) -> Array:
         """Returns what vectors (P, D) promise (P,): minus squares of what is missing, and far behind of the
@@ -159,7 +164,8 @@ class Power:
     def slopes(self, look: Look) -> tuple[Array, Array]:
         """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, of what is
         missing."""
-        moves, total = self._moves, np.zeros(len(look.vector))
+        moves = self._moves
+        total = np.zeros(len(look.vector))
         frames = moves.geometry(look.vector[None])[1][0]
         change = difference(moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, look.vector))))
         for answer in look.seen:

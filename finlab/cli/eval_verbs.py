@@ -26,7 +26,8 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
     """
     from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 
-    made, wanted = SubcommandApp(), argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
+    made = SubcommandApp()
+    wanted = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
         known = name == wanted or wanted.startswith("-")
         made.command(name=name)(verb_of(load_experiment(name)) if known else lambda: None)
@@ -94,11 +95,13 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
     """An option as the parser takes it: lists are texts with commas between."""
     from finlab.research.evaluation.experiment import item_type
 
-    kind, default = option.annotation, option.default
+    kind = option.annotation
+    default = option.default
     item, several = item_type(kind)
     if several:
         text = None if default is None else ",".join(map(str, default))
-        kind, default = Annotated[str if text else str | None, arg(metavar="A,B,...")], text
+        kind = Annotated[str if text else str | None, arg(metavar="A,B,...")]
+        default = text
     elif (word := {int: "N", float: "X", str: "NAME"}.get(item)) is not None:
         kind = Annotated[kind, arg(metavar=word)]
     if option.name == "layout":

@@ -65,7 +65,8 @@ def allocate(
     robot, gone = shared_options.open_robot(layout, lost)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     # Names that are none are refused there, in sentences.
-    name, axes = cast("MethodName", method), cast("tuple[Axis, ...]", free)
+    name = cast("MethodName", method)
+    axes = cast("tuple[Axis, ...]", free)
     allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)

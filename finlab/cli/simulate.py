@@ -222,7 +222,8 @@ def _learner(allocator: Allocator) -> OnlineFit:
 
     from finlab.swim.identification.fitted_robot import OnlineFit, leaned
 
-    learner, layout = OnlineFit(allocator.layout), allocator.layout
+    learner = OnlineFit(allocator.layout)
+    layout = allocator.layout
     allocator.on(leaned(layout, np.full(layout.n, 0.01)))
     return learner
 

@@ -235,8 +235,12 @@ class Core:
     def many(self, wrenches: Array, policy: Any, now: Now = STILL) -> Found:
         """Returns the answers to wrenches (N, 6); see `one`."""
         wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
-        force, value, error = np.empty((count, self._count, 2)), np.empty(count), np.empty(count)
-        price, aim, within = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, np.bool_)
+        force = np.empty((count, self._count, 2))
+        value = np.empty(count)
+        error = np.empty(count)
+        price = np.empty((count, 6))
+        aim = np.empty((count, 6))
+        within = np.empty(count, np.bool_)
         command = np.empty((count, self._count, 3))
         outs = [values.ctypes.data for values in (force, price, aim, value, command, within, error)]
         with self._lock:
@@ -261,7 +265,8 @@ class Core:
 
     def look(self, wrench: Array, inner: Array) -> tuple[Array, float]:
         """What prices (6,) in the basis give: forces (n, 2), and the dual value [W] for a wrench (6,)."""
-        wrench, inner = np.ascontiguousarray(wrench), np.ascontiguousarray(inner)
+        wrench = np.ascontiguousarray(wrench)
+        inner = np.ascontiguousarray(inner)
         force = np.empty((self._count, 2))
         data = (wrench.ctypes.data, inner.ctypes.data, force.ctypes.data)
         return force, self._core.fl_look(self._at, self._area, *data)
@@ -299,8 +304,11 @@ def reach(block: Array, own: Array, origin: Array, ray: Array, close: float) -> 
         own: of each actuator (R, n, 16) the place of its polygon, or 0 and radius, middle and half of a
             sector, then the wrench (2, 6) per newton along its directions.
     """
-    core, (count, n, _) = library(), own.shape
-    size, normal, force = np.empty(count), np.empty((count, 6)), np.empty((count, n, 2))
+    core = library()
+    count, n, _ = own.shape
+    size = np.empty(count)
+    normal = np.empty((count, 6))
+    force = np.empty((count, n, 2))
     work = ctypes.create_string_buffer(core.fl_sizes(3))
     ins = [values.ctypes.data for values in (own, origin, ray)]
     outs = [values.ctypes.data for values in (size, normal, force)]

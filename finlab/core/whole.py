@@ -60,7 +60,8 @@ class Whole(Core):
     def __init__(self, block: Array, beside: Beside) -> None:
         """Takes the block of the robot by its laws alone."""
         super().__init__(block.copy(), len(beside.frames))
-        self._beside, self._turn = beside, Lock()
+        self._beside = beside
+        self._turn = Lock()
         self._raised: BaseException | None = None
         arrays = (beside.jets, beside.inflow, block, np.ascontiguousarray(beside.frames))
         effect = _EFFECT(self._effect) if beside.jets is None else library().fl_jets
@@ -70,7 +71,9 @@ class Whole(Core):
             *(None if own is None else own.ctypes.data for own in arrays),
             tuple(beside.counts),
         )
-        self._begin, self._end, self._turns = np.zeros((1, self._count, 2)), np.zeros(4), 0
+        self._begin = np.zeros((1, self._count, 2))
+        self._end = np.zeros(4)
+        self._turns = 0
         self._ends = self._begin.ctypes.data, self._from, self._end.ctypes.data
 
     def settled(
@@ -89,8 +92,10 @@ class Whole(Core):
         the wrench. An error counts `worth` [W] at least. No turn but the first is begun after `most_steps`
         steps. Else as for `one`."""
         with self._turn:
-            self._begin[0], self._turns = 0.0 if force is None else force, turns
-            self._end[1], self._end[3] = worth, most_steps
+            self._begin[0] = 0.0 if force is None else force
+            self._turns = turns
+            self._end[1] = worth
+            self._end[3] = most_steps
             found = self.one(wrench, policy, price, now)
             return Ended(found._replace(force=self._begin.copy()), *self._end.tolist())
 
@@ -98,7 +103,8 @@ class Whole(Core):
         ins = ctypes.addressof(self._whole), self._at, self._area, self._to, self._turns
         error: int = self._core.fl_settle(*ins, *self._ends)
         if self._raised is not None:
-            raised, self._raised = self._raised, None
+            raised = self._raised
+            self._raised = None
             raise raised
         return error
 

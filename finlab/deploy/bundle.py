@@ -47,7 +47,8 @@ class Bundle:
         """Write the files into a folder, which is made; an earlier bundle there is replaced. Raises
         DataError: the folder holds something else, or cannot be written."""
         path = Path(folder)
-        made, present = not path.exists(), [file for file in path.rglob("*") if not file.is_dir()]
+        made = not path.exists()
+        present = [file for file in path.rglob("*") if not file.is_dir()]
         names = {file: file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)}
         try:
             # The checksums come last: what a kill leaves is refused.
@@ -79,7 +80,8 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
-    layout, cases = allocator.layout, self_tests(allocator, lost)
+    layout = allocator.layout
+    cases = self_tests(allocator, lost)
     inside, tables = with_tables_inside(layout)
     sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.weights)
     files = {
@@ -117,7 +119,9 @@ def _about(allocator: Allocator) -> bytes:
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose force tables, and the network of whose interaction, have the names that they have in a
     bundle, and their contents by name; `DataError`: one cannot be read, or is too large to travel."""
-    names, contents, own = dict[str, str](), dict[str, bytes](), layout.interaction
+    names = dict[str, str]()
+    contents = dict[str, bytes]()
+    own = layout.interaction
     table = bundle_files.LARGEST_TABLE, "a table of forces for a bundle"
     for path in layout.files:
         is_network = own is not None and path == own.reads

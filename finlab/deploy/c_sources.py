@@ -259,7 +259,9 @@ def _plain_source(layout: Layout, name: str) -> str:
 def _samples(layout: Layout, method: Dual, count: int) -> str:
     """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to the
     library, which has more ways around gaps."""
-    allocator, flow, rng = Allocator(layout), method.plant.flow, np.random.default_rng(0)
+    allocator = Allocator(layout)
+    flow = method.plant.flow
+    rng = np.random.default_rng(0)
     before: list[str] = []
     rows: list[str] = []
     for k in range(8 * count):

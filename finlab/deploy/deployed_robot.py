@@ -132,10 +132,14 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
     table cannot be read."""
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
-    layout, lost = robot.layout, robot.lost
+    layout = robot.layout
+    lost = robot.lost
     alive = [i for i, name in enumerate(layout.names) if name not in lost]
-    plant, scale = plant_of(layout.without(lost) if lost else layout), robot.allocator.scale
-    differs, errors, allowed = [], [], REACHED
+    plant = plant_of(layout.without(lost) if lost else layout)
+    scale = robot.allocator.scale
+    differs = []
+    errors = []
+    allowed = REACHED
     for case in robot.self_test:
         stored = plant.wrench(np.array([case.command[i] for i in alive], dtype=np.float64))
         differs.append(float(np.linalg.norm((stored - np.array(case.delivered_wrench)) / scale)))
@@ -151,14 +155,17 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
 def extremes(robot: DeployedRobot) -> Finding:
     """Ask for each axis both ways, far out of reach, by the method's policies, with each actuator lost; the
     value is how many of these have no answer, and the question names the first of them."""
-    layout, silent, n = robot.layout, [], 0
+    layout = robot.layout
+    silent = []
+    n = 0
     kinds = KINDS if method_class(robot.allocator.method).every_policy else KINDS[:1]
     alive = [name for name in layout.names if name not in robot.lost]
     for lost in [(), *([name] for name in alive if len(alive) > 1)]:
         for policy, i in product(kinds, np.flatnonzero(layout.commanded)):
             for way in (-1.0, 1.0):
                 target = np.zeros(6)
-                target[i], n = way * FAR * robot.allocator.scale[i], n + 1
+                target[i] = way * FAR * robot.allocator.scale[i]
+                n = n + 1
                 try:
                     robot.allocate(target, lost=lost, policy=policy)
                 except Exception as error:  # each is a finding

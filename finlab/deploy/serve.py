@@ -80,7 +80,8 @@ class Server:
 
     def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
         """Takes the robot, and the longest silence before its fins rest [s]; without one they never do."""
-        self._robot, self._watchdog = robot, watchdog
+        self._robot = robot
+        self._watchdog = watchdog
         self._sent: Allocation | Array | None = None  # the last answer, or commands of rest (n, 3)
         self._sent_at = 0.0
         self._lost: tuple[str, ...] = ()
@@ -152,14 +153,16 @@ class Server:
                 _error(name, f"the target could not be answered ({what}); the robot rests, ask again"),
             ]
         self._lost = tuple(request.lost)
-        self._sent, self._sent_at = answer, time.monotonic()
+        self._sent = answer
+        self._sent_at = time.monotonic()
         return [reply]
 
     def _rest(self) -> dict[str, Any]:
         now = self._sent.command if isinstance(self._sent, Allocation) else self._sent
         rest = self._robot.neutral(self._lost, now)
         if self._sent is not None:  # what follows begins at rest
-            self._sent, self._sent_at = rest, time.monotonic()
+            self._sent = rest
+            self._sent_at = time.monotonic()
         return self._reply(None, "neutral", rest)
 
     def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:

@@ -144,11 +144,13 @@ def _grid(grid: Array, users: Record) -> Array:
     measured fin keeps its grid."""
     count = grid[:3].astype(int)
     axes = np.split(grid[7 : 7 + count.sum()], np.cumsum(count)[:-1])
-    values, period = grid[7 + count.sum() :].reshape(*count, -1), grid[3]
+    values = grid[7 + count.sum() :].reshape(*count, -1)
+    period = grid[3]
     if count[0] == count[1] == 1 < count[2]:
         axes[2], value, period = _reached(axes[2], values[0, 0], period, users)
         kept = _angles(axes[2], value, period)
-        axes[2], values = axes[2][kept], value[None, None, kept]
+        axes[2] = axes[2][kept]
+        values = value[None, None, kept]
     elif values.shape[2:] == (1, 1):
         axes[0], values = _sizes(axes[0], values, 2 if grid[6] else 1)
     return np.concatenate([[*map(len, axes)], [period], grid[4:7], *axes, values.ravel()])
@@ -181,10 +183,12 @@ def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[A
 def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
     """Which knots (K,) of a period, or of an axis where it is 0, say all values (K, c) nearly: more and more,
     where most is missing."""
-    kept, ends = np.arange(0, len(knot), max(len(knot) // 16, 1)), [0, 1, len(knot) - 2, len(knot) - 1]
+    kept = np.arange(0, len(knot), max(len(knot) // 16, 1))
+    ends = [0, 1, len(knot) - 2, len(knot) - 1]
     kept = kept if period else np.union1d(kept, ends)
     while len(kept) < min(2 * CELLS, len(knot)):
-        rows, around = kept, knot[kept]
+        rows = kept
+        around = knot[kept]
         if period:
             rows = np.concatenate([kept[-2:], kept, kept[:2]])
             around = np.concatenate([knot[kept[-2:]] - period, around, knot[kept[:2]] + period])
@@ -199,10 +203,14 @@ def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
 
 def _sizes(knot: Array, value: Array, power: int) -> tuple[Array, Array]:
     """As few of the knots (K,) of sizes (K, f, 1, 1) as do, and one beyond each end for the slope there."""
-    ends, slope = np.array([1, -2]), (value[[2, -1]] - value[[0, -3]]).T / (knot[[2, -1]] - knot[[0, -3]])
-    wanted, best, step = value[1:-1] ** power, (knot, value), 2
+    ends = np.array([1, -2])
+    slope = (value[[2, -1]] - value[[0, -3]]).T / (knot[[2, -1]] - knot[[0, -3]])
+    wanted = value[1:-1] ** power
+    best = (knot, value)
+    step = 2
     while (len(knot) - 3) % step == 0:
-        x, v = knot[1:-1][::step], value[1:-1][::step]
+        x = knot[1:-1][::step]
+        v = value[1:-1][::step]
         width = x[ends] - x[[0, -1]]
         low, high = np.split(v[ends] - 2.0 * (slope * width).T, 2)
         x = np.concatenate([x[:1] - width[:1], x, x[-1:] - width[1:]])
@@ -210,7 +218,8 @@ def _sizes(knot: Array, value: Array, power: int) -> tuple[Array, Array]:
         miss = np.abs(_cubic(x, v)(knot[1:-1]) ** power - wanted).max()
         if miss > TOLERANCE * max(np.abs(wanted).max(), NOTHING):
             break
-        best, step = (x, v), 2 * step
+        best = (x, v)
+        step = 2 * step
     return best
 
 

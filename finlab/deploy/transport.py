@@ -75,7 +75,8 @@ class StandardStreams:
 
     def send(self, line: bytes) -> None:
         """Send one answer; `Unsent` where it is not taken."""
-        self._sending, rest = True, memoryview(line)
+        self._sending = True
+        rest = memoryview(line)
         self._hurry()
         try:
             while rest:
@@ -89,13 +90,17 @@ class StandardStreams:
     def _read(self, source: int, looked: float) -> None:
         """Read until the end. Bytes that are there at a look came after the look before, and a line has the
         age of its first byte: none is ever taken for younger than it is."""
-        part, since, chunk = b"", looked, b"\n"
+        part = b""
+        since = looked
+        chunk = b"\n"
         ready = select.poll()
         ready.register(source, select.POLLIN)
         while chunk:
             while not ready.poll(LOOK_S * 1e3):
                 looked = time.monotonic()
-            came, looked, size = looked, time.monotonic(), _waiting(source)
+            came = looked
+            looked = time.monotonic()
+            size = _waiting(source)
             try:
                 chunk = os.read(source, size)
             except OSError:  # a terminal that was closed

@@ -43,7 +43,8 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
     hull = None if layout.body is None else layout.body.hull
     points = [place]
     if hull is not None and hull.size_m is not None:
-        sides, center = np.array(hull.size_m), np.array(hull.center_m)
+        sides = np.array(hull.size_m)
+        center = np.array(hull.center_m)
         around, up = np.meshgrid(np.linspace(-np.pi, np.pi, 33), np.linspace(-np.pi / 2, np.pi / 2, 17))
         ball = np.stack([np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1)
         skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** SHARPNESS.get(hull.shape, 1.0)
@@ -63,7 +64,8 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
 def body_picture(title: str, unit: str, body: Any) -> Figure:
     """Returns an attainable set (a `finlab.analysis.AttainableSet`) about the origin."""
     figure, axes = _space(title, np.concatenate([body.vertices, np.zeros((1, 3))]), unit)
-    corners, faces = body.vertices.T, body.faces
+    corners = body.vertices.T
+    faces = body.faces
     if len(faces):
         axes.plot_trisurf(*corners, triangles=faces, color=COLORS[0], alpha=0.35, edgecolor="0.4", lw=0.3)
     axes.plot(*corners[:, np.append(body.outline, body.outline[:1])], color=COLORS[0])
@@ -86,7 +88,8 @@ def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, 
 def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) -> Figure:
     """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at NaN."""
     figure, axes = panels((6.0, 2.4), 1, 2)
-    width, low = np.nan_to_num(high - low), np.nan_to_num(low)
+    width = np.nan_to_num(high - low)
+    low = np.nan_to_num(low)
     for side, unit, rows in zip(axes[0], ("N", "N m"), (slice(3), slice(3, 6)), strict=True):
         side.barh(names[rows], width[rows], left=low[rows], color=COLORS[0])
         side.axvline(0.0, color="k", linewidth=0.8)
@@ -115,8 +118,10 @@ def _space(title: str, points: Array, unit: str) -> tuple[Figure, Any]:
 
     figure = Figure(figsize=(5.6, 4.8), layout="constrained")
     axes: Any = figure.add_subplot(projection="3d")
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, span = (low + high) / 2, np.maximum(high - low, max(THIN * float((high - low).max()), 1e-9))
+    low = points.min(axis=0)
+    high = points.max(axis=0)
+    middle = (low + high) / 2
+    span = np.maximum(high - low, max(THIN * float((high - low).max()), 1e-9))
     ends = zip(middle - 0.55 * span, middle + 0.55 * span, strict=True)
     axes.set(**dict(zip(("xlim", "ylim", "zlim"), ends, strict=True)))
     axes.set_box_aspect(span)

@@ -32,7 +32,8 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
 FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
 FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
 """What a suffix stands for where the user does not say."""
-TABLES, PROGRAMS = (".csv", ".tsv", ".txt", ".dat"), (".cpp", ".h", ".hpp", ".lua")
+TABLES = (".csv", ".tsv", ".txt", ".dat")
+PROGRAMS = (".cpp", ".h", ".hpp", ".lua")
 PARAMETERS = (".params", ".parm", ".param")
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
@@ -80,7 +81,8 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     """Returns the layout in the text of a file of this name, of any form. Raises LayoutError: something in it
     is wrong or missing, or it holds no form that is known."""
     path = Path(file)
-    name, suffix = path.stem.strip()[:64].strip() or "robot", path.suffix.lower()
+    name = path.stem.strip()[:64].strip() or "robot"
+    suffix = path.suffix.lower()
     if text.lstrip().startswith("<"):
         return read_description(text, name, exchange)
     if FORM_OF.get(suffix) != "layout":

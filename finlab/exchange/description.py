@@ -138,7 +138,8 @@ def _pose(part: Element) -> Array:
     origin = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
     quaternion = said(part, "pose@rotation_format") == "quat_xyzw"
     values = numbers(said(part, "pose", origin), 7 if quaternion else 6, what)
-    pose, turn = np.eye(4), values[3:]
+    pose = np.eye(4)
+    turn = values[3:]
     pose[:3, 3] = values[:3]
     if quaternion and not turn.any():
         raise LayoutError(f"{what} has a quaternion without length")
@@ -152,7 +153,8 @@ def _pose(part: Element) -> Array:
 def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str, Array]:
     """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there; without
     those that hang on what is included."""
-    poses, lost = {"": np.eye(4)}, {*included}
+    poses = {"": np.eye(4)}
+    lost = {*included}
     outside = tuple(f"{name}::" for name in included)
     try:
         for key in TopologicalSorter({key: [base] for key, (base, _) in hung.items()}).static_order():
@@ -169,8 +171,10 @@ def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str
 
 def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old: bool) -> Joint:
     """A joint; in `old` SDF an axis is seen from the model, as where use_parent_model_frame says so."""
-    own, kind = part.get("name", ""), part.get("type", "")
-    name, what = f"{scope}{own}", f"joint {own!r:.60}"
+    own = part.get("name", "")
+    kind = part.get("type", "")
+    name = f"{scope}{own}"
+    what = f"joint {own!r:.60}"
     seen_from = said(part, "axis/xyz@expressed_in")
     of_model = said(part, "axis/use_parent_model_frame", str(int(old))).lower() in ("1", "true")
     frame = _key(scope, seen_from or "__model__", named) if seen_from or of_model else f"joint {name}"
@@ -203,11 +207,14 @@ def _link(scope: str, name: str, named: Named) -> str:
 
 def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array | None, dict[str, float]]:
     """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass of all links together."""
-    parts, added, known = [], dict[str, float](), True
+    parts = []
+    added = dict[str, float]()
+    known = True
     for key, (_, link) in named.items():
         inertial = link.find("inertial") if key in poses else None
         if inertial is not None:
-            pose, mass = poses[key] @ _pose(inertial), number(inertial, "mass@value mass")
+            pose = poses[key] @ _pose(inertial)
+            mass = number(inertial, "mass@value mass")
             paths = [f"inertia@i{moment} inertia/i{moment}" for moment in MOMENTS]
             inertia = np.array([number(inertial, path) for path in paths])[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
             known &= mass == 0.0 or all(said(inertial, paths[k]) for k in (0, 3, 5))
@@ -215,7 +222,9 @@ def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array 
             for axis in ADDED:
                 if said(inertial, f"fluid_added_mass/{axis}"):
                     added[axis] = added.get(axis, 0.0) + number(inertial, f"fluid_added_mass/{axis}")
-    total, center, about = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))
+    total = sum(part[0] for part in parts)
+    center = np.zeros(3)
+    about = np.zeros((3, 3))
     if total > 0.0:
         center = sum((kg * at for kg, at, _ in parts), center) / total
         for kg, at, own in parts:

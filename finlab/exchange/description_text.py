@@ -48,8 +48,11 @@ SDF = {
 def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]) -> str:
     """Returns the contents of a URDF or SDF file with a layout's places, axes, limits of force, mass and
     damping; `exchange` gets notes on what it has not."""
-    body, links = layout.body or Body(), [link for part in layout.actuators for link in _links(part)]
-    hull, mass, moments = "", body.mass_kg, body.inertia_kgm2 or (1e-3,) * 3
+    body = layout.body or Body()
+    links = [link for part in layout.actuators for link in _links(part)]
+    hull = ""
+    mass = body.mass_kg
+    moments = body.inertia_kgm2 or (1e-3,) * 3
     share = MOMENT * min(moments) / len(links)
     if body.hull is not None and body.hull.size_m is not None:
         hull = form["hull"].format(place=_text(body.hull.center_m), size=_text(body.hull.size_m))
@@ -64,7 +67,8 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         parts.append(form["joint"].format(**own, kind=kind, axis=_text(axis), limit=limit))
     for part in layout.actuators:
         if part.THRUST is not None:
-            low, high = part.lower[part.THRUST], part.upper[part.THRUST]
+            low = part.lower[part.THRUST]
+            high = part.upper[part.THRUST]
             limits = {"min_thrust_cmd": low, "max_thrust_cmd": high}
             dead_band = getattr(part, "dead_band", 0.0)
             band = {"deadband": dead_band} if dead_band else {}
@@ -87,10 +91,12 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
 
 def _links(part: Actuator) -> Iterator[tuple[str, str, Vector, Vector, tuple[float, float] | None]]:
     """Links of an actuator: name, parent, place seen from it [m], axis, and limits of the angle [rad]."""
-    parent, place = ROOT, part.position
+    parent = ROOT
+    place = part.position
     for suffix, axis, ends in part.joints:
         yield part.name + suffix, parent, place, axis, ends
-        parent, place = part.name + suffix, (0.0, 0.0, 0.0)
+        parent = part.name + suffix
+        place = (0.0, 0.0, 0.0)
 
 
 def _inertial(form: Mapping[str, str], mass: float | None, moments: Sequence[float]) -> str:

@@ -66,7 +66,8 @@ class Exchange:
         if not 1e-9 < size < 1e9:
             raise LayoutError(f"{name!r:.60} has no force; no actuator of finlab gives torque alone")
         self.note("It has no places: thrusters sit where lines of their forces are nearest to the origin.")
-        axis, torque = column[:3] / size, column[3:] / size
+        axis = column[:3] / size
+        torque = column[3:] / size
         ends = None if force is None else (force[0] * size, force[1] * size)
         return self.thruster(name, np.cross(axis, torque), axis, ends, float(torque @ axis))
 

@@ -99,7 +99,8 @@ def _propeller(
         exchange.note(f"{joint.child} sits off the axis about which it turns: its place at angle 0 is taken.")
     arc = mount.ends if mount.ends[1] - mount.ends[0] < TURN else (-math.pi, math.pi)
     # Where it sits along its thrust changes nothing, but for what turns with it.
-    position, turn = vector(place - (arm @ zero) * zero), (vector(mount.axis), vector(zero))
+    position = vector(place - (arm @ zero) * zero)
+    turn = (vector(mount.axis), vector(zero))
     return Azimuth(part.name, position, *turn, part.force, T200_POWER, arc, part.dead_band)
 
 
@@ -107,7 +108,8 @@ def _fin(joint: Joint, start: Array, exchange: Exchange) -> Fin:
     if joint.kind not in TURNING:
         kinds = " or ".join(TURNING)
         raise LayoutError(f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {kinds}")
-    axis, place = joint.axis, joint.place - start
+    axis = joint.axis
+    place = joint.place - start
     if abs(axis[2]) <= math.sin(MAX_TILT):
         # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.
         outward = axis if axis[:2] @ place[:2] >= 0 else -axis
@@ -146,7 +148,8 @@ def drives(plugin: Element) -> bool:
 
 def driven(robot: Description, scope: str, plugin: Element) -> Joint:
     """Returns the joint that a thruster's plugin drives. Raises LayoutError: it moves no link."""
-    name, link = said(plugin, "joint_name jointName"), said(plugin, "linkName")
+    name = said(plugin, "joint_name jointName")
+    link = said(plugin, "linkName")
     joint = robot.joints.get(f"{scope}{name}") or robot.joints.get(name)
     if joint is None and not name and UUV_THRUSTER in plugin.get("filename", ""):
         joint = robot.movers.get(link)
@@ -164,16 +167,20 @@ def force_of(plugin: Element, name: str, exchange: Exchange) -> tuple[float, flo
         return _uuv_force(plugin, name, exchange)
     if not said(plugin, "min_thrust_cmd max_thrust_cmd"):
         return None
-    low, high = number(plugin, "min_thrust_cmd", -MOST), number(plugin, "max_thrust_cmd", MOST)
+    low = number(plugin, "min_thrust_cmd", -MOST)
+    high = number(plugin, "max_thrust_cmd", MOST)
     if said(plugin, "use_angvel_cmd").lower() in ("1", "true"):
-        density, size = number(plugin, "fluid_density", 1000.0), number(plugin, "propeller_diameter", 0.02)
+        density = number(plugin, "fluid_density", 1000.0)
+        size = number(plugin, "propeller_diameter", 0.02)
         gain = number(plugin, "thrust_coefficient", 1.0) * density * size**4
         low, high = sorted(gain * end * abs(end) for end in (low, high))
     return low, high
 
 
 def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, float] | None:
-    kind, low, high = said(plugin, "conversion/type"), -math.inf, math.inf
+    kind = said(plugin, "conversion/type")
+    low = -math.inf
+    high = math.inf
     if said(plugin, "clampMin") and said(plugin, "clampMax") and kind == "Basic":
         scale = number(plugin, "gain", 1.0) * number(plugin, "propeller_efficiency", 1.0)
         speeds = (scale * number(plugin, "clampMin"), scale * number(plugin, "clampMax"))
@@ -183,7 +190,8 @@ def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, f
     else:
         exchange.note(f"uuv_thruster of {name}: no clamps, or conversion {kind!r:.40}, which is not read.")
     if said(plugin, "thrustMin") and said(plugin, "thrustMax"):
-        low, high = max(low, number(plugin, "thrustMin")), min(high, number(plugin, "thrustMax"))
+        low = max(low, number(plugin, "thrustMin"))
+        high = min(high, number(plugin, "thrustMax"))
     return (low, high) if math.isfinite(low) else None
 
 

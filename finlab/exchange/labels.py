@@ -35,7 +35,8 @@ COUNT = "count n num number nthrusters numthrusters numberofthrusters thrusterco
 POSITION = "position positions pos xyz location locations place placement leverarm r coordinates origin"
 DIRECTION = "direction directions dir axis axes forcedirection forcedirections thrustdirection "
 DIRECTION += "thrustdirections thrustaxis thrustvector unitvector vector"
-ANGLES, UNCLEAR = "rpy euler eulerangles rollpitchyaw", "orientation orientations attitude rotation"
+ANGLES = "rpy euler eulerangles rollpitchyaw"
+UNCLEAR = "orientation orientations attitude rotation"
 ROWS_OF = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
 CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
 PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
@@ -67,10 +68,12 @@ def lookup(
     may end the key (`position_mm`) or stand behind it in brackets; an empty key where there is none."""
     known = words.split()
     for key, value in values.items():
-        label, size = str(key)[:100], 1.0
+        label = str(key)[:100]
+        size = 1.0
         unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE) if units else None
         if unit and units and unit[1].lower() in units:
-            label, size = label[: unit.start()], units[unit[1].lower()]
+            label = label[: unit.start()]
+            size = units[unit[1].lower()]
         word = plain(label)
         if word in known or word.removeprefix("thruster").removeprefix("s") in known:
             return str(key), value, size
@@ -142,7 +145,8 @@ def nodes(data: Any) -> Iterator[Node]:
             raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
         inner: Iterable[tuple[str, Any]] = ()
         if isinstance(value, Mapping):
-            scopes, inner = ((path, value), *scopes), value.items()
+            scopes = ((path, value), *scopes)
+            inner = value.items()
             node = Node(path, value, scopes)
         elif isinstance(value, list):
             inner = ((f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list))

@@ -66,11 +66,13 @@ def table_of(text: str) -> Table:
 def plain_of(table: Table) -> dict[str, Any]:
     """Returns a table as plain values: a matrix, or a mapping for each thruster. Raises LayoutError: a row
     has another length, or a cell that is no number; the row is named."""
-    header, rows = table.header, table.rows
+    header = table.header
+    rows = table.rows
     columns = {plain(cell) for cell in header}
     if measured := MEASURED & {cell.removesuffix("us") for cell in columns}:
         raise LayoutError(f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them")
-    width, named = len(header or rows[0][1]) if rows else 0, {"names": header} if header else {}
+    width = len(header or rows[0][1]) if rows else 0
+    named = {"names": header} if header else {}
     if sum(axis_of(row[1][0]) is not None for row in rows) > 1:
         return _by_axis(header, rows, width)
     if sum(axis_of(cell) is not None for cell in header) > 1 or columns & PLACES:

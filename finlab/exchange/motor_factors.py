@@ -28,7 +28,8 @@ AXES = ("Tx", "Ty", "Tz", "Fz", "Fx", "Fy")
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
 """Sign of that axis for a positive factor."""
 _PLANAR = "0 0 1 0 -1 1, 0 0 -1 0 -1 -1, 0 0 -1 0 1 1, 0 0 1 0 1 -1, "
-_SIMPLE, _TWO = "0 0 -1 0 1 0, 0 0 1 0 1 0, ", "1 0 0 -1 0 0, -1 0 0 -1 0 0"
+_SIMPLE = "0 0 -1 0 1 0, 0 0 1 0 1 0, "
+_TWO = "1 0 0 -1 0 0, -1 0 0 -1 0 0"
 _FRAMES = {
     "BLUEROV1": f"{_SIMPLE} -0.5 0.5 0 0.45 0 0, 0.5 0.5 0 0.45 0 0, 0 -1 0 1 0 0, -0.25 0 0 0 0 1",
     "VECTORED": _PLANAR + _TWO,
@@ -99,7 +100,8 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
     MOT_n_DIRECTION -1 turns a motor the other way for the same output, so that it pushes as its frame says.
     Raises LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a value is no number."""
     values = read_parameters(text, "FRAME_ MOT_1 MOT_2 MOT_3 MOT_4 MOT_5 MOT_6 MOT_7 MOT_8")
-    config, frames = values.get("FRAME_CONFIG"), [*FRAMES]
+    config = values.get("FRAME_CONFIG")
+    frames = [*FRAMES]
     if config is None:
         other = " of another vehicle (FRAME_CLASS)" if "FRAME_CLASS" in values else ""
         lacks = "no FRAME_CONFIG, by which ArduSub names the motors of a robot"
@@ -153,10 +155,14 @@ def called(text: str) -> list[MotorRow]:
     """Returns the motors of calls of `add_motor_raw_6dof` in C++ or Lua, which may go over several lines.
     Raises LayoutError: a call does not parse; its line is named."""
     lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
-    code, rows = _without_comments(text, lua), list[MotorRow]()
-    constants, line, seen = constants_in(code), 1, 0
+    code = _without_comments(text, lua)
+    rows = list[MotorRow]()
+    constants = constants_in(code)
+    line = 1
+    seen = 0
     for call in _CALL.finditer(code):
-        line, seen = line + code.count("\n", seen, call.start()), call.start()
+        line = line + code.count("\n", seen, call.start())
+        seen = call.start()
         cells = _arguments(code[call.end() : call.end() + LONGEST])
         before = code[max(0, call.start() - 40) : call.start()].rpartition("\n")[2]
         if re.search(r"\b(?:void|function)\b", before) or any(map(_DECLARED.match, cells)):
@@ -189,7 +195,8 @@ def _without_comments(code: str, lua: bool) -> str:
 
 def _arguments(text: str) -> list[str]:
     """What stands between a bracket and the one that closes it, parted by commas; none where none does."""
-    depth, cells = 0, [""]
+    depth = 0
+    cells = [""]
     for letter in text:
         depth += (letter in "([{") - (letter in ")]}")
         if depth < 0:
@@ -216,7 +223,8 @@ def tabled(table: Table) -> list[MotorRow]:
 def value_of(text: str, constants: Mapping[str, float]) -> float:
     """Returns the value of numbers, constants, + - * /, brackets and functions such as `cosf(radians(45))`.
     ValueError: it is something else, or not finite; the message names what is not known."""
-    what, names = f"{text.strip()!r:.60}", {**_NAMES, **constants}
+    what = f"{text.strip()!r:.60}"
+    names = {**_NAMES, **constants}
     try:
         if len(text) > MOST:
             raise SyntaxError

@@ -36,7 +36,8 @@ def read_parameters(text: str, wanted: str) -> dict[str, float]:
         place = next((i for i, cell in enumerate(cells) if _NAME.match(cell)), None)
         if place is None or _ASKING & {*cells[:place]}:
             continue
-        name, value = cells[place], (cells[place + 1 : place + 2] or [""])[0]
+        name = cells[place]
+        value = (cells[place + 1 : place + 2] or [""])[0]
         if is_number(value) and abs(float(value)) < 1e9:
             values[name] = float(value)
         elif name.startswith(tuple(wanted.split())):

@@ -32,7 +32,8 @@ def read_plain(
     if len(held.rows) > MAX_ACTUATORS:
         what = "columns" if held.axes else "thrusters"
         raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {len(held.rows)}", held.node.words)
-    frd, used = _frd(held, exchange, comments), {held.node.path}
+    frd = _frd(held, exchange, comments)
+    used = {held.node.path}
     parts = (_of_matrix if held.axes else _of_places)(held, data, frd, used, exchange)
     for k, (path, scope) in enumerate(held.node.scopes):
         words = f"{labels.FRAME_KEYS} {labels.NAMES} {labels.LIMIT_KEYS if k < 2 else ''}"
@@ -67,7 +68,8 @@ def _of_places(
             used.add(each.path)
             exchange.note(f"The origin is at {each.words}, {at[0]:g} {at[1]:g} {at[2]:g} m.")
     exchange.note(f"{held.node.words} was read: places in m, directions, limits in N.")
-    sign, parts = TO_FRD[:3, 0] if frd else np.ones(3), []
+    sign = TO_FRD[:3, 0] if frd else np.ones(3)
+    parts = []
     for (key, row), ends in zip(held.rows.items(), _ends(held, data, used, exchange), strict=True):
         place_key, place, size = lookup(row, labels.POSITION, LENGTHS)
         at = _three(place, f"{key}.{place_key}") * size - center
@@ -164,13 +166,16 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
     high_key, high, high_size = lookup(values, labels.MOST, FORCES)
     if high is None:
         return [None] * n
-    most, least = numbers_in(high), numbers_in(low if low is not None else high)
+    most = numbers_in(high)
+    least = numbers_in(low if low is not None else high)
     if most is None or least is None or not {most.size, least.size} <= {1, n}:
         raise LayoutError(f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}")
     if low is None:
         exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
-        least, low_size = -least, high_size
-    lows, highs = np.broadcast_to(least.ravel() * low_size, n), np.broadcast_to(most.ravel() * high_size, n)
+        least = -least
+        low_size = high_size
+    lows = np.broadcast_to(least.ravel() * low_size, n)
+    highs = np.broadcast_to(most.ravel() * high_size, n)
     return [*zip(lows.tolist(), highs.tolist(), strict=True)]
 
 
@@ -179,7 +184,8 @@ def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
     LayoutError: there is no thruster."""
     kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
     rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
-    names, limits = list(kept.names), np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()
+    names = list(kept.names)
+    limits = np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()
     matrix = dict(zip(AXES, rows.tolist(), strict=True))
     if suffix != ".csv":
         head = {"frame": exchange.frame or "FLU", "unit": "N", "names": names, "limits": limits}

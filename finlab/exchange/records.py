@@ -90,7 +90,8 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
 def _joined(row: Mapping[str, Any]) -> Row:
     """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction, unless it has
     torques or angles: a wrench is for others to read."""
-    joined, short = {**row}, {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
+    joined = {**row}
+    short = {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
     if any(axis_of(key) in ("Tx", "Ty", "Tz") for key in short):
         return joined
     for what, starts in (("position", ("", "p", "pos")), ("direction", ("d", "a", "n", "u", "dir", "f"))):
@@ -123,10 +124,12 @@ def _lists(node: Node, exchange: Exchange) -> dict[str, Row]:
     value = node.value if isinstance(node.value, Mapping) else {}
     place_key, places, size = lookup(value, labels.POSITION, LENGTHS)
     key, directions, _ = lookup(value, labels.DIRECTION)
-    axes, at = numbers_in(directions), numbers_in(places)
+    axes = numbers_in(directions)
+    at = numbers_in(places)
     if axes is None or at is None or axes.size < 6 or axes.size % 3 or axes.ndim > 2:
         return {}
-    n, what = axes.size // 3, f"{node.words}.{key}"
+    n = axes.size // 3
+    what = f"{node.words}.{key}"
     names, count = (lookup(value, words)[1] for words in (labels.NAMES, labels.COUNT))
     if at.size != axes.size:
         raise LayoutError(f"holds {at.size} numbers, and {key} {axes.size}", f"{node.words}.{place_key}")
@@ -159,7 +162,9 @@ def is_allocation(node: Node) -> bool:
 
 def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
     """Thrusters by their wrenches: a mapping for each, or a matrix whose key or rows say that it is one."""
-    value, sure, names = node.value, is_allocation(node), list[str]()
+    value = node.value
+    sure = is_allocation(node)
+    names = list[str]()
     held = _held(value)
     if held and len(held) == len(value):
         return _of_records(node, held)
@@ -172,7 +177,8 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
         if sure and isinstance(flat := lookup(value, "data")[1], list):
             value = flat
         elif len(value) > 1 and all(isinstance(row, list) for row in value.values()):
-            names, value = [*map(str, value)], [*value.values()]
+            names = [*map(str, value)]
+            value = [*value.values()]
     if not sure or not isinstance(value, list) or not value:
         return None
     array = _array(value, node) if isinstance(value[0], list) else numbers_in(value)
@@ -247,7 +253,8 @@ def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, ta
     axes = tuple(axis for each in said if (axis := axis_of(each))) if isinstance(said, list) else AXES
     if isinstance(said, list) and len({*axes}) < len(said):
         raise LayoutError(f"names its rows {said!r:.80}, expected such as Fx, Fy, Tz", node.words)
-    by_axes, across = len(array) == len(axes) and not names, array.shape[1] == len(axes)
+    by_axes = len(array) == len(axes) and not names
+    across = array.shape[1] == len(axes)
     if not by_axes and not across:
         raise LayoutError(
             f"is {len(array)} rows of {array.shape[1]} numbers, expected six rows, or beside them "

@@ -22,7 +22,9 @@ def root_of(text: str) -> Element:
     Entities could pull in other files or grow without bound, and robot descriptions have no use for them; as
     the text is UTF-8 whatever its first line says, no other encoding can hide them. Raises LayoutError: it is
     no XML, too deep or too large, or declares a DOCTYPE."""
-    builder, parser, opened = TreeBuilder(), expat.ParserCreate(), [0, 0]
+    builder = TreeBuilder()
+    parser = expat.ParserCreate()
+    opened = [0, 0]
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         opened[:] = opened[0] + 1, opened[1] + 1
@@ -37,8 +39,10 @@ def root_of(text: str) -> Element:
     def doctype(*_: object) -> None:
         raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them")
 
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler, parser.buffer_text = builder.data, True
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = builder.data
+    parser.buffer_text = True
     parser.StartDoctypeDeclHandler = doctype
     try:
         parser.Parse(text.lstrip(), True)
@@ -58,7 +62,8 @@ def is_xacro(root: Element) -> bool:
 def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
     """Returns the model that is the robot: the one that the exchange names, or the first with thrusters.
     Raises LayoutError: there is no model, none of that name, or the robot is included from another file."""
-    alone, wanted = root.tag in ("robot", "model"), {*exchange.fins, *exchange.thrusters}
+    alone = root.tag in ("robot", "model")
+    wanted = {*exchange.fins, *exchange.thrusters}
     models = [root] if alone else [*root.findall("model"), *root.findall("world/model")]
     names = [model.get("name", "") for model in models]
     if exchange.model is not None:
@@ -90,7 +95,10 @@ def parts_of(top: Element) -> tuple[Named, list[tuple[str, Element]], list[str]]
     """Returns the parts of a model and of those inside it, its plugins with their scopes, and the names of
     what is included, which is not read. Raises LayoutError: one has no name, or is placed by a frame of its
     own."""
-    named, plugins, included, waiting = Named(), list[tuple[str, Element]](), list[str](), [("", top)]
+    named = Named()
+    plugins = list[tuple[str, Element]]()
+    included = list[str]()
+    waiting = [("", top)]
     while waiting:
         scope, model = waiting.pop()
         for part in (part for tag in ("link", "joint", "frame", "model") for part in model.findall(tag)):

@@ -39,7 +39,8 @@ class CsvTable:
     def __init__(self, content: bytes, source: str, gaps: bool = False) -> None:
         """Takes a file's content, what errors call it, and whether cells may be empty. Raises DataError: it
         is no text."""
-        self.source, self._gaps = source, gaps
+        self.source = source
+        self._gaps = gaps
         lines = decoded(content, source, "CSV text").splitlines()
         above = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
         self.notes = tuple(line.lstrip("# ").rstrip() for line in lines[:above])
@@ -48,7 +49,8 @@ class CsvTable:
         self._delimiter = max(",;\t", key=first.count)
         self.header = [cell.strip() for cell in self._cells(first, f"{source}: line {above + 1}")]
         """Names of the columns."""
-        self._rows, self._first = lines[above + 1 :], above + 2
+        self._rows = lines[above + 1 :]
+        self._first = above + 2
 
     def numbers(self, places: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns the columns at some places (rows, len(places)), and the line of each row (rows,).

@@ -43,11 +43,14 @@ def checked(
         values = msgspec.to_builtins(values, enc_hook=_plain)
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as problem:
-        said, place = str(problem), ""
+        said = str(problem)
+        place = ""
     except (RecursionError, TypeError, ValueError, OverflowError):
-        said, place = "Expected `object`", ""
+        said = "Expected `object`"
+        place = ""
     if parts := _PLACE.fullmatch(said):
-        said, place = parts[1], parts[2]
+        said = parts[1]
+        place = parts[2]
     sentence, inner = _sentence(said, place, values, kind)
     place = ".".join(part for part in (place.lstrip("."), inner) if part)
     if key and place:
@@ -70,14 +73,16 @@ def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
         return f"unknown key, expected one of {', '.join(_keys(known))}", name
     if parts := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
         unit = "characters" if parts[1] == "str" else "values"
-        few, many = getattr(known, "min_length", None), getattr(known, "max_length", None)
+        few = getattr(known, "min_length", None)
+        many = getattr(known, "max_length", None)
         if few is None or many is None:
             few = many = int(parts[3])
         number = f"{few} to {many}" if few < many else f"{many}"
         return f"expected {_TYPES[parts[1]]} of {number} {unit}, got {len(value)}", ""
     if said.startswith("Expected `str` matching regex"):
         return f"expected text on one line, without spaces around it, got {shown(value)}", ""
-    least, most = getattr(known, "ge", None), getattr(known, "le", None)
+    least = getattr(known, "ge", None)
+    most = getattr(known, "le", None)
     if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (least, most):
         return f"must lie within {least:g} .. {most:g}, got {shown(value)}", ""
     if parts := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):

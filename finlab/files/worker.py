@@ -52,7 +52,8 @@ def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
             answer, error = here.recv()
         except EOFError:
             process.join()
-            answer, error = None, _ended(process.exitcode, limits)
+            answer = None
+            error = _ended(process.exitcode, limits)
         except OSError as problem:
             raise FinlabError(f"no process can be started to read the file: {problem.strerror}") from None
         finally:

@@ -152,15 +152,18 @@ def read_columns(
     used = [i for i, column in enumerate(named) if column.name]
     for name in needed:
         if not set(name.split("|")) & {named[i].name for i in used}:
-            missing, header = name.replace("|", " or "), ", ".join(table.header)
+            missing = name.replace("|", " or ")
+            header = ", ".join(table.header)
             raise DataError(f"{path}: column {missing} is missing, found {header:.200}; expected {expected}")
     numbers, lines = table.numbers(used)
     values: dict[str, Array] = {}
     first: dict[str, int] = {}
     for i, column in zip(used, numbers.T, strict=True):
-        own, name = column * named[i].scale, named[i].name
+        own = column * named[i].scale
+        name = named[i].name
         if name not in values:
-            values[name], first[name] = own, i
+            values[name] = own
+            first[name] = i
         elif not np.allclose(own, values[name], rtol=0.0, atol=ALIKE * np.abs(own).max(), equal_nan=True):
             pair = f"{table.header[first[name]]:.40} and {table.header[i]:.40}"
             raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")

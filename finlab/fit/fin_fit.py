@@ -62,10 +62,13 @@ class FinFit:
         predicted = np.array([component.predict(inputs) for component in self.components])
         thrust, unsure = self.largest * predicted.transpose(1, 0, 2).reshape(2, 3, *command.shape[:-1])
         angle = command[..., 2] + self.deflection
-        cos, sin = np.cos(angle), np.sin(angle)
-        (along, across, sideways), (by_along, by_across, by_sideways) = thrust, unsure
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        along, across, sideways = thrust
+        by_along, by_across, by_sideways = unsure
         force = [sideways, along * cos - across * sin, along * sin + across * cos]
-        y, z = np.hypot(by_along * cos, by_across * sin), np.hypot(by_along * sin, by_across * cos)
+        y = np.hypot(by_along * cos, by_across * sin)
+        z = np.hypot(by_along * sin, by_across * cos)
         return np.stack(force, axis=-1), np.stack([by_sideways, y, z], axis=-1)
 
     def predict_power(self, command: Array) -> Array | None:
@@ -97,7 +100,8 @@ class FinFit:
     def doubts(self) -> tuple[str, ...]:
         """Why the fit should not be trusted, a clause each; nothing where it may be."""
         usual = float(np.sqrt(np.mean(self.uncertainty(self.grid()) ** 2)))
-        lost, n = len(self.outliers), len(self.measurements)
+        lost = len(self.outliers)
+        n = len(self.measurements)
         clauses = {
             f"forces are uncertain by {usual:.0%} of the largest one": usual > GOOD_ERROR,
             f"only {self.coverage():.0%} of the samples lie in their 95 % band": self.coverage() < GOOD_BAND,
@@ -182,7 +186,8 @@ def _fitted(
     ):
         tell(f"fitting the {what}")
         parts.append(Component(inputs, values / largest, parts[0].mean if parts else None))
-    power, largest_power = None, 1.0
+    power = None
+    largest_power = 1.0
     if measurements.power is not None:
         tell("fitting power")
         largest_power = float(measurements.power.max())
@@ -193,7 +198,8 @@ def _fitted(
 def fin_csv(fit: FinFit) -> str:
     """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a grid."""
     command = fit.grid(GRID).reshape(-1, 3)
-    (force, deviation), power = fit.predict(command), fit.predict_power(command)
+    force, deviation = fit.predict(command)
+    power = fit.predict_power(command)
     table = np.hstack([command, force, *([] if power is None else [power[:, None]]), deviation])
     header = [*COLUMNS, *([] if power is None else [POWER_COLUMN]), *DEVIATIONS]
     return table_text(summary(fit), header, table, 6)

@@ -54,7 +54,8 @@ class ThrustKernel(NamedTuple):
         """Returns k (n, m), and a function from weights (n, m) to the derivatives (5,) of the sum of weights
         times k by the logarithms of the kernel's numbers."""
         apart = [np.subtract.outer(inputs[:, k], others[:, k]) for k in range(3)]
-        a, f = (apart[0] / self.amplitude) ** 2, (apart[1] / self.frequency) ** 2
+        a = (apart[0] / self.amplitude) ** 2
+        f = (apart[1] / self.frequency) ** 2
         phi = 2.0 * (1.0 - np.cos(apart[2])) / self.turn**2
         distance = np.sqrt(5.0 * (a + f))
         bare = np.multiply.outer(inputs[:, 0] * inputs[:, 1], others[:, 0] * others[:, 1]) * np.exp(-distance)
@@ -81,7 +82,8 @@ class GaussianProcess:
 
     def __init__(self, kernel: ThrustKernel, inputs: Array, values: Array, variance: Array) -> None:
         """Takes inputs (n, 3) as `ThrustKernel` does, values (n,) and the variance (n,) of their noise."""
-        self._kernel, self._inputs = kernel, inputs
+        self._kernel = kernel
+        self._inputs = inputs
         self._lower = _factor(kernel.covariance(inputs, inputs), variance)
         self._weights = cho_solve((self._lower, True), values)
 
@@ -138,7 +140,8 @@ def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProc
     """The process whose numbers make up to `TUNED_ON` of the values most likely; where the variance of the
     noise is not known, it is one of them, and the same for all values."""
     few = np.linspace(0, len(values) - 1, min(len(values), TUNED_ON)).astype(int)
-    places, chosen = inputs[few], values[few]
+    places = inputs[few]
+    chosen = values[few]
     known = None if variance is None else variance[few]
 
     def unlikely(logs: Array) -> tuple[float, Array]:
@@ -152,9 +155,11 @@ def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProc
             slopes = np.append(slopes, noise[0] * np.trace(curve))
         return float(0.5 * chosen @ weights + np.log(np.diag(lower)).sum()), 0.5 * slopes
 
-    start, bounds = list(ThrustKernel()), list(BOUNDS)
+    start = list(ThrustKernel())
+    bounds = list(BOUNDS)
     if known is None:
-        start, bounds = [*start, FIRST_NOISE], [*bounds, NOISE]
+        start = [*start, FIRST_NOISE]
+        bounds = [*bounds, NOISE]
     logs = minimize(unlikely, np.log(start), jac=True, method="L-BFGS-B", bounds=np.log(bounds).tolist()).x
     noise = np.full(len(values), np.exp(logs[5])) if variance is None else variance
     return GaussianProcess(ThrustKernel(*np.exp(logs[:5])), inputs, values, noise)

@@ -65,7 +65,8 @@ class Measurements:
     def thrust(self) -> tuple[Array, float]:
         """Returns the forces along the thrust's mean direction, across it and along the shaft (n, 3) [N], and
         the angle [rad] from the zero direction to that direction."""
-        force, phi = self.force, self.command[:, 2]
+        force = self.force
+        phi = self.command[:, 2]
         planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
         deflection = float(np.angle(planar.sum()))
         planar *= np.exp(-1j * deflection)
@@ -100,7 +101,8 @@ def _check_units(values: dict[str, Array], source: str) -> None:
         ("A", "half amplitudes", MAX_AMPLITUDE, "rad", "`A [deg]`, and call whole strokes `stroke`"),
         ("f", "frequencies", MAX_FREQUENCY, "Hz", "`f [rpm]`"),
     ):
-        low, high = float(values[name].min()), float(values[name].max())
+        low = float(values[name].min())
+        high = float(values[name].max())
         if high > most + 1e-9 or low < 0.0:
             raise DataError(
                 f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; name "
@@ -110,7 +112,8 @@ def _check_units(values: dict[str, Array], source: str) -> None:
 
 def _checked(read: list[Columns], source: str) -> Measurements:
     """The samples of all files, with what is wrong with all together said in a sentence."""
-    places, notes = tuple(place for file in read for place in file.places), list[str]()
+    places = tuple(place for file in read for place in file.places)
+    notes = list[str]()
     if (n := len(places)) < MIN_SAMPLES:
         raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
     columns = together([file.values for file in read])

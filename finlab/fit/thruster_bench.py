@@ -107,7 +107,8 @@ def _levels(volts: Array) -> list[NDArray[np.intp]]:
 def _between(low: Rows, high: Rows, share: float) -> Rows:
     """The table at a share of the way from one to the other, over commands that both reach."""
     ends = [(rows["command"].min(), rows["command"].max()) for rows in (low, high)]
-    first, last = max(own[0] for own in ends), min(own[1] for own in ends)
+    first = max(own[0] for own in ends)
+    last = min(own[1] for own in ends)
     places = np.unique(np.concatenate([low["command"], high["command"]]))
     places = places[(places >= first) & (places <= last)]
 
@@ -145,7 +146,8 @@ def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = 
     one named counts [V]; between two of them forces are interpolated. Raises DataError: a file is missing,
     lacks a column or holds what no thruster does, or there are several voltages and none is named."""
     read = [_tables(Path(path)) for path in paths]
-    files, source = [table for tables, _ in read for table in tables], ", ".join(str(path) for path in paths)
+    files = [table for tables, _ in read for table in tables]
+    source = ", ".join(str(path) for path in paths)
     kind, *others = [name for name in COMMANDS if all(name in file.values for file in files)] or [""]
     if not kind:
         raise DataError(f"{source}: no command stands in all files, expected {EXPECTED}")
@@ -188,14 +190,16 @@ def _is_header(cells: Sequence[str]) -> bool:
 def _renamed(columns: Columns) -> Columns:
     header = columns.headers.get("input", "")
     if "PWM" not in columns.values and re.match("[uµμm]", named_column(header, NAMES).unit):
-        columns.values["PWM"], columns.headers["PWM"] = columns.values.pop("input"), header
+        columns.values["PWM"] = columns.values.pop("input")
+        columns.headers["PWM"] = header
     return columns
 
 
 def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
     """Rows of one table with signed forces, apart by voltage."""
     values = file.values
-    command, force = values[kind], values["force"]
+    command = values[kind]
+    force = values["force"]
     if kind == "rpm" and named_column(file.headers[kind], NAMES).unit == "rpm":
         command = command * 60.0
     if kind == "rpm" and command.min() >= 0.0 > force.min():
@@ -214,7 +218,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
 
 def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
     """Rows whose forces have signs: where they are sizes alone, those below the neutral command push back."""
-    command, force = rows["command"], rows["force"]
+    command = rows["command"]
+    force = rows["force"]
     size = np.abs(force)
     if min(-force.min(), force.max()) > UNSIGNED * size.max():
         return rows
@@ -231,7 +236,9 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
 
 
 def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Bench:
-    command, force, power = values["command"], values["force"], values["power"]
+    command = values["command"]
+    force = values["force"]
+    power = values["power"]
     if not force.any() or not power.any():
         raise DataError(f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?")
     count = len(np.unique(command))

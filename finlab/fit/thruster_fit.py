@@ -72,7 +72,8 @@ def _fitted(bench: Bench) -> ThrusterFit:
         np.bincount(where, values) / count for values in (bench.command, bench.force, bench.power)
     )
     rising = isotonic_regression(force, weights=count).x
-    side, notes = _sides(command, force, rising, bench.unit), list(bench.notes)
+    side = _sides(command, force, rising, bench.unit)
+    notes = list(bench.notes)
     idle = float(power[side == 0].min()) if (side == 0).any() else 0.0
     least = NO_FORCE * float(np.abs(force).max())
     thrust = np.where(side == 0, 0.0, side * np.maximum(side * rising, least))

@@ -69,19 +69,25 @@ def _hull_of(points: Array, kind: Kind) -> AttainableSet:
     dimension = int(thick.sum())
     if dimension == 3:
         return _body(points, kind)
-    kept, flat = axes[thick], axes[~thick]
+    kept = axes[thick]
+    flat = axes[~thick]
     if dimension == 2:
         polygon = ConvexHull(inside[:, thick])
-        corners, lines = polygon.vertices, polygon.equations
-        normals, offsets = lines[:, :2] @ kept, -lines[:, 2] + lines[:, :2] @ kept @ center
+        corners = polygon.vertices
+        lines = polygon.equations
+        normals = lines[:, :2] @ kept
+        offsets = -lines[:, 2] + lines[:, :2] @ kept @ center
     elif dimension == 1:
         along = inside[:, thick][:, 0]
         corners = np.array([along.argmin(), along.argmax()])
         normals = np.concatenate([-kept, kept])
         offsets = (points[corners] * normals).sum(-1)
     else:
-        corners, normals, offsets = np.array([0]), np.zeros((0, 3)), np.zeros(0)
-    sides, none = np.concatenate([flat, -flat]), np.zeros((0, 3), dtype=np.intp)
+        corners = np.array([0])
+        normals = np.zeros((0, 3))
+        offsets = np.zeros(0)
+    sides = np.concatenate([flat, -flat])
+    none = np.zeros((0, 3), dtype=np.intp)
     outline = np.arange(len(corners)) if dimension else none[:, 0]
     normals = np.concatenate([normals, sides])
     offsets = np.concatenate([offsets, (points @ sides.T).max(axis=0)])
@@ -93,7 +99,8 @@ def _body(points: Array, kind: Kind) -> AttainableSet:
     corners = hull.vertices
     place = np.zeros(len(points), dtype=np.intp)
     place[corners] = np.arange(len(corners))
-    faces, normals = hull.simplices, hull.equations[:, :3]
+    faces = hull.simplices
+    normals = hull.equations[:, :3]
     a, b, c = (points[faces[:, k]] for k in range(3))
     backward = (np.cross(b - a, c - a) * normals).sum(-1) < 0.0
     faces = np.where(backward[:, None], faces[:, ::-1], faces)
@@ -143,7 +150,8 @@ def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Arra
     """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,): by the
     solver, in each convex part; those near the origin are the origin."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    parts, speck = convex_parts(sets), SPECK * float(sets.radius.sum())
+    parts = convex_parts(sets)
+    speck = SPECK * float(sets.radius.sum())
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:
@@ -159,7 +167,8 @@ def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Arra
         # The origin stands in for a point that is not proven to be attained.
         proven = answer.gap < UNPROVEN * (1.0 + answer.size)
         points = np.where(proven[:, None], asked.wrench(answer.force)[:, own], 0.0)
-        points, size = points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
+        points = points[best] * SCALE[own]
+        size = answer.size[best] * SCALE[own][0]
         near = np.linalg.norm(points, axis=-1) <= speck
         return np.where(near[:, None], 0.0, points), np.where(near, 0.0, size)
 

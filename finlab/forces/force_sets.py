@@ -109,7 +109,9 @@ class ForceSets(NamedTuple):
         twice `close`, in the strongest actuator's wrench; and the normal (R, m) of the plane that proves
         it."""
         rows, n, _, m = self.effectiveness.shape
-        own, unit, ends = np.zeros((rows, n, 16)), self.unit, np.zeros((2, rows, 6))
+        own = np.zeros((rows, n, 16))
+        unit = self.unit
+        ends = np.zeros((2, rows, 6))
         own[..., :4] = np.stack([self.place, self.radius, self.middle, self.half], axis=-1)
         own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = self.effectiveness / unit[:, None, None, None]
         ends[..., :m] = origin / unit[:, None], ray
@@ -173,7 +175,8 @@ def force_sets(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | Non
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
     """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
     numbers = [planes(len(shapes[0]))]
-    fields, end = [], len(numbers[0])
+    fields = []
+    end = len(numbers[0])
     for shape in (shape for robot in shapes for shape in robot):
         fields.append((shape.radius, shape.middle, shape.half, end if shape.polygons else 0))
         for corners in shape.polygons:
@@ -195,7 +198,8 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
     for places, law in laws_of(layout.actuators):
         if law.feels_flow:
             met = plant_of(layout).inflow(None if flow is None else np.asarray(flow, np.float64))
-            lower, upper = layout.lower[places], layout.upper[places]
+            lower = layout.lower[places]
+            upper = layout.upper[places]
             command = lower + np.linspace(0.0, 1.0, ALONG)[:, None, None] * (upper - lower)
             force = law.force(command, None if met is None else met[places])[..., 1:]
             for k, place in enumerate(places):
@@ -217,7 +221,9 @@ def _shape(response: Response, is_fin: bool) -> Shape:
         directions = np.stack([response.effectiveness[:3], np.zeros(3)])
         radius = max(largest, -least) if least <= 0.0 <= largest else 0.5 * (largest - least)
         return Shape(directions, radius, 0.0, 0.0, (np.array([[least, 0.0], [largest, 0.0]]),))
-    directions, middle, half = response.effectiveness[:, :3], response.middle, response.half
+    directions = response.effectiveness[:, :3]
+    middle = response.middle
+    half = response.half
     turn = half * np.linspace(-1.0, 1.0, ALONG)
     if response.gauge is not None or half == 0.0:
         gauge = np.ones(1) if response.gauge is None else response.gauge
@@ -252,7 +258,8 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
-    low, high = along.min(axis=0), along.max(axis=0)
+    low = along.min(axis=0)
+    high = along.max(axis=0)
     length, width = high - low
     angle = math.atan2(axes[0, 1], axes[0, 0])
     if width <= THINNEST * length or length == 0.0:

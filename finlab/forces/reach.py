@@ -66,7 +66,8 @@ def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
     Wide sectors count as their convex parts, with too many of them some as hulls, see `convex_parts`."""
-    robots, n = len(sets.radius), len(directions)
+    robots = len(sets.radius)
+    n = len(directions)
     parts = convex_parts(sets)
     result = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
     size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap))

@@ -97,9 +97,11 @@ class AtPlaces(Interaction):
         it counts, and by what speed takes, the wrench (..., 6), and its derivatives (..., n, 3, 6) where
         `steep`."""
         shape = force.shape if inflow is None else np.broadcast_shapes(force.shape, inflow.shape)
-        force, change = np.ascontiguousarray(np.broadcast_to(force, shape)), np.empty(shape)
+        force = np.ascontiguousarray(np.broadcast_to(force, shape))
+        change = np.empty(shape)
         met = None if inflow is None else np.ascontiguousarray(np.broadcast_to(inflow, shape))
-        wrench, slope = np.empty((*shape[:-2], 6)), np.empty((*shape, 6) if steep else 0)
+        wrench = np.empty((*shape[:-2], 6))
+        slope = np.empty((*shape, 6) if steep else 0)
         count = math.prod(shape[:-2])
         ins = (self.table.ctypes.data, force.ctypes.data, count, None if met is None else met.ctypes.data)
         outs = (change.ctypes.data, wrench.ctypes.data, slope.ctypes.data if steep else None)

@@ -60,7 +60,8 @@ class LearnedInteraction(AtPlaces):
     def __init__(self, weights: Weights, trust: float, places: Places) -> None:
         """Takes the weights, and the ratio of the networks' own error to how much they differ."""
         super().__init__(places)
-        self._weights, self._trust = weights, trust
+        self._weights = weights
+        self._trust = trust
         self._pairs = pairs = Pairs(places)
         self._among = np.eye(len(places.position))[:, pairs.receiver]
         """Which pairs (n, p) each actuator receives from."""
@@ -100,8 +101,10 @@ class LearnedInteraction(AtPlaces):
 
     def _slope_at_rest(self, force: Array) -> tuple[Array, Array]:
         """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
-        n, pairs = force.shape[-2], self._pairs
-        source, receiver = force[..., pairs.source, :], force[..., pairs.receiver, :]
+        n = force.shape[-2]
+        pairs = self._pairs
+        source = force[..., pairs.source, :]
+        receiver = force[..., pairs.receiver, :]
         sent, by_source, by_receiver = self._slopes(
             "pair",
             (lambda some: pairs.rows(some, receiver), source),
@@ -111,7 +114,8 @@ class LearnedInteraction(AtPlaces):
         own = np.einsum("np,...pab->...nab", self._among, by_receiver)
         if self._has_hull:
             more, by_own = self._slopes("hull", (lambda some: hull_rows(self.places, some), force))
-            change, own = change + more, own + by_own
+            change = change + more
+            own = own + by_own
         slope = np.zeros((*force.shape[:-2], n * n, 3, 3))
         slope[..., pairs.source * n + pairs.receiver, :, :] = by_source
         slope = slope.reshape(*force.shape[:-2], n, n, 3, 3).swapaxes(-3, -2)
@@ -151,10 +155,12 @@ def numbers_and_slopes(weights: Weights, name: str, features: Array) -> tuple[Ar
     slope = weights[f"{name}.{LAYERS - 1}.weight"].swapaxes(1, 2)[:, None]  # (MEMBERS, rows, k, width)
     for layer in reversed(range(LAYERS - 1)):
         slope = slope * (1.0 - hidden[layer] * hidden[layer])[:, :, None, :]
-        rows, k = slope.shape[1], slope.shape[2]
+        rows = slope.shape[1]
+        k = slope.shape[2]
         slope = slope.reshape(MEMBERS, rows * k, -1) @ weights[f"{name}.{layer}.weight"].swapaxes(1, 2)
         slope = slope.reshape(MEMBERS, rows, k, -1)
-    number, shape = last.mean(axis=0), features.shape[:-1]
+    number = last.mean(axis=0)
+    shape = features.shape[:-1]
     return number.reshape(*shape, -1), slope.mean(axis=0).reshape(*shape, number.shape[-1], -1)
 
 

@@ -35,7 +35,8 @@ class Pairs:
             ~np.eye(len(size), dtype=bool) & (places.diameter > 0.0)[:, None]
         )
         """Places (p,) of the two."""
-        self._size, self._own = size[self.source], size[self.receiver]
+        self._size = size[self.source]
+        self._own = size[self.receiver]
         self._way = (places.position[self.receiver] - places.position[self.source]) / self._size[:, None]
 
     def rows(self, source: AnyArray, receiver: AnyArray) -> Any:
@@ -68,9 +69,11 @@ class Pairs:
 
 def hull_rows(places: Places, force: AnyArray) -> Any:
     """Returns rows (..., n, 6 + 2 * 3) of actuators with forces (..., n, 3) [N] and the hull."""
-    center, half = places.hull[0], np.maximum(places.hull[1], LEAST)
+    center = places.hull[0]
+    half = np.maximum(places.hull[1], LEAST)
     thrust, ahead, _ = jets_of(force, np.maximum(places.diameter, LEAST))
-    place, course = (places.position - center) / half, -ahead / half
+    place = (places.position - center) / half
+    course = -ahead / half
     towards = -(place * course).sum(-1) / np.sqrt((course * course).sum(-1) + 1e-9)
     squared = (place * place).sum(-1)
     beside = squared - towards * towards
@@ -99,5 +102,6 @@ def _packed(features: list[Any], vectors: list[Any], strength: Any) -> Any:
 
 
 def _cross(a: AnyArray, b: AnyArray) -> Any:
-    one, two = [1, 2, 0], [2, 0, 1]
+    one = [1, 2, 0]
+    two = [2, 0, 1]
     return a[..., one] * b[..., two] - a[..., two] * b[..., one]

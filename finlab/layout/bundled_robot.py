@@ -50,7 +50,8 @@ def robot_of(files: Files, source: str, parse: Callable[..., Layout]) -> Robot:
         LayoutError: there is no layout, or one that names a force table or a network outside the bundle, or
             its self-test has commands for another number of actuators.
     """
-    place, folder = f"{source}/{ROBOT}", Path(os.path.abspath(source))
+    place = f"{source}/{ROBOT}"
+    folder = Path(os.path.abspath(source))
     values = parse_json(decoded(files[ROBOT], place, "JSON", LayoutError), place, LayoutError)
     robot = checked(values, Robot, source=place)
     layout: Layout = parse(robot.layout, f"{place}: layout", folder, may_open=False)

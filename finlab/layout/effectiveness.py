@@ -23,9 +23,13 @@ def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
         (..., n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along shaft, e_h and e_z.
     """
     xp = library_of(position)
-    x, y, z = position[..., 0], position[..., 1], position[..., 2]
-    c, s = xp.cos(mounting_angle), xp.sin(mounting_angle)
-    zero, one = xp.zeros_like(x), xp.ones_like(x)
+    x = position[..., 0]
+    y = position[..., 1]
+    z = position[..., 2]
+    c = xp.cos(mounting_angle)
+    s = xp.sin(mounting_angle)
+    zero = xp.zeros_like(x)
+    one = xp.ones_like(x)
     shaft = [c, s, zero, -z * s, z * c, x * s - y * c]
     horizontal = [-s, c, zero, -z * c, -z * s, x * c + y * s]
     vertical = [zero, zero, one, y, -x, zero]

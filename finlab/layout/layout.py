@@ -141,9 +141,11 @@ class Layout(Checked):
         """
         for part in self.actuators:
             if part.type != kind:
-                wanted, problem = f"robots of {kind}s", f"is of type {part.type}"
+                wanted = f"robots of {kind}s"
+                problem = f"is of type {part.type}"
             elif horizontal and getattr(part, "mounting_angle", None) is None:
-                wanted, problem = "fins with a mounting angle", "has a shaft of its own direction"
+                wanted = "fins with a mounting angle"
+                problem = "has a shaft of its own direction"
             else:
                 continue
             raise LayoutError(

@@ -18,7 +18,8 @@ from finlab.exchange.motor_factors import read_parameters_of_ardusub
 from finlab.log.recorded import CUT, Event, Recorded, Series, silent
 
 MAGIC = b"\xa3\x95"
-REST_US, FULL_US = 1500.0, 400.0
+REST_US = 1500.0
+FULL_US = 400.0
 FIRST_MOTOR, MOTORS, CHANNELS = 33, 8, 14
 """Function of the output of motor 1, most motors, and channels of one message of outputs."""
 WORTH = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
@@ -42,7 +43,9 @@ def read_dataflash(path: Path) -> Recorded:
         lacks = f"holds no RATE, expected the demands of ArduSub; it has {has}"
         raise DataError(f"{path}: {lacks}; set LOG_BITMASK so that it logs attitude rates")
     parameters = {name: float(value) for name, value in _rows(tables, "PARM", "Name", "Value")}
-    time, throttle, sticks = rate["time"], rate.get("AOut"), tables.get("RCIN", {})
+    time = rate["time"]
+    throttle = rate.get("AOut")
+    sticks = tables.get("RCIN", {})
     if throttle is None and (control := tables.get("CTUN")):
         throttle = _held(control, "ThO", time)[:, 0]
     heave = np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
@@ -135,20 +138,22 @@ def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str,
         functions = {FIRST_MOTOR + i: i + 1 for i in range(MOTORS)}
         how = "channel n is motor n"
         record.notes.append(f"It says of no output that it is a motor's (SERVOn_FUNCTION): {how}.")
-    time, escs, shares, speeds = pulses["time"], tables.get("ESC", {}), [], []
+    time = pulses["time"]
+    escs = tables.get("ESC", {})
+    shares = []
+    speeds = []
     for motor in range(MOTORS):
         channel = functions.get(FIRST_MOTOR + motor, 0)
         if (pulse := pulses.get(f"C{channel}")) is None:
             break
         sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
         shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
-        rows, speed = escs.get("Instance", np.empty(0)) == channel - 1, np.full((len(time), 1), np.nan)
+        rows = escs.get("Instance", np.empty(0)) == channel - 1
+        speed = np.full((len(time), 1), np.nan)
         speeds.append(_held(escs, "RPM", time, rows) if rows.any() else speed)
     if shares:
-        record.outputs, record.turns = (
-            Series.of(time, np.stack(shares, axis=1)),
-            Series.of(time, np.hstack(speeds)),
-        )
+        record.outputs = Series.of(time, np.stack(shares, axis=1))
+        record.turns = Series.of(time, np.hstack(speeds))
 
 
 def _held(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:

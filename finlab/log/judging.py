@@ -53,7 +53,10 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
         DataError: a table of forces cannot be read.
     """
     account = Account(log)
-    scale, span, impulse, notes = account.scale, log.span, account.impulse, [*log.notes]
+    scale = account.scale
+    span = log.span
+    impulse = account.impulse
+    notes = [*log.notes]
     asked = span @ np.abs(account.demand)
     axis = AXES[int(np.argmax(impulse / scale))] if account.lost.any() else None
     if ((span @ np.abs(account.away) - impulse) / scale).max() > OFF * (asked / scale).max():
@@ -95,7 +98,8 @@ class Account:
     """What was asked for in a log of N samples, given and missing; n actuators."""
 
     def __init__(self, log: Log) -> None:
-        self.log, self.scale = log, yardstick(log.robot)
+        self.log = log
+        self.scale = yardstick(log.robot)
         self.demand = np.nan_to_num(log.demand)
         """(N, 6) [N, N m]."""
         self.watts: float | None = None
@@ -127,7 +131,9 @@ class Account:
             method = "dual" if log.form == "ros" else log.form
             command = answers_to(Allocator(log.robot, method), log.demand).command
         self.full, self.ended = at_limits(log.robot, command)
-        plant, delivered, energy = plant_of(log.robot), np.empty((len(log), 6)), 0.0
+        plant = plant_of(log.robot)
+        delivered = np.empty((len(log), 6))
+        energy = 0.0
         for k in range(0, len(log), CHUNK):
             rows = slice(k, k + CHUNK)
             delivered[rows] = plant.wrench(command[rows])
@@ -139,7 +145,8 @@ class Account:
     def _bound(self) -> Flags:
         """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster
         which does not reverse or was stopped, or, in a log without outputs, where the autopilot says so."""
-        log, bound = self.log, self.at.any(axis=1)
+        log = self.log
+        bound = self.at.any(axis=1)
         if log.command is not None:
             one_way = (log.robot.lower[:, 0] == 0.0) | (log.robot.upper[:, 0] == 0.0)
             rests = (log.command[..., 0] == 0.0) & one_way
@@ -151,7 +158,8 @@ class Account:
     def _dead(self) -> Flags:
         """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and whose
         forces are most of what was away while no actuator was at a limit."""
-        log, robot = self.log, self.log.robot
+        log = self.log
+        robot = self.log.robot
         none = np.zeros(robot.n, bool)
         if log.command is None:
             return none
@@ -162,7 +170,8 @@ class Account:
             return none
         counts = rest[:, None] & np.isfinite(log.demand).any(axis=0)
         columns = np.where(counts, plant_of(robot).effectiveness[:, 0] / self.scale, 0.0)
-        force, size = off @ np.linalg.pinv(columns), np.square(off).sum()
+        force = off @ np.linalg.pinv(columns)
+        size = np.square(off).sum()
         share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
         explained = np.square(off - force @ columns).sum() < DEAD * size
         return np.asarray(rest & (share > DEAD) & explained)
@@ -173,14 +182,18 @@ class Account:
 
     def spells(self) -> list[Spell]:
         """Times between which axes were lost, without longer breaks."""
-        time, span, places = self.log.time, self.log.span, np.flatnonzero(self.lost.any(axis=1))
+        time = self.log.time
+        span = self.log.span
+        places = np.flatnonzero(self.lost.any(axis=1))
         apart = time[places[1:]] - (time + span)[places[:-1]] > MERGED_S
         parts = np.split(places, np.flatnonzero(apart) + 1) if len(places) else []
         return [self._spell(slice(int(part[0]), int(part[-1]) + 1)) for part in parts]
 
     def _spell(self, rows: slice) -> Spell:
-        log, lost = self.log, self.lost[rows]
-        span, some = log.span[rows], np.asarray(lost.any(axis=1))
+        log = self.log
+        lost = self.lost[rows]
+        span = log.span[rows]
+        some = np.asarray(lost.any(axis=1))
         flags = (np.any(each[rows][some], axis=0) for each in (self.full, self.ended))
         return Spell(
             start=float(log.time[rows.start]),
@@ -198,7 +211,8 @@ class Account:
 
     def timeline(self) -> Timeline:
         """Means over pieces of the log."""
-        span, n = self.log.span, len(self.log)
+        span = self.log.span
+        n = len(self.log)
         starts = np.unique(np.linspace(0, n, BINS, endpoint=False).astype(np.intp))
         columns = (self.demand, self.delivered, self.missing, self.at)
         sums = [np.add.reduceat(span[:, None] * each, starts) for each in columns]

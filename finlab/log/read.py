@@ -162,9 +162,12 @@ def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
 
 def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None) -> Log:
     """The log in the robot's newtons, at the times of its outputs, or else of what says what was left."""
-    sides, unit = _sides(record.layout, robot), _unit(record.form, robot, scale)
+    sides = _sides(record.layout, robot)
+    unit = _unit(record.form, robot, scale)
     basis = record.outputs or record.unmet or record.demand
-    time, notes, asks = basis.time, [*record.notes], [*record.asks]
+    time = basis.time
+    notes = [*record.notes]
+    asks = [*record.asks]
     demand = record.demand.at(time) * np.where(robot.commanded, unit, np.nan)
     kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MOST_FORCE).any(axis=1)
     command = unmet = None
@@ -229,7 +232,8 @@ def robot_rest(robot: Layout) -> Array:
 
 def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
     """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
-    n, k = robot.n, outputs.shape[1]
+    n = robot.n
+    k = outputs.shape[1]
     if not record.of_shares and k == 3 * n:
         return np.asarray(outputs.reshape(-1, n, 3))
     if k < n or (k != n and record.form == "ros"):
@@ -240,7 +244,8 @@ def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -
     robot.only("a log with one output for each actuator", "thruster")
     values = outputs[:, :n] * sides
     command = np.zeros((len(values), n, 3))
-    low, high = robot.lower[:, 0], robot.upper[:, 0]
+    low = robot.lower[:, 0]
+    high = robot.upper[:, 0]
     force = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
     for i, part in enumerate(robot.actuators):
         model = getattr(part, "model", None)

@@ -87,7 +87,8 @@ class Recorded:
         self, read: Callable[[str, str, Exchange], Layout], parameters: dict[str, Any], name: str
     ) -> Layout | None:
         """The robot that a reader of the autopilot's parameters finds in them; None where it finds none."""
-        exchange, lines = Exchange(), "\n".join(f"{key} {value}" for key, value in parameters.items())
+        exchange = Exchange()
+        lines = "\n".join(f"{key} {value}" for key, value in parameters.items())
         try:
             self.layout = read(lines, name[:64] or self.form, exchange)
         except LayoutError as error:

@@ -57,7 +57,8 @@ class Demands(NamedTuple):
 def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
     """Takes demands (N, 6) that held for times (N,) together until at most `most` are left: equal ones, then
     those in one cell of a grid, ever wider, each as its mean over time."""
-    spread, place = 0.0, np.nan_to_num(wrench / scale, nan=1e9)
+    spread = 0.0
+    place = np.nan_to_num(wrench / scale, nan=1e9)
     while True:
         cell = place.view(np.int64) if spread == 0.0 else np.round(place / spread).astype(np.int64)
         _, first, group = np.unique(cell @ HASH, return_index=True, return_inverse=True)

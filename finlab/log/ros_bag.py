@@ -51,7 +51,8 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
     record = Recorded("ros", _series(path, demanded, rows), events=events)
     record.lacking.append("A bag holds no robot; name it by --robot LAYOUT.")
     if sent in rows:
-        record.outputs, record.of_shares = _series(path, sent, rows), kinds[sent] == SHARES
+        record.outputs = _series(path, sent, rows)
+        record.of_shares = kinds[sent] == SHARES
     return record
 
 

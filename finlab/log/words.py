@@ -64,7 +64,8 @@ def _replays(judged: Judgement) -> Table:
 
 def picture(judged: Judgement) -> Figure:
     """Demand and what the outputs gave over time, of each axis asked for, and actuators at limits."""
-    line, names = judged.timeline, judged.robot.names
+    line = judged.timeline
+    names = judged.robot.names
     shown = [k for k in range(6) if judged.asked[k] > 1e-3 * max(judged.asked)] or [0]
     figure, rows = panels((9.0, 1.6 * len(shown) + 2.2), len(shown) + 1, sharex=True)
     *upper, last = rows[:, 0]

@@ -117,7 +117,8 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
             groups.setdefault(i if own.common is None else (own.common,), []).append(i)
     sources = []
     for places in groups.values():
-        together, alone = np.zeros((len(command), 3, 6)), np.zeros((len(command), 6))
+        together = np.zeros((len(command), 3, 6))
+        alone = np.zeros((len(command), 6))
         for i in places:
             own = known[i]
             assert own is not None

@@ -30,7 +30,9 @@ def effort_scale(upper: Values) -> Values:
 
 def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
     """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
-    a, f, d = amplitude, frequency, zero_direction
+    a = amplitude
+    f = frequency
+    d = zero_direction
     return AMPLITUDE * a * a + FREQUENCY * f * f + ZERO_DIRECTION * d * d + PRODUCT * a * f
 
 
@@ -52,7 +54,8 @@ class EffortMeter:
 
     def __init__(self, upper: Array) -> None:
         """Make it for upper limits (n, 3)."""
-        self.upper, self._scale = upper, effort_scale(upper)
+        self.upper = upper
+        self._scale = effort_scale(upper)
         squares = np.array([AMPLITUDE, FREQUENCY, ZERO_DIRECTION])
         self._twice = 2.0 * squares / self._scale**2
         self._product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])

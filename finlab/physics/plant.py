@@ -32,8 +32,11 @@ class Plant:
     def __init__(self, layout: Layout) -> None:
         """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made. Raises
         DataError: a fin's force table cannot be read."""
-        self.layout, self.n, self.n_fins = layout, layout.n, layout.n_fins
-        self.lower, self.upper = layout.lower, layout.upper
+        self.layout = layout
+        self.n = layout.n
+        self.n_fins = layout.n_fins
+        self.lower = layout.lower
+        self.upper = layout.upper
         self.width = self.upper - self.lower
         """Ranges of the limits (n, 3)."""
         self.turns: NDArray[np.bool_] = free_angles(layout.actuators) & is_full_turn(self.width)
@@ -76,7 +79,8 @@ class Plant:
         if axes.all():
             return self
         other = copy(self)
-        other.effectiveness, other.counts = np.where(axes, self.effectiveness, 0.0), axes
+        other.effectiveness = np.where(axes, self.effectiveness, 0.0)
+        other.counts = axes
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
@@ -122,7 +126,8 @@ class Plant:
     def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted, near
         forces."""
-        known, frames = self.interaction, self.layout.frames
+        known = self.interaction
+        frames = self.layout.frames
         if known is None:
             return self.offset(force), self.effectiveness
         offset, slope = known.effect(body_force(force, frames), self.met_by_all(flow))
@@ -154,7 +159,8 @@ class Plant:
         """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
         inflow = self.inflow(flow)
         shape = _broadcast(command, inflow)
-        force, jacobian = np.empty(shape), np.empty((*shape, 3))
+        force = np.empty(shape)
+        jacobian = np.empty((*shape, 3))
         for places, law in self._laws:
             answer = law.force_and_jacobian(command[..., places, :], *_met(law, inflow, places))
             force[..., places, :], jacobian[..., places, :, :] = answer

@@ -42,7 +42,8 @@ def line_error(
     at the lines left out if every second or every fourth one is kept, as shares, or None."""
     second = _mean_square(missed(2))
     fourth = _mean_square(missed(4)) if count >= FEWEST[1] else 0.0
-    far, farther = 4.0**order, 16.0**order
+    far = 4.0**order
+    farther = 16.0**order
     spacing = second / far
     if fourth:
         spacing = min(max((fourth - second) / (farther - far), 0.0), spacing)
@@ -95,7 +96,8 @@ class GridUncertainty:
     @cached_property
     def _variances(self) -> Array:
         """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by file and grid."""
-        square, error = (self._grid.values[..., :3] ** 2).sum(axis=-1), self.error
+        square = (self._grid.values[..., :3] ** 2).sum(axis=-1)
+        error = self.error
         share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
         known = np.zeros(3) if self._measured is None else self._measured
         across = share * (square + SMALL_FORCE**2 * square.max()) + known[..., 1:].mean(axis=-1)
@@ -113,7 +115,8 @@ class GridUncertainty:
     @cached_property
     def uncertain_share(self) -> float:
         """The part of the standard deviation across the shaft that grows with the force, as a share of it."""
-        square, variance = (self._grid.values[..., :3] ** 2).sum(axis=-1), self._variances[..., 0]
+        square = (self._grid.values[..., :3] ** 2).sum(axis=-1)
+        variance = self._variances[..., 0]
         away = square - square.mean()
         return float(np.sqrt(max((away * variance).sum() / max((away**2).sum(), 1e-300), 0.0)))
 
@@ -124,7 +127,8 @@ grid_uncertainty = lru_cache(maxsize=64)(GridUncertainty)
 
 def grid_error(grid: Grid) -> TableError:
     """Returns the errors of a grid of forces over their sizes, those of all axes together."""
-    counts, orders = [len(axis) for axis in grid.axes], [OPEN_ORDER, OPEN_ORDER, OPEN_ORDER]
+    counts = [len(axis) for axis in grid.axes]
+    orders = [OPEN_ORDER, OPEN_ORDER, OPEN_ORDER]
     if grid.periodic:
         orders[2] = ORDER
     few = tuple(k for k, count in enumerate(counts) if count < FEWEST[0])

@@ -46,7 +46,8 @@ def map_parts(
     that can be pickled can be sent. With a title `what` there is a bar on a terminal's stderr, which counts
     units. Raises FinlabError: the cluster is gone, a part ends every worker, or a process of this machine
     has ended; and whatever `function` raises."""
-    client, count = _client.get(), len(parts)
+    client = _client.get()
+    count = len(parts)
     jobs = min(jobs, count)
     if client is not None:
         made = _by_cluster(client, function, parts)
@@ -112,7 +113,8 @@ def _version() -> str:
 
 
 def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs: int) -> Iterator[Made]:
-    others, context = set(multiprocessing.active_children()), multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, context, end_with_parent) as pool:
         made = pool.map(function, parts)
         started = set(multiprocessing.active_children()) - others
@@ -151,7 +153,8 @@ def _result(client: "Client", future: "Future[Any]") -> Any:
                 with client.as_current():
                     wait(future, timeout=PATIENCE_S)
             except TimeoutError:
-                before, lost = lost, not client.scheduler_info(n_workers=-1)["workers"]
+                before = lost
+                lost = not client.scheduler_info(n_workers=-1)["workers"]
                 if before and lost:
                     raise FinlabError(
                         "cluster: all workers are lost; start others and run it again"

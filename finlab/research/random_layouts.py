@@ -76,7 +76,8 @@ def random_layout(
 
 
 def _varied_limits(rng: np.random.Generator, count: int) -> list[Limits]:
-    amplitude, frequency = rng.uniform(*AMPLITUDE_MAX_RANGE, count), rng.uniform(*FREQUENCY_MAX_RANGE, count)
+    amplitude = rng.uniform(*AMPLITUDE_MAX_RANGE, count)
+    frequency = rng.uniform(*FREQUENCY_MAX_RANGE, count)
     width = rng.uniform(*ARC_RANGE, count)
     center = rng.uniform(-1.0, 1.0, count) * (math.pi - width / 2)
     arc = rng.uniform(size=count) < ARC_SHARE
@@ -167,7 +168,8 @@ def random_robot(
         kinds: what they are drawn of, each kind as often.
         each: whether there is at least one of each kind.
     """
-    n, size = int(rng.integers(count[0], count[1] + 1)), log_uniform(rng, *SIZE)
+    n = int(rng.integers(count[0], count[1] + 1))
+    size = log_uniform(rng, *SIZE)
     chosen = [kinds[k] for k in rng.integers(len(kinds), size=n)]
     if each:
         chosen[: len(kinds)] = kinds
@@ -328,9 +330,11 @@ def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     half = n // 2
     one, turn = _places(rng, n - half)
     if kind == 1:  # port and starboard: the mirror image of a shaft's azimuth is its negative
-        other, turned = one[:half] * np.array([1.0, -1.0, 1.0]), -turn[:half]
+        other = one[:half] * np.array([1.0, -1.0, 1.0])
+        turned = -turn[:half]
     else:  # one above the other
         one[:half, 2] = rng.uniform(0.0, 0.1)
-        other, turned = one[:half] * np.array([1.0, 1.0, -1.0]), turn[:half]
+        other = one[:half] * np.array([1.0, 1.0, -1.0])
+        turned = turn[:half]
     order = rng.permutation(n)
     return np.concatenate([one, other])[order], np.asarray(wrapped(np.concatenate([turn, turned])))[order]

@@ -26,7 +26,9 @@ from finlab.swim.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
-TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"  # where files are kept, inside a folder
+# where files are kept, inside a folder
+TABLE_FOLDER = "tables"
+HULL_FOLDER = "hulls"
 A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
@@ -76,7 +78,8 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         parts = bundle_files_of(content, source)
         robot = robot_of(parts, source, parse_layout)
-        layout, lost = robot.layout, robot.lost
+        layout = robot.layout
+        lost = robot.lost
     else:
         parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
         layouts = [name for name in parts if name.endswith(LAYOUTS)]
@@ -136,7 +139,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     layout, body = renamed(layout, names), layout.body
     if body is None or body.hull is None or body.hull.mesh is None:
         return Opened(layout)
-    mesh, hull = came(body.hull.mesh), None
+    mesh = came(body.hull.mesh)
+    hull = None
     if mesh in parts:
         hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
     missing = () if hull else (Path(mesh).name[-60:],)
@@ -151,7 +155,8 @@ def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
     mesh, report = read_mesh(name, content, scale)
     if report.triangles > MAX_FACES:
         fewer = simplified(mesh, MAX_FACES)
-        name, content = "hull.stl", stl_of(fewer._replace(vertices=fewer.vertices / scale))
+        name = "hull.stl"
+        content = stl_of(fewer._replace(vertices=fewer.vertices / scale))
     return _kept(content, folder / HULL_FOLDER, Path(name).suffix.lower())
 
 

@@ -22,7 +22,8 @@ from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
 TABLE = PowerTable(t200_rows(16), "us")
-UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+AHEAD = (1.0, 0.0, 0.0)
 
 
 def thruster(force: tuple[float, float], model: Any, **more: Any) -> Thruster:
@@ -76,7 +77,8 @@ def check(
     group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
 ) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command gives it."""
-    multipliers, m = prices_of(group, 5.0), len(group.responses)
+    multipliers = prices_of(group, 5.0)
+    m = len(group.responses)
     robot = prepared(group, wrench, low, high)
     force = np.array([answer(robot, price)[0] for price in multipliers.T])
     command = robot.core.commands(force)
@@ -121,9 +123,11 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[floa
     wrench = columns(RUDDERS)
     frames = np.array([part.frame for part in RUDDERS])
     inflow = frames @ np.array(flow)
-    group, law = RudderGroup(RUDDERS, wrench).at(inflow), RudderLaw(RUDDERS)
+    group = RudderGroup(RUDDERS, wrench).at(inflow)
+    law = RudderLaw(RUDDERS)
     low, high = (np.array([getattr(part, end) for part in RUDDERS]) for end in ("lower", "upper"))
-    robot, met = prepared(group, wrench, low, high), law.met(inflow)
+    robot = prepared(group, wrench, low, high)
+    met = law.met(inflow)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
     for share in (0.0, 0.3, 1.0):
         force = np.zeros((1, 2, 2))
@@ -141,7 +145,8 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[floa
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench, law = columns([part]), RudderLaw([part])
+    wrench = columns([part])
+    law = RudderLaw([part])
     group = RudderGroup([part], wrench).at(inflow)
     robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
     price = np.linspace(-3.0, 3.0, 31)
@@ -157,7 +162,8 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
 def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench, law = columns([part]), RudderLaw([part])
+    wrench = columns([part])
+    law = RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
     group = RudderGroup([part], wrench).at(inflow)
     robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
@@ -182,7 +188,8 @@ def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
     group = AzimuthGroup(AZIMUTHS, columns(AZIMUTHS))
     low, high = (np.array([getattr(part, end) for part in AZIMUTHS]) for end in ("lower", "upper"))
     core = prepared(group, columns(AZIMUTHS), low, high).core
-    rest, before = np.zeros((1, 3, 2)), np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
+    rest = np.zeros((1, 3, 2))
+    before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
     for previous, angles in ((before, [3.0, 0.9, 1.2]), (None, [0, 0, 1]), (np.nan * before, [0, 0, 1])):
         np.testing.assert_allclose(core.commands(rest, previous)[0, :, 0], angles, atol=1e-12)
 

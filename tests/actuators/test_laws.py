@@ -178,7 +178,8 @@ def test_a_plant_judges_any_mix() -> None:
     wrench = plant.wrench(command, flow=flow)
     np.testing.assert_allclose(wrench, np.concatenate([force, torque], axis=-1).sum(axis=1), atol=1e-12)
     np.testing.assert_allclose(force[:, 0], command[:, 0, :1] * [0.0, 0.6, 0.8])
-    angle, size = command[:, 3, 0], command[:, 3, 1]
+    angle = command[:, 3, 0]
+    size = command[:, 3, 1]
     np.testing.assert_allclose(
         force[:, 3, :2], np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
     )

@@ -47,7 +47,8 @@ def boat(home: Path) -> Layout:
 
 
 def test_it_is_answered_in_and_out_of_reach_and_damaged(boat: Layout) -> None:
-    allocator, plant = Allocator(boat), plant_of(boat)
+    allocator = Allocator(boat)
+    plant = plant_of(boat)
     for surge, yaw in ((10.0, 1.0), (25.0, -3.0), (5.0, 0.0)):
         answer = allocator.allocate([surge, 0, 0, 0, 0, yaw])
         np.testing.assert_allclose(plant.wrench(answer.command)[[0, 5]], (surge, yaw), atol=1e-6)

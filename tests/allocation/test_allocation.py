@@ -63,7 +63,8 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
 
 
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
-    layout, search = load_layout("A"), AnyRobot("mdn")
+    layout = load_layout("A")
+    search = AnyRobot("mdn")
     first, second = (search.allocate(layout, SURGE) for _ in range(2))
     assert first.candidates is not None and first.candidates.command.base is not first.command
     with pytest.raises(ValueError, match="read-only"):
@@ -110,7 +111,8 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
 
 @pytest.mark.parametrize("method", OF_FINS)
 def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) -> None:
-    allocator, layout = quick_allocator(method), load_layout("A")
+    allocator = quick_allocator(method)
+    layout = load_layout("A")
     table = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))
     tables = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
     for answer in (allocator.allocate, lambda *asked, **how: allocator.allocate_batch(*asked, **how)):
@@ -139,7 +141,9 @@ def wrenches(n: int = 6) -> np.ndarray:
 
 
 def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
-    allocator, layout, targets = AnyRobot(), load_layout("A"), wrenches(20)
+    allocator = AnyRobot()
+    layout = load_layout("A")
+    targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
     errors = np.array([allocator.allocate(layout, target).err_norm for target in targets])
     np.testing.assert_allclose(batch.err_norm, errors, rtol=1e-6, atol=1e-5)
@@ -166,7 +170,8 @@ def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
 
 
 def test_a_method_that_does_not_know_the_policy_says_so_at_once() -> None:
-    allocator, layout = AnyRobot("analytic"), load_layout("A")
+    allocator = AnyRobot("analytic")
+    layout = load_layout("A")
     for policy in ("priority", Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
         with pytest.raises(AllocationError, match="minimizes the plain error"):
             allocator.allocate_batch(layout, [[0.1, 0, 0, 0, 0, 0]], policy=policy)

@@ -35,7 +35,9 @@ def test_an_axis_that_nobody_commands_decides_nothing(name: str, surge: float, p
 @pytest.mark.parametrize("policy", POLICIES)
 def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
     layout = load_layout("bluerov2_heavy")
-    allocator, surge, free = Allocator(layout), [20.0, 1.0, 2.0, 3.0, 4.0, 5.0], AXES[1:]
+    allocator = Allocator(layout)
+    surge = [20.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    free = AXES[1:]
     one = allocator.allocate(surge, free=free, policy=policy)
     assert one.wrench[0] == pytest.approx(20.0) and one.reachable
     np.testing.assert_array_equal(np.isnan(one.target), [False] + 5 * [True])

@@ -38,10 +38,12 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
 @pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
 def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: Layout, kind: str) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
-    layout, bow = replace(penta, actuators=fins), penta.index("bow")
+    layout = replace(penta, actuators=fins)
+    bow = penta.index("bow")
     result = search.allocate(layout, TARGET, damage=Damage(torn={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told, law = result.forces, Plant(layout).body_forces(result.command)
+    told = result.forces
+    law = Plant(layout).body_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
     np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
     np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)

@@ -38,10 +38,12 @@ def test_candidates_are_read_only() -> None:
 
 
 def test_a_buffer_that_is_used_again_changes_nothing(allocator: Allocator) -> None:
-    buffer, flow = wrenches()[0], np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
+    buffer = wrenches()[0]
+    flow = np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
     result, expected = (allocator.allocate(given, flow=flow) for given in (buffer, buffer.copy()))
     _ = expected.bound, expected.notes, expected.err_norm
-    buffer[:], flow[:] = 1e3, 3.0
+    buffer[:] = 1e3
+    flow[:] = 3.0
     assert result == expected
     many = wrenches()
     batch, same = (allocator.allocate_batch(given) for given in (many, many.copy()))
@@ -55,7 +57,8 @@ def test_a_buffer_that_is_used_again_changes_nothing(allocator: Allocator) -> No
 
 
 def test_another_command_is_a_copy(allocator: Allocator) -> None:
-    result, command = allocator.allocate(wrenches()[0]), np.zeros((8, 3))
+    result = allocator.allocate(wrenches()[0])
+    command = np.zeros((8, 3))
     other = result.with_command(command)
     command[:] = 5.0
     assert not other.command.any() and command.flags.writeable
@@ -87,7 +90,8 @@ def test_a_batch_has_the_commands_of_each_answer_by_name(robot: str) -> None:
 
 
 def test_the_batch_says_what_a_table_sends() -> None:
-    layout, table = load_layout("bluerov2_heavy"), PowerTable(t200_rows(16), "us")
+    layout = load_layout("bluerov2_heavy")
+    table = PowerTable(t200_rows(16), "us")
     measured = layout.replace_actuator(layout.names[0], model=table, force=(-30.0, 40.0))
     batch = Allocator(measured).allocate_batch([*wrenches(), np.zeros(6)])
     sent = batch.commands[layout.names[0]].input  # type: ignore[union-attr]

@@ -72,10 +72,13 @@ def ask(seed: int) -> None:
     """Ask a drawn robot, and look at what it answers."""
     rng = np.random.default_rng([2026, seed])
     name = pick(rng, METHODS)
-    robot, allocator, how = hostile_robot(seed, 2026), method(name), policy(rng)
+    robot = hostile_robot(seed, 2026)
+    allocator = method(name)
+    how = policy(rng)
     if name not in ("dual", "mdn") and not how.is_plain:
         how = Policy()
-    plant, asked = plant_of(robot), question(rng, robot)
+    plant = plant_of(robot)
+    asked = question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
     anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
     target = np.clip(

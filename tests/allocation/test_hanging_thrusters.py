@@ -53,7 +53,8 @@ def pod(rng: np.random.Generator, name: str, dead_band: float) -> Azimuth:
     force = least, float(rng.uniform(10.0, 50.0))
     arc = (-math.pi, math.pi) if rng.random() < 0.5 else (-0.8, 1.1)
     model = PowerLaw(rng.uniform(0.5, 2.0), rng.uniform(0.5, 2.0))
-    turn_axis, ahead = tuple(axis.tolist()), tuple(zero.tolist())
+    turn_axis = tuple(axis.tolist())
+    ahead = tuple(zero.tolist())
     return Azimuth(name, position, turn_axis, ahead, force, model, arc, dead_band)
 
 
@@ -101,7 +102,8 @@ def test_the_others_make_up_for_what_hangs(seed: int) -> None:
     layout = robot(rng)
     index = int(rng.integers(layout.n)) if seed % 2 else 0
     damage, kept = hangs(rng, layout.actuators[index])
-    targets, allocator = reached_targets(rng, layout, index, kept), Allocator(layout)
+    targets = reached_targets(rng, layout, index, kept)
+    allocator = Allocator(layout)
     result = allocator.allocate(targets[0], damage=damage)
     tick = allocator.allocate(targets[0], damage=damage, previous=result)
     for answer in (result, tick):
@@ -120,7 +122,8 @@ def test_the_others_make_up_for_what_hangs(seed: int) -> None:
 @pytest.mark.parametrize("force", [12.0, 0.0, -9.0])
 def test_every_method_accounts_for_a_thruster_that_hangs(method: str, force: float) -> None:
     """As well as for one that is lost, whose force is taken off the target."""
-    layout, rng = load_layout("bluerov2_heavy"), np.random.default_rng(5)
+    layout = load_layout("bluerov2_heavy")
+    rng = np.random.default_rng(5)
     name = layout.names[2]
     targets = reached_targets(rng, layout, 2, np.array([force, 0.0, 0.0])) * 0.5
     kept = np.zeros((layout.n, 3))

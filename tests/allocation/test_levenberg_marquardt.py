@@ -50,18 +50,21 @@ HOSTILE = {
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
 def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRobot) -> None:
-    before, after = [], []
+    before = []
+    after = []
     for seed in range(5000, 5010):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
         problem = problem_of(search, layout)
-        target, start = problem.wrench(draw(problem, 20, 1)), draw(problem, 20, 2)
+        target = problem.wrench(draw(problem, 20, 1))
+        start = draw(problem, 20, 2)
         refined = refine(problem, target, start, 30)
         assert keeps_limits(problem, refined.command)
         before.append(error(problem, target, start))
         after.append(error(problem, target, refined.command))
         np.testing.assert_allclose(refined.error, after[-1], atol=1e-9)
         np.testing.assert_allclose(refined.wrench, problem.wrench(refined.command), atol=1e-9)
-    first, last = np.concatenate(before), np.concatenate(after)
+    first = np.concatenate(before)
+    last = np.concatenate(after)
     assert (last <= first + 1e-12).all()
     assert np.median(first) > 0.5 and (last < 0.05 * first).mean() > 0.7
 
@@ -120,7 +123,8 @@ def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
 
 def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5004), n_fins=4))
-    target, start = problem.wrench(draw(problem, 6, 1)), draw(problem, 6, 2)
+    target = problem.wrench(draw(problem, 6, 1))
+    start = draw(problem, 6, 2)
     together = refine(problem, target, start, 8)
     for row in range(6):
         alone = refine(problem, target[row : row + 1], start[row : row + 1], 8)
@@ -167,7 +171,9 @@ def test_directions_are_clamped_as_angles(fin: int, direction: float, expected: 
 
 
 def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
-    rng, lower, upper = np.random.default_rng(0), LIMITS.lower, LIMITS.upper
+    rng = np.random.default_rng(0)
+    lower = LIMITS.lower
+    upper = LIMITS.upper
     clamped = LIMITS.feasible(5.0 * rng.standard_normal((500, 3, 3)))
     assert (clamped >= lower).all() and (clamped <= upper).all()
     inner = lower + rng.random((500, 3, 3)) * (upper - lower)

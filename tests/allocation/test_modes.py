@@ -20,8 +20,10 @@ from finlab.layout import load_layout
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot, normalized_error
 
-LOWER, UPPER = np.tile([0.05, 0.1, -math.pi], (2, 1)), np.tile([0.6, 2.1, math.pi], (2, 1))
-PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
+LOWER = np.tile([0.05, 0.1, -math.pi], (2, 1))
+UPPER = np.tile([0.6, 2.1, math.pi], (2, 1))
+PUSH = (0.4, 1.5, 0.0)
+REST = (0.05, 0.1, 0.0)
 
 
 def candidates(*commands: list[tuple[float, ...]]) -> Candidates:

@@ -31,7 +31,8 @@ def wrenches(n: int) -> np.ndarray:
 @pytest.mark.parametrize("method", METHODS)
 def test_copies_answer_the_same(method: str) -> None:
     layout = load_layout("bluerov2_heavy" if method in ("px4", "ardusub") else "A")
-    allocator, lost = Allocator(layout, method, **QUICK.get(method, {})), layout.names[:1]
+    allocator = Allocator(layout, method, **QUICK.get(method, {}))
+    lost = layout.names[:1]
     answer = allocator.allocate(SURGE, lost=lost)
     for twin in (copy.copy(allocator), copy.deepcopy(allocator), pickle.loads(pickle.dumps(allocator))):
         assert (twin.layout, twin.method, twin.settings) == (
@@ -69,7 +70,8 @@ def test_an_answer_needs_no_allocator(tmp_path: Path) -> None:
 
 
 def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
-    allocator, made = Allocator(load_layout("A")), []
+    allocator = Allocator(load_layout("A"))
+    made = []
     kind = type(allocator._whole.method)
     first = Method.__init__
 
@@ -92,7 +94,8 @@ def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.
 def test_errors_are_shares_of_what_the_robot_can_push() -> None:
     layout = load_layout("A")
     allocator = Allocator(layout)
-    strongest, lever = 4.737410112522892 * (2.1 * np.sin(0.6)) ** 2, np.linalg.norm(layout.position, axis=1)
+    strongest = 4.737410112522892 * (2.1 * np.sin(0.6)) ** 2
+    lever = np.linalg.norm(layout.position, axis=1)
     np.testing.assert_allclose(allocator.scale[:3], 2.0 * strongest, rtol=1e-9)
     assert 0.8 * 2.0 * strongest * lever.max() < allocator.scale[3] <= 2.0 * strongest * lever.max() * 1.0001
     far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
@@ -119,7 +122,8 @@ def test_the_yardstick_grows_with_the_robot(size: float) -> None:
 
 
 def test_many_targets_take_flat_memory() -> None:
-    allocator, targets = Allocator(load_layout("A")), wrenches(12 * CHUNK)
+    allocator = Allocator(load_layout("A"))
+    targets = wrenches(12 * CHUNK)
     allocator.allocate_batch(targets[: CHUNK + 1])
     tracemalloc.start()
     batch = allocator.allocate_batch(targets)

@@ -34,7 +34,8 @@ def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_start
     """Weighted error that scipy finds on the plant from several starts."""
     lower = layout.lower
     upper = layout.upper
-    plant, rng = Plant(layout), np.random.default_rng(0)
+    plant = Plant(layout)
+    rng = np.random.default_rng(0)
 
     def residual(command: np.ndarray) -> np.ndarray:
         return (plant.wrench(command.reshape(-1, 3)) - target) * weights
@@ -63,7 +64,8 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
 
 def cosine(result: Allocation) -> float:
     """Between what was asked and what is given, both normalized."""
-    asked, given = result.target / result.scale, result.wrench / result.scale
+    asked = result.target / result.scale
+    given = result.wrench / result.scale
     return float(asked @ given / (np.linalg.norm(asked) * np.linalg.norm(given)))
 
 
@@ -144,7 +146,8 @@ def test_direction_within_arcs(search: AnyRobot) -> None:
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AnyRobot) -> None:
-    layout, target = shipped("A"), [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+    layout = shipped("A")
+    target = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
     result = search.allocate(layout, target, policy=policy)
     assert result.reachable
     assert result.share == pytest.approx(1.0, abs=1e-6)

@@ -16,7 +16,8 @@ SAME = 1e-6
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
-    rng, off = np.random.default_rng(4), []
+    rng = np.random.default_rng(4)
+    off = []
     for number in range(3):
         allocator = Allocator(load(random_robot(kind, number, 0)))
         target = within(random_plant(kind, number, 0), rng, 0.2, 0.5)
@@ -33,7 +34,8 @@ def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
                 off.append(np.linalg.norm((other.wrench - answer.wrench) / answer.scale))
                 assert off[-1] < REACHED, f"{kind} {number}, direction {k}"
                 assert answer.bound is None or other.power >= answer.bound * (1.0 - SAME)
-                low, high = answer.layout.lower - 1e-9, answer.layout.upper + 1e-9
+                low = answer.layout.lower - 1e-9
+                high = answer.layout.upper + 1e-9
                 assert ((command >= low) & (command <= high)).all()
     assert off or kind in ("rudders", "holes"), "some of them have another way"
     assert np.median(off or 0.0) < SAME, (

@@ -63,7 +63,8 @@ def test_it_stops_when_told(shipped: Layouts) -> None:
 
 
 def test_it_stops_within_a_round(shipped: Layouts) -> None:
-    layout, seen = shipped("A"), list[int]()
+    layout = shipped("A")
+    seen = list[int]()
 
     def rule(position: Array, frames: Array) -> Array:
         seen.append(len(position))
@@ -123,7 +124,8 @@ SHIPPED = {
 
 @pytest.mark.parametrize("name", sampled(SHIPPED, every=2))
 def test_any_actuator_moves_within_bounds_and_keeps_the_mirror(shipped: Layouts, name: str) -> None:
-    layout, (names, settings) = shipped(name), SHIPPED[name]
+    layout = shipped(name)
+    names, settings = SHIPPED[name]
     parts = [layout.actuators[layout.index(part)] for part in names]
     bounds = {part.name: Bounds.around(part, 0.04, 0.3) for part in parts}
     found = optimize_layout(layout, names, bounds, rounds=4, seed=1, **settings)
@@ -145,7 +147,8 @@ def test_a_torpedo_at_rest_has_nothing_to_raise(shipped: Layouts) -> None:
 
 
 def test_the_mission_of_a_torpedo_counts_at_its_speed(shipped: Layouts) -> None:
-    layout, flow = replace(shipped("torpedo"), axes=("Fx", "Tx", "Ty", "Tz")), [1.5, 0, 0, 0, 0, 0]
+    layout = replace(shipped("torpedo"), axes=("Fx", "Tx", "Ty", "Tz"))
+    flow = [1.5, 0, 0, 0, 0, 0]
     rolled = [[5.0, 0.0, 0.0, 0.5, 0.0, 0.0]]
     left = layout.actuators[layout.index("elevator_left")]
     bounds = {left.name: Bounds.around(left, (0.0, 0.05, 0.0), 0.0)}
@@ -165,7 +168,8 @@ def test_what_a_robot_pushes_alone_is_not_given_for_the_weakest_direction(shippe
 
 def slopes_are_differences(hill: Hill, moves: Moves, rel: float) -> None:
     """Along a random change, slopes agree with differences of the goal."""
-    random, width = np.random.default_rng(3), moves.upper - moves.lower
+    random = np.random.default_rng(3)
+    width = moves.upper - moves.lower
     vector = random.uniform(moves.lower, moves.upper)
     way = random.standard_normal(len(width))
     way *= width / np.linalg.norm(way)
@@ -183,7 +187,8 @@ def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     moves = Moves(layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators})
     axes = [axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts]
-    near, far = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]], [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
+    near = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    far = [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
     slopes_are_differences(Directions(moves, axes, False), moves, 0.02)
     slopes_are_differences(Power(moves, near, None), moves, 0.02)
     slopes_are_differences(Power(moves, far, None), moves, 0.1)  # the nearest point by other weights
@@ -192,7 +197,8 @@ def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
 @pytest.mark.parametrize(("goal", "least"), [("weakest_direction", 112.0), ("mission_power", -1.2)])
 def test_eight_thrusters_find_their_places(shipped: Layouts, goal: str, least: float) -> None:
     """The same arguments and seed give the same layout; what is proposed keeps its distance and its grid."""
-    layout, grid = shipped("bluerov2_heavy"), (0.001, np.radians(1.0))
+    layout = shipped("bluerov2_heavy")
+    grid = (0.001, np.radians(1.0))
     bounds = {part.name: Bounds.around(part, 0.05, np.pi / 2) for part in layout.actuators}
     seen: list[Progress] = []
     found = optimize_layout(layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=seen.append)

@@ -47,7 +47,8 @@ def test_wide_arcs_are_noted(wide: Layout) -> None:
 @pytest.mark.parametrize("name", ["A", "B", "ucat", "pair", "no_yaw", "hexa", "asymmetric"])
 def test_quick_check_agrees_with_the_whole_analysis(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
-    quick, whole = quick_check(layout), authority(layout)
+    quick = quick_check(layout)
+    whole = authority(layout)
     assert (quick.rank, quick.without_authority, quick.coupled) == (
         whole.rank,
         whole.without_authority,
@@ -76,7 +77,8 @@ def test_a_pair_shares_heave_evenly() -> None:
 
 
 def test_failures() -> None:
-    layout, wrench = load_layout("A"), [[0.5, 0.0, 0.5, 0.0, 0.0, 0.05]]
+    layout = load_layout("A")
+    wrench = [[0.5, 0.0, 0.5, 0.0, 0.0, 0.05]]
     assert np.isfinite(least_power(layout, wrench)).all()
     assert np.isnan(least_power(layout, wrench, lost=layout.names[:3])).all()
 

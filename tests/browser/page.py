@@ -81,7 +81,8 @@ class Page:
             self.session.start_over()
             self.session.display = self._display
             self.session.desk = Desk()
-            self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
+            self.session.draft = SearchRequest()
+            self.session.swim = SwimSettings()
             self.view.jobs.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
@@ -120,7 +121,8 @@ class Page:
     def catch_up(self) -> None:
         """Wait until all that the server has told so far has come to the page."""
         self._marks += 1
-        loop, gui = self._served.server.get_event_loop(), self.view.client.gui
+        loop = self._served.server.get_event_loop()
+        gui = self.view.client.gui
         loop.call_soon_threadsafe(run_script, gui, f"window.finlabMark = {self._marks}")
         self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks, polling=20)
 

@@ -25,7 +25,8 @@ def hull_file(folder: Path) -> Path:
 
 def describe(page: Any, texts: tuple[str, ...]) -> None:
     """What the inspector has of the selected fin: name, place, shaft."""
-    session, (name, x, y, z, shaft) = page.session, texts
+    session = page.session
+    name, x, y, z, shaft = texts
     page.page.locator(".fl.head b", has_text="1").or_(page.page.locator(".fl.head b")).first.wait_for()
     page.type("Name", name)
     page.until(lambda: session.selected == name)
@@ -84,7 +85,8 @@ def test_a_robot_from_nothing_to_another_browser(
     page.page.keyboard.press("Escape")
     page.until(lambda: page.page.locator(".fl-ask").count() == 0)
     there = browser.new_context(viewport={"width": 900, "height": 600})
-    tab, known = there.new_page(), set(served.app.views)
+    tab = there.new_page()
+    known = set(served.app.views)
     tab.goto(link.replace("?", "?fixedDpr=0.1&"))
 
     def others() -> list[Any]:
@@ -160,7 +162,8 @@ def test_reach_draws_sets_and_compares_layouts(page: Any) -> None:
     page.choose("Draw the set of", "forces")
     page.visible("/robot/attainable/now")
     page.until(lambda: "axes independent" in page.text(".score"))
-    whole, card = page.vertices("/robot/attainable/now"), page.text(".score")
+    whole = page.vertices("/robot/attainable/now")
+    card = page.text(".score")
     page.key("n")
     page.key("x")
     page.until(lambda: page.session.state.failed == ("front_right",))
@@ -197,7 +200,8 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
 
 def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any) -> None:
     page.tab("Design")
-    session, card = page.session, page.page.locator(".fl-ask")
+    session = page.session
+    card = page.page.locator(".fl-ask")
     for key, mass in (("Escape", 19.0), ("Enter", None)):
         page.press("Forget")
         card.wait_for()

@@ -37,7 +37,8 @@ def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
     """Drag files over an element of the page, see what the page says to that, and let them go there."""
     coded = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
     carried = page.page.evaluate_handle(CARRIED, coded)
-    target, said = page.page.locator(place).first, page.page.locator("html.fl-dropping")
+    target = page.page.locator(place).first
+    said = page.page.locator("html.fl-dropping")
     target.dispatch_event("dragover", {"dataTransfer": carried})
     said.wait_for()
     target.dispatch_event("drop", {"dataTransfer": carried})
@@ -45,7 +46,8 @@ def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
 
 
 def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:
-    state, session = page.session.state, page.session
+    state = page.session.state
+    session = page.session
     drop(page, ".fl-status", {"notes.docx": b"Dear all"})
     page.until(lambda: any("'notes.docx' cannot be opened" in text for text in page.notes()))
     values, table = measured_robot(tmp_path)
@@ -120,7 +122,8 @@ def test_what_is_exported(page: Any, tmp_path: Path) -> None:
 
 
 def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
-    command, session = commands(120), page.session
+    command = commands(120)
+    session = page.session
     cell = write(tmp_path / "cell.csv", columns_of(command, measured(soft(k=4.0, d=0.1), command)))
     page.tab("Design")
     page.key("n")

@@ -77,7 +77,8 @@ def overlaps(boxes: dict[str, dict[str, float]]) -> list[str]:
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) -> None:
-    page, (width, height) = resized, size
+    page = resized
+    width, height = size
     page.page.set_viewport_size({"width": width, "height": height})
     page.session.rename_robot("A robot with quite a long name")  # and so a step with one
     for task in TASKS:
@@ -281,7 +282,8 @@ def test_boxes_have_names_and_one_without_is_found(page: Any) -> None:
     page.tab("Design")
     page.key("n")
     page.row("Position [m]").last.wait_for()
-    boxes, wanted = page.row("Position [m]"), [f"Position [m], {k + 1} of 3" for k in range(3)]
+    boxes = page.row("Position [m]")
+    wanted = [f"Position [m], {k + 1} of 3" for k in range(3)]
     page.until(lambda: [box.get_attribute("aria-label") for box in boxes.all()] == wanted)
     page.page.evaluate(
         "() => document.body.append(Object.assign(document.createElement('input'), { id: 'it' }))"

@@ -27,7 +27,8 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.until(lambda: page.session.state.target[1] == 0.5)
     page.tab("Improve")
     page.key("2")
-    mine, camera = page.session.state, page.view.scenery.robot.camera
+    mine = page.session.state
+    camera = page.view.scenery.robot.camera
     undo = page.session.history.undo_name
     page.press("Tour")
     page.page.get_by_text("Your own work comes back").locator("visible=true").wait_for()
@@ -54,7 +55,8 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
 
 def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.tab("Comparison")
-    mine, desk = page.session.state, page.session.desk
+    mine = page.session.state
+    desk = page.session.desk
     page.press("Lessons")
     page.press(f"1. {LESSONS[0].title}")
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
@@ -132,7 +134,8 @@ def test_reload_and_reconnect_restore_and_tabs_are_apart(
 
 
 def test_a_token_opens(browser: Any) -> None:
-    guard, layout = Guard("127.0.0.1", "a-secret-token"), load_layout("ucat")
+    guard = Guard("127.0.0.1", "a-secret-token")
+    layout = load_layout("ucat")
 
     server = start_server(guard, 0)
     app = App(server, Solver(), layout, Display(shadows=False, frozen=True))

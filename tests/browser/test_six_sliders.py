@@ -55,7 +55,8 @@ def six_sliders(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Itera
 def test_the_browser_answers_as_the_library_does(six_sliders: Any, name: str, lost: int) -> None:
     layout = finlab.load_layout(name)
     names = [layout.names[lost]] if lost >= 0 else []
-    allocator, rng = finlab.Allocator(layout), np.random.default_rng(5)
+    allocator = finlab.Allocator(layout)
+    rng = np.random.default_rng(5)
     wrenches = rng.normal(size=(12, 6)) * allocator.scale * np.tile([[0.3], [3.0]], (6, 1)) * layout.commanded
     for policy in ("closest", "direction", "priority"):
         answers = six_sliders.evaluate(ASKS, [name, lost, wrenches.tolist(), policy])

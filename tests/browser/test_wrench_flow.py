@@ -65,7 +65,8 @@ def test_failed_and_damaged_fins(page: Any) -> None:
 
 
 def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
-    session, answering = page.session, page.view.jobs.answering
+    session = page.session
+    answering = page.view.jobs.answering
     page.tab("Candidates")
     rows = page.page.locator("table.modes tr.pick >> visible=true")  # another drawer has one, too
     # The table is drawn again when the network's rows come.
@@ -118,7 +119,9 @@ def test_methods_side_by_side(page: Any) -> None:
 
 
 def test_a_number_counts_when_it_is_typed_whole(page: Any) -> None:
-    session, keys, box = page.session, page.page.keyboard, page.row("Fx [N]").last
+    session = page.session
+    keys = page.page.keyboard
+    box = page.row("Fx [N]").last
 
     def asked(text: str, end: str, value: float) -> None:
         box.click()

@@ -183,6 +183,7 @@ def test_robust_is_an_option(allocate: Callable[..., tuple[int, str, str]], tmp_
     save_layout(load_layout("A").replace_actuator("front_left", uncertainty=Uncertainty(0.3)), path)
     _, plain, _ = allocate(str(path), *WRENCH, "--json")
     _, sure, _ = allocate(str(path), *WRENCH, "--robust", "3", "--json")
-    first, second = json.loads(plain), json.loads(sure)
+    first = json.loads(plain)
+    second = json.loads(sure)
     assert second["expected_error"] < first["expected_error"] and second["power"] > first["power"]
     assert "measure front_left next" in first["notes"][-1] and second["bound"] is None

@@ -239,7 +239,8 @@ def keys(value: Any) -> Any:
 def test_named_files_are_read_in_the_process_with_limits(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own, places = os.getpid(), {"R": tmp_path / "a.yaml", "T": tmp_path / "a.csv"}
+    own = os.getpid()
+    places = {"R": tmp_path / "a.yaml", "T": tmp_path / "a.csv"}
 
     def elsewhere(path: Any, *rest: Any) -> bytes:
         assert os.getpid() != own or Path(path) not in places.values(), "read in this process"

@@ -72,7 +72,8 @@ def test_a_monitor_says_what_it_finds(
 def test_the_papers_controllers_and_a_picture(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    picture, out = tmp_path / "path.svg", tmp_path / "out"
+    picture = tmp_path / "path.svg"
+    out = tmp_path / "out"
     argv = [*line, "--controller", "waypoint", "--lost", "front_left@4"]
     assert main([*argv, "--plot", str(picture), "-o", str(out)]) == 0
     assert load_log(out / "log.npz").controller == "waypoint"

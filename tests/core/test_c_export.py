@@ -76,10 +76,8 @@ def test_single_precision_goes_on_while_the_ridge_grows(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("single", SINGLE)
 def test_self_test_fails_where_a_number_is_another(single: str, tmp_path: Path) -> None:
-    other, part = (
-        shutil.copytree(exported("octo", 200), tmp_path / "c"),
-        "FL_SINGLE\n" if single else "#else\n",
-    )
+    other = shutil.copytree(exported("octo", 200), tmp_path / "c")
+    part = "FL_SINGLE\n" if single else "#else\n"
     first, rest = (other / "robot.c").read_text().split(part)
     numbers = rest.split(", ")  # the sixth is the scale of forces along x
     numbers[5] = str(1.5 * float(numbers[5]))
@@ -128,7 +126,8 @@ def test_on_aarch64(tmp_path: Path) -> None:
 
 
 def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
-    folder, elf = exported("octo", 2000), tmp_path / "it.elf"
+    folder = exported("octo", 2000)
+    elf = tmp_path / "it.elf"
     board = f"-Wl,--gc-sections -nostartfiles -T{HERE / 'board.ld'} {HERE / 'board.c'}"
     ran(f"{SMALL} -DFL_NO_MAIN {board} -I. *.c -lm -o {elf}", folder)
     machine = (

@@ -73,7 +73,8 @@ def test_a_block_cut_short_is_refused(heavy: Core) -> None:
 
 
 def test_what_is_no_number_is_refused(heavy: Core) -> None:
-    wrench, prices = np.zeros(6), np.zeros(6)
+    wrench = np.zeros(6)
+    prices = np.zeros(6)
     for bad in (np.nan, np.inf):
         with pytest.raises(CommandError, match="argument"):
             heavy.one(np.where(np.arange(6) == 2, bad, wrench), None)

@@ -248,7 +248,8 @@ def test_a_full_disk_leaves_nothing_under_the_final_name(
     large = Bundle({**bundle.files, ABOUT: np.random.default_rng(0).bytes(300_000)})
     (tmp_path / "old").mkdir()
     write(tmp_path / "old" / "bundle", bundle)
-    before, limits = held(tmp_path), resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = held(tmp_path)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limits[1]))  # a file cannot be longer than that
     try:
         for name in ("new", "old/bundle"):

@@ -171,7 +171,8 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
             np.testing.assert_array_equal(getattr(answer, field), getattr(truth, field), field)
         assert answer.notes == truth.notes
         previous = truth.command
-    batch, many = robot.allocator.allocate_batch(targets), desk.allocate_batch(layout, targets)
+    batch = robot.allocator.allocate_batch(targets)
+    many = desk.allocate_batch(layout, targets)
     np.testing.assert_array_equal(batch.command, many.command)
     assert (many.err_norm[:-1] < 1e-4).all()
 
@@ -179,7 +180,9 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
 def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None:
     rudder = Rudder("tail", (-0.6, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.02, (-0.5, 0.5), 3.0)
     layout = Layout("hybrid", (*finlab.load_layout("turtle_hybrid").actuators, rudder))
-    flow, wrench, desk = [0.8, 0, 0, 0, 0, 0], [2.0, 0, 5.0, 0, 0, 0.3], finlab.Allocator(layout)
+    flow = [0.8, 0, 0, 0, 0, 0]
+    wrench = [2.0, 0, 5.0, 0, 0, 0.3]
+    desk = finlab.Allocator(layout)
     make_bundle(desk).write_zip(tmp_path / "x.zip")
     robot = load_robot(tmp_path / "x.zip")
     assert robot.layout == layout and not bad(robot)
@@ -191,9 +194,11 @@ def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None
 
 
 def test_extremes_name_the_one_that_has_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout, asked = finlab.load_layout("bluerov2"), []
+    layout = finlab.load_layout("bluerov2")
+    asked = []
     robot = DeployedRobot(finlab.Allocator(layout))
-    healthy, second = type(robot.allocator).allocate, layout.names[1]
+    healthy = type(robot.allocator).allocate
+    second = layout.names[1]
 
     def broken(self: Any, wrench: Any, *, lost: Any, policy: str) -> Any:
         asked.append((tuple(np.sign(wrench)), policy, tuple(lost)))

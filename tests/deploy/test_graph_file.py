@@ -23,7 +23,8 @@ SCHEMA = Path(__file__).parents[2] / "finlab" / "layout" / "graph.schema.json"
 
 @pytest.mark.parametrize("name", sorted(shipped_layouts()))
 def test_the_same_robot_comes_back(name: str, tmp_path: Path) -> None:
-    layout, file = load_layout(name), tmp_path / "robot.json"
+    layout = load_layout(name)
+    file = tmp_path / "robot.json"
     write_graph(layout, file)
     assert load_layout(file) == layout
     data = json.loads(file.read_text())
@@ -49,7 +50,8 @@ def test_features_over_their_scales_are_what_the_papers_network_sees() -> None:
 
 
 def test_a_graph_that_was_changed_says_where(tmp_path: Path) -> None:
-    data, file = json.loads(graph_text(load_layout("A"))), tmp_path / "a.json"
+    data = json.loads(graph_text(load_layout("A")))
+    file = tmp_path / "a.json"
     for change, words in (
         (lambda d: d["edges"].pop(), "edges"),
         (lambda d: d["nodes"][1].update(colour=3), "actuators.1..colour"),

@@ -44,7 +44,8 @@ class Script:
     0.3 s with each request."""
 
     def __init__(self, *requests: Any) -> None:
-        self.now, self.requests = 100.0, list(requests)
+        self.now = 100.0
+        self.requests = list(requests)
         self.sent: list[dict[str, Any]] = []
         self.waits: list[float | None] = []
 
@@ -306,7 +307,8 @@ def text(line: Line | None) -> bytes:
 
 
 def test_streams_keep_only_the_newest_request(streams: StandardStreams) -> None:
-    (source, requests), (answers, sink) = os.pipe(), os.pipe()
+    source, requests = os.pipe()
+    answers, sink = os.pipe()
     streams.open(source, sink)
     assert streams.newest(0.0) is None and streams.newest(0.02) is None
     os.write(requests, b"one\n\ntwo\nthree\n   \n")
@@ -335,7 +337,8 @@ def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams
 
 
 def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams) -> None:
-    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
+    source, requests = os.pipe()
+    sink = os.open("/dev/null", os.O_WRONLY)
     begin = time.monotonic()
     streams.open(source, sink)
     os.write(requests, b"be")
@@ -360,7 +363,8 @@ def test_requests_that_nobody_takes_need_no_memory(requests: int) -> None:
 
 def test_a_signal_ends_waiting_and_sending(streams: StandardStreams, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.deploy.transport.PATIENCE", 0.05)
-    (source, requests), (_, sink) = os.pipe(), os.pipe()
+    source, requests = os.pipe()
+    _, sink = os.pipe()
     os.write(requests, LINE)
     streams.open(source, sink)
     signal.raise_signal(signal.SIGTERM)
@@ -398,7 +402,8 @@ def ended(service: subprocess.Popen[bytes]) -> tuple[list[str], str]:
 def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> None:
     """A feeder goes on meanwhile, and its targets of that time are not followed."""
     service = started(folder, "--watchdog-s=0.5", stdout=subprocess.PIPE)
-    feed, out = pipe(service.stdin), pipe(service.stdout)
+    feed = pipe(service.stdin)
+    out = pipe(service.stdout)
     for paused in (False, True):
         for i in range(15):
             feed.write(json.dumps(GOOD | {"id": [paused, i]}).encode() + b"\n")

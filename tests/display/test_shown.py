@@ -90,7 +90,9 @@ def test_hostile_names_are_read_as_written(name: str) -> None:
 
 
 def test_figures_are_those_of_the_object() -> None:
-    answer, card, log = result(lost=["back_left"]), score_card(robot()), swim()
+    answer = result(lost=["back_left"])
+    card = score_card(robot())
+    log = swim()
     rows = {row[0]: row[1:] for row in Page(answer._repr_html_()).rows}
     np.testing.assert_allclose(np.array(rows["delivered"], float), answer.wrench, atol=6e-4)
     for part, force in zip(answer.names[1:], answer.forces[1:], strict=True):

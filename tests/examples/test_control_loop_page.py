@@ -33,12 +33,15 @@ def test_the_page_runs_and_its_thousand_ticks_stay_within_the_drives(
         exec(compile(block, str(PAGE), "exec"), names)
     assert "names free" not in capsys.readouterr().err
     layout = finlab.load_layout("catamaran")
-    lower, upper, step = layout.lower, layout.upper, layout.rates * 0.1
+    lower = layout.lower
+    upper = layout.upper
+    step = layout.rates * 0.1
     ticks = [one for one in answers if isinstance(one[1].get("previous"), type(answers[0][0]))]
     assert len(ticks) > 1000
     assert any(not answer.reachable for answer, _ in ticks) and ticks[-1][0].damage.lost == ("bow",)
     for answer, options in ticks:
-        command, before = answer.command, options["previous"].command
+        command = answer.command
+        before = options["previous"].command
         known = np.isfinite(command)
         assert (command[known] >= lower[known]).all() and (command[known] <= upper[known]).all()
         change = np.abs(command - before)

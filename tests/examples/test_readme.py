@@ -15,7 +15,8 @@ def test_python_gives_output_of_the_printed_form(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     place = next(i for i, (language, _) in enumerate(BLOCKS) if language == "python")
-    program, printed = BLOCKS[place][1], BLOCKS[place + 1][1]
+    program = BLOCKS[place][1]
+    printed = BLOCKS[place + 1][1]
     assert len([line for line in program.splitlines() if line.strip()]) <= 8
     monkeypatch.chdir(ROOT)
     exec(compile(program, "README.md", "exec"), {})

@@ -27,7 +27,8 @@ ROBOT = layout_of(
 
 @pytest.mark.parametrize("seed", range(10))
 def test_least_watts_of_three_actuators(seed: int) -> None:
-    plant, rng = OwnPlant(ROBOT), np.random.default_rng(seed)
+    plant = OwnPlant(ROBOT)
+    rng = np.random.default_rng(seed)
     wrench = plant.wrench(plant.draw(rng, float(rng.uniform(0.2, 1.0))))
     force, watts, bound = runpy.run_path(str(PATH))["solve"](wrench[[0, 1, 5]])
     np.testing.assert_allclose(plant.effectiveness @ force, wrench, atol=1e-8)

@@ -105,10 +105,12 @@ def test_px4_has_one_size_for_both_ways(tmp_path: Path) -> None:
 def test_ardusub_frames_have_the_directions_of_the_bluerov2(tmp_path: Path) -> None:
     path = tmp_path / "rov.csv"
     path.write_text(factor_rows("VECTORED_6DOF"))
-    layout, shipped = read_any(str(path), Exchange()), finlab.load_layout("bluerov2_heavy")
+    layout = read_any(str(path), Exchange())
+    shipped = finlab.load_layout("bluerov2_heavy")
     np.testing.assert_allclose(wrenches(layout)[:, :3], DIRECTIONS, atol=1e-15)
     np.testing.assert_allclose(wrenches(shipped)[:, :3], DIRECTIONS, atol=1e-7)
-    torques, own = wrenches(layout)[:, 3:], wrenches(shipped)[:, 3:]
+    torques = wrenches(layout)[:, 3:]
+    own = wrenches(shipped)[:, 3:]
     clear = np.abs(torques) > 0.01
     np.testing.assert_array_equal(np.sign(torques)[clear], np.sign(own)[clear])
 
@@ -168,7 +170,8 @@ def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
     """Arms of the matrix that users of ROS 2 load for it: yaw 0.1888 m, roll 0.21805, pitch 0.12."""
     arms = np.zeros((8, 3))
     arms[:4, 2] = [-0.1888, 0.1888, 0.1888, -0.1888]
-    arms[4:, 0], arms[4:, 1] = [0.21805, -0.21805, 0.21805, -0.21805], [0.12, 0.12, -0.12, -0.12]
+    arms[4:, 0] = [0.21805, -0.21805, 0.21805, -0.21805]
+    arms[4:, 1] = [0.12, 0.12, -0.12, -0.12]
     matrix = np.hstack([np.array(DIRECTIONS), arms])
     rows = "\n".join(",".join(map(repr, row)) for row in matrix.T.tolist())
     (tmp_path / "tam.csv").write_text(rows)

@@ -16,7 +16,8 @@ from tests.any_robot import FIN_ROBOTS
 from tests.mixed_robots import load, random_robot
 
 HERE = Path(__file__).parent
-TURTLE, HEAVY = HERE / "turtle.urdf", HERE / "bluerov2_heavy.urdf"
+TURTLE = HERE / "turtle.urdf"
+HEAVY = HERE / "bluerov2_heavy.urdf"
 FINS = ("front_right_fin", "front_left_fin", "tail_fin")
 
 
@@ -38,11 +39,13 @@ def convert_layout(layout: Layout, path: Path) -> list[str]:
 
 
 def test_a_bluerov2_comes_out_as_shipped() -> None:
-    layout, shipped = read(HEAVY), finlab.load_layout("bluerov2_heavy")
+    layout = read(HEAVY)
+    shipped = finlab.load_layout("bluerov2_heavy")
     assert layout.names == tuple(f"thruster{i}" for i in range(1, 9))
     np.testing.assert_allclose(own_effectiveness(layout)[:, 0], own_effectiveness(shipped)[:, 0], atol=1e-7)
     np.testing.assert_array_equal([part.force for part in layout.actuators], [(-39.91, 51.44)] * 8)
-    told, body = layout.body, shipped.body
+    told = layout.body
+    body = shipped.body
     assert told is not None and body is not None
     assert (told.mass_kg, told.inertia_kgm2) == (body.mass_kg, pytest.approx(body.inertia_kgm2))
     for field in ("added_mass", "linear_damping", "quadratic_damping"):
@@ -144,7 +147,8 @@ def test_any_propellers_survive_the_way_there_and_back(kind: str, suffix: str, t
 
 @pytest.mark.parametrize("suffix", ["urdf", "sdf"])
 def test_names_with_signs_of_xml(suffix: str, tmp_path: Path) -> None:
-    layout, path = finlab.load_layout("bluerov2_heavy"), tmp_path / f"robot.{suffix}"
+    layout = finlab.load_layout("bluerov2_heavy")
+    path = tmp_path / f"robot.{suffix}"
     odd = replace(layout.replace_actuator(layout.names[0], name="a<\"&{0}'é"), name='<{name}> & "co"')
     back = written(odd, path)
     assert (back.name, back.names) == (odd.name, odd.names)
@@ -186,7 +190,8 @@ def test_an_azimuth_that_turns_about_a_line_beside_its_thrust(tmp_path: Path) ->
 def test_rotated_links_and_axes_of_fins_come_out_in_the_body_frame() -> None:
     layout = read(TURTLE, fins=(*FINS, "rudder"), origin="base")
     right, left, tail, upright = layout.fins
-    c, s = math.cos(math.pi / 3), math.sin(math.pi / 3)
+    c = math.cos(math.pi / 3)
+    s = math.sin(math.pi / 3)
     np.testing.assert_allclose(right.position, [0.2 + 0.05 * c, -0.1 - 0.05 * s, 0.0], atol=1e-12)
     assert right.mounting_angle == pytest.approx(-math.pi / 3)
     np.testing.assert_allclose(left.position, [0.2, 0.1, 0.0], atol=1e-12)
@@ -198,7 +203,8 @@ def test_rotated_links_and_axes_of_fins_come_out_in_the_body_frame() -> None:
 
 
 def test_origin_moves_to_the_centre_of_gravity() -> None:
-    base, gravity = read(TURTLE, fins=FINS, origin="base"), read(TURTLE, fins=FINS)
+    base = read(TURTLE, fins=FINS, origin="base")
+    gravity = read(TURTLE, fins=FINS)
     for a, b in zip(base.fins, gravity.fins, strict=True):
         np.testing.assert_allclose(np.subtract(a.position, b.position), [0.02, 0.0, -0.01], atol=1e-12)
     assert gravity.body is not None and base.body is None

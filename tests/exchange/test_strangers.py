@@ -171,7 +171,9 @@ def test_motors_of_programs_and_lists_are_the_same() -> None:
         f"0,{ahead},1e-20,{yaw},0,0,{i}"
         for i, (yaw, ahead) in enumerate([(-5e-1, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)], 1)
     )
-    (one, _), (two, _), (three, _) = read("a.cpp", cpp), read("a.lua", lua), read("a.csv", csv)
+    one, _ = read("a.cpp", cpp)
+    two, _ = read("a.lua", lua)
+    three, _ = read("a.csv", csv)
     assert one.names == two.names == three.names == ("motor1", "motor2", "motor3", "motor4")
     np.testing.assert_allclose(columns(one), columns(two), atol=1e-12)
     np.testing.assert_allclose(columns(one), columns(three), atol=1e-12)

@@ -386,7 +386,8 @@ def test_it_changes_nothing_for_others_who_use_xacro(folder: Path) -> None:
     import xacro
 
     file = written(folder, robot(screw("s", "${-1} 0 0")))
-    evaluate, symbols = xacro.safe_eval, dict(xacro._global_symbols)
+    evaluate = xacro.safe_eval
+    symbols = dict(xacro._global_symbols)
     read_any(file, Exchange())
     assert xacro.safe_eval is evaluate and dict(xacro._global_symbols) == symbols
 

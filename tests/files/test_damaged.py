@@ -50,7 +50,8 @@ def changed(rng: np.random.Generator, content: bytes) -> bytes:
     """Content with some bytes or numbers changed, cut, doubled, or something odd put in."""
     content, numbers = bytearray(content), [found.span() for found in NUMBER.finditer(content[:20_000])]
     for _ in range(rng.integers(1, 4)):
-        place, kind = int(rng.integers(0, len(content) + 1)), rng.integers(6)
+        place = int(rng.integers(0, len(content) + 1))
+        kind = rng.integers(6)
         if kind == 0 and place < len(content):
             content[place] = int(rng.integers(256))
         elif kind == 1:

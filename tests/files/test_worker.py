@@ -41,7 +41,8 @@ def fill() -> int:
 
 def grown() -> int:
     """By how much the memory of a reader can grow [MB]."""
-    before, parts = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, []
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    parts = []
     try:
         while True:
             parts.append(bytearray(b"x" * 1_000_000))
@@ -71,7 +72,8 @@ def test_a_reader_that_fails_or_ends_is_a_sentence() -> None:
 
 
 def test_time_is_bounded() -> None:
-    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begin = time.monotonic()
     with pytest.raises(FinlabError, match=r"too much time, more than 1\.8 s"):
         in_worker(spin)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

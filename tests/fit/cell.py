@@ -10,7 +10,8 @@ from finlab.fit.measurements import Measurements
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
 
-LOWER, UPPER = np.array([0.05, 0.2, -np.pi]), np.array([0.6, 2.1, np.pi])
+LOWER = np.array([0.05, 0.2, -np.pi])
+UPPER = np.array([0.6, 2.1, np.pi])
 
 
 def soft(**numbers: float) -> FinLaw:

@@ -16,7 +16,8 @@ from finlab.fit.thruster_bench import read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
 
 PWM = np.arange(1100.0, 1901.0, 50.0)
-N_PER_KGF, N_PER_LB = 9.80665, 4.44822
+N_PER_KGF = 9.80665
+N_PER_LB = 4.44822
 ENDS = (-41.0, 52.0)
 """Forces [N] at the ends of the commands, at 16 V."""
 

@@ -33,15 +33,18 @@ def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
 def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]:
     """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one fit."""
     rng = np.random.default_rng([seed, LAWS.index(kind)])
-    law, command = random_law(kind, rng), commands(300, seed)
+    law = random_law(kind, rng)
+    command = commands(300, seed)
     path = folder / f"{kind}-{seed}.csv"
     write_fin(fit_fin(samples(command, measured(law, command, 0.05, seed + 1))), path)
     model = FinModelSpec("table", (("path", str(path)),))
-    misses, expected = [], []
+    misses = []
+    expected = []
     for _ in range(3):
         layout = random_layout(rng, n_fins=4)
         layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
-        plant, allocator = plant_of(layout), Allocator(layout)
+        plant = plant_of(layout)
+        allocator = Allocator(layout)
         targets = rng.uniform(0.2, 0.9, (TARGETS, 1)) * plant.wrench(plant.sample(rng, (TARGETS,)))
         answers = allocator.allocate_batch(targets)
         off = law.force(answers.command) - plant.force(answers.command)

@@ -65,7 +65,8 @@ def test_outliers_are_named_and_no_good_sample_with_them(fit: FinFit) -> None:
 
 
 def test_neighbours_of_wild_samples_are_taken_back_under_mixed_noise() -> None:
-    command, rng = commands(150, seed=4), np.random.default_rng(54)
+    command = commands(150, seed=4)
+    rng = np.random.default_rng(54)
     force = measured(LAW, command, seed=5)
     largest = np.linalg.norm(force, axis=-1).max()
     force += 0.02 * largest * rng.standard_normal(force.shape)
@@ -103,7 +104,8 @@ def test_the_file_of_a_fin_is_a_table_that_answers_as_the_fit(fit: FinFit, tmp_p
 
 def robot_with(path: Path) -> Layout:
     """Layout A with a table for every fin."""
-    layout, model = load_layout("A"), FinModelSpec("table", (("path", str(path)),))
+    layout = load_layout("A")
+    model = FinModelSpec("table", (("path", str(path)),))
     fins = (Fin(f.name, f.position, f.mounting_angle, f.limits, model) for f in layout.fins)
     return Layout(layout.name, tuple(fins))
 
@@ -129,7 +131,8 @@ def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch
 
 def eight_directions(n: int = 300, along_shaft: float = 0.15, noise: float = 0.03) -> tuple[Array, Array]:
     """Commands of a rig that turns in eighths, and forces with a part along the shaft."""
-    rng, command = np.random.default_rng(1), commands(n)
+    rng = np.random.default_rng(1)
+    command = commands(n)
     command[:, 2] = rng.choice(np.arange(-4, 4) * np.pi / 4, n)
     force = LAW.force(command)
     size = np.linalg.norm(force, axis=-1)

@@ -9,12 +9,15 @@ from tests.fit.cell import commands
 
 KERNEL = ThrustKernel(even=0.7, uneven=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
 FEW = commands(12) / [0.6, 2.1, 1.0]
-INPUTS, RNG = commands(30) / [0.6, 2.1, 1.0], np.random.default_rng(0)
-VALUES, VARIANCE = RNG.standard_normal(30), RNG.uniform(0.01, 0.1, 30)
+INPUTS = commands(30) / [0.6, 2.1, 1.0]
+RNG = np.random.default_rng(0)
+VALUES = RNG.standard_normal(30)
+VARIANCE = RNG.uniform(0.01, 0.1, 30)
 
 
 def test_predictions_are_those_of_a_conditioned_normal_distribution() -> None:
-    process, test = GaussianProcess(KERNEL, INPUTS, VALUES, VARIANCE), commands(8, seed=1) / [0.6, 2.1, 1.0]
+    process = GaussianProcess(KERNEL, INPUTS, VALUES, VARIANCE)
+    test = commands(8, seed=1) / [0.6, 2.1, 1.0]
     noisy = KERNEL.covariance(INPUTS, INPUTS) + np.diag(VARIANCE)
     gain = KERNEL.covariance(test, INPUTS) @ np.linalg.inv(noisy)
     left = KERNEL.covariance(test, test) - gain @ KERNEL.covariance(INPUTS, test)
@@ -33,7 +36,8 @@ def test_a_value_left_out_is_predicted_by_a_process_without_it() -> None:
 
 
 def test_repeated_commands_without_noise_are_bearable() -> None:
-    twice, values = np.repeat(INPUTS, 40, axis=0), np.repeat(VALUES, 40)
+    twice = np.repeat(INPUTS, 40, axis=0)
+    values = np.repeat(VALUES, 40)
     strong = KERNEL._replace(even=1e4)
     mean, deviation = GaussianProcess(strong, twice, values, np.zeros(1200)).predict(INPUTS)
     assert np.isfinite(mean).all() and np.isfinite(deviation).all()
@@ -55,6 +59,7 @@ def test_nothing_is_unknown_at_rest() -> None:
 
 
 def test_only_the_uneven_part_fades_with_the_turn() -> None:
-    one, other = np.array([[0.5, 0.5, 0.0]]), np.array([[0.5, 0.5, np.pi]])
+    one = np.array([[0.5, 0.5, 0.0]])
+    other = np.array([[0.5, 0.5, np.pi]])
     share = np.exp(-2.0 / KERNEL.turn**2)
     assert KERNEL.covariance(one, other)[0, 0] == pytest.approx((0.7 + 0.2 * share) / 16.0)

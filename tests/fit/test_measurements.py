@@ -49,7 +49,8 @@ def renamed(columns: Columns, name: str, header: str, factor: float) -> Columns:
 def test_units_stand_in_the_header(
     tmp_path: Path, columns: Columns, name: str, header: str, factor: float
 ) -> None:
-    plain, found = read(tmp_path, columns), read(tmp_path, renamed(columns, name, header, factor))
+    plain = read(tmp_path, columns)
+    found = read(tmp_path, renamed(columns, name, header, factor))
     np.testing.assert_allclose(found.command, plain.command, rtol=1e-6)
     np.testing.assert_allclose(found.force, plain.force, rtol=1e-6, atol=1e-12)
 

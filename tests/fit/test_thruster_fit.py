@@ -130,7 +130,8 @@ def robot_with(fit: ThrusterFit, table: Path) -> Path:
 def test_the_verb_makes_a_table_that_answers_with_inputs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    table, target = tmp_path / "7, at: 16 V.csv", ["10", "0", "0", "0", "0", "4"]
+    table = tmp_path / "7, at: 16 V.csv"
+    target = ["10", "0", "0", "0", "0", "4"]
     assert main(["fit", "thruster", str(T200), "-o", str(table)]) == 0
     assert "none from 1472 to 1528" in capsys.readouterr().out
     robot = robot_with(fit_thruster(read_bench([T200])), table)

@@ -44,7 +44,8 @@ def largest_by_polygons(sets: ForceSets, direction: Array, corners: int, outer: 
     """
     n = sets.radius.shape[1]
     angles = 2 * np.pi * np.arange(corners) / corners
-    rows, limits = [], []
+    rows = []
+    limits = []
     for i in range(n):
         reach = sets.radius[0, i] * (1.0 if outer else np.cos(np.pi / corners))
         normals = [(angle, reach) for angle in angles]

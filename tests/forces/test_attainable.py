@@ -30,7 +30,8 @@ def outside(body: AttainableSet, points: Array) -> float:
     a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     size = np.linalg.norm(normals, axis=-1)
-    normals, a = normals[size > 1e-12] / size[size > 1e-12, None], a[size > 1e-12]
+    normals = normals[size > 1e-12] / size[size > 1e-12, None]
+    a = a[size > 1e-12]
     return float(((points @ normals.T) - (a * normals).sum(-1)).max())
 
 
@@ -39,7 +40,8 @@ def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts,
     # Sums of planar forces that leave no other wrench, made by projecting random ones and shrinking them.
     layout = shipped("mixed")
     sets = force_sets(layout)
-    own, other = OWN[kind], OWN["torque" if kind == "force" else "force"]
+    own = OWN[kind]
+    other = OWN["torque" if kind == "force" else "force"]
     effectiveness = sets.effectiveness[0].reshape(-1, 6)
     _, _, directions = np.linalg.svd(effectiveness[:, other].T)
     kept = directions[3:]
@@ -119,7 +121,8 @@ def test_bluerov2_heavy_reaches_what_its_sources_say() -> None:
 def test_as_far_as_linear_programs_by_another_plant(kind: str) -> None:
     rng = np.random.default_rng(7)
     for number in range(5):
-        plant, flow = random_plant(kind, number, 3), random_flow(kind, number, 3)
+        plant = random_plant(kind, number, 3)
+        flow = random_flow(kind, number, 3)
         sets = force_sets(load(random_robot(kind, number, 3)), flow=flow)
         drawn = rng.standard_normal((6, 6))
         directions = drawn / np.linalg.norm(drawn, axis=-1, keepdims=True)
@@ -132,10 +135,13 @@ def test_as_far_as_linear_programs_by_another_plant(kind: str) -> None:
 
 
 def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
-    rng, none = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
+    none = 0
     for number in range(6):
-        robot, flow = random_robot("rudders", number, 21), rng.normal(size=6) * [1.5, 1.5, 1.5, 0.3, 0.3, 0.3]
-        sets, plant = force_sets(load(robot), flow=flow), OwnPlant(robot, flow)
+        robot = random_robot("rudders", number, 21)
+        flow = rng.normal(size=6) * [1.5, 1.5, 1.5, 0.3, 0.3, 0.3]
+        sets = force_sets(load(robot), flow=flow)
+        plant = OwnPlant(robot, flow)
         directions = rng.normal(size=(4, 6))
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         found = max_wrench_along_exactly(sets, directions)[0][0]
@@ -150,7 +156,8 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
 )
 def test_no_command_goes_beyond_and_the_best_are_as_good(name: str, flow: tuple[float, ...] | None) -> None:
     layout = replace(load_layout(name), axes=WRENCH)
-    plant, sets = Plant(layout), force_sets(layout, flow=flow)
+    plant = Plant(layout)
+    sets = force_sets(layout, flow=flow)
     drawn = np.random.default_rng(2).standard_normal((30, 6))
     directions = np.concatenate([AXES, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
     water = None if flow is None else np.array(flow)
@@ -181,7 +188,8 @@ def test_a_thruster_that_pulls_only_and_an_azimuth_that_cannot_stop() -> None:
 
 def test_a_torpedo_needs_speed() -> None:
     layout = replace(load_layout("torpedo"), axes=WRENCH)
-    still, ahead = score_card(layout), score_card(layout, flow=AT_SPEED)
+    still = score_card(layout)
+    ahead = score_card(layout, flow=AT_SPEED)
     assert (still.authority.rank, ahead.authority.rank) == (1, 4)
     assert any("At rest rudder_top" in note for note in still.notes)
     assert not any("At rest" in note for note in ahead.notes)

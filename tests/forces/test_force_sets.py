@@ -40,7 +40,8 @@ def sector(sets: ForceSets, row: int) -> Array:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
-    sets, pull = fins(half), pulls()
+    sets = fins(half)
+    pull = pulls()
     normal = np.pad(pull[:, 0], ((0, 0), (0, 4)))
     reach, force = sets.farthest(normal)
     assert np.allclose((force * pull).sum((-1, -2)), reach)

@@ -65,7 +65,8 @@ def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
     for direction in BOTH_WAYS:
         found = max_wrench_along(sets, direction[None])
         force = found.force[0]
-        thrust, angle = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        thrust = np.hypot(*force.T)
+        angle = np.arctan2(force[:, 1], force[:, 0])
         wrench = Plant(layout).wrench(_commands(layout, thrust, angle))
         assert wrench / SCALE == pytest.approx(found.size[0] * direction, abs=1e-3)
 
@@ -113,7 +114,8 @@ def robots(half: float, scale: float) -> ForceSets:
 
 @pytest.mark.parametrize(("half", "scale"), crossed(HALVES, [1e-3, 1.0, 1e3], every=2))
 def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
-    sets, rng = robots(half, scale), np.random.default_rng(6)
+    sets = robots(half, scale)
+    rng = np.random.default_rng(6)
     ray = rng.standard_normal((40, 6))
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
     inside = sets.farthest(rng.standard_normal((40, 6)))[1]

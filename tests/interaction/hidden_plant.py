@@ -53,8 +53,10 @@ def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
     jets = [_jet(force, d) for force, d in zip(forces, diameters, strict=True)]
     hull = layout.body.hull if layout.body else None
     for i, (thrust, course, speed) in enumerate(jets):
-        place, area = layout.position[i], math.pi * diameters[i] ** 2 / 4.0
-        kept, push = 1.0, np.zeros(3)
+        place = layout.position[i]
+        area = math.pi * diameters[i] ** 2 / 4.0
+        kept = 1.0
+        push = np.zeros(3)
         water = np.zeros(3)
         for j, (_, other, fast) in enumerate(jets):
             if j == i or fast == 0.0:
@@ -78,7 +80,8 @@ def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
 
 def _on_hull(place: np.ndarray, course: np.ndarray, thrust: float, half: np.ndarray) -> np.ndarray:
     """A jet that comes within a rim of the hull pushes it along the jet and a little off along its normal."""
-    z, q = place / half, course / half
+    z = place / half
+    q = course / half
     towards = -float(z @ q) / float(np.linalg.norm(q))
     if towards <= 0.0:
         return np.zeros(3)

@@ -9,11 +9,13 @@ from finlab.interaction.jets import Jets
 
 def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
     """The wrench (6,) beside forces (n, 3) of places that move at `inflow` (n, 3)."""
-    n, wrench = len(force), np.zeros(6)
+    n = len(force)
+    wrench = np.zeros(6)
     area = 0.25 * np.pi * places.diameter**2
     least = 0.5 * DENSITY * area * STILL**2
     thrust = np.sqrt((force**2).sum(axis=1) + least**2)
-    ahead, speed = force / thrust[:, None], np.sqrt(2.0 * thrust / (DENSITY * area))
+    ahead = force / thrust[:, None]
+    speed = np.sqrt(2.0 * thrust / (DENSITY * area))
     for i in range(n):
         water = np.zeros(3)
         for j in set(range(n)) - {i}:
@@ -28,7 +30,8 @@ def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
         lost += places.advance[i] * (inflow[i] @ ahead[i]) / speed[i]
         center, half = places.hull
         if half.all():
-            place, course = (places.position[i] - center) / half, -ahead[i] / half
+            place = (places.position[i] - center) / half
+            course = -ahead[i] / half
             facing = -(place @ course) / np.linalg.norm(course)
             rim = np.tanh((1.0 - place @ place + facing**2) / 0.3)
             lost += known.hull * 0.25 * (1.0 + rim) * (1.0 + np.tanh(facing / 0.3))

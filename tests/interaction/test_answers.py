@@ -39,7 +39,8 @@ def test_answers_are_exact_by_the_plant(kind: str, seed: int) -> None:
         missed = (plant.wrench(result.command) - target) / allocator.scale
         assert np.linalg.norm(missed) <= 1e-6
         assert result.bound is None or result.bound <= result.power
-        lower, upper = allocator.layout.lower, allocator.layout.upper
+        lower = allocator.layout.lower
+        upper = allocator.layout.upper
         assert ((result.command >= lower) & (result.command <= upper)).all()
 
 
@@ -55,8 +56,10 @@ def pods(places: list[tuple[float, float]]) -> Layout:
 
 def least_of_starts(layout: Layout, target: Array, count: int = 16) -> float:
     """Least power that sequential quadratic programming of scipy finds from many starts."""
-    plant, best = Plant(layout), np.inf
-    lower, upper = layout.lower[:, :2].ravel(), layout.upper[:, :2].ravel()
+    plant = Plant(layout)
+    best = np.inf
+    lower = layout.lower[:, :2].ravel()
+    upper = layout.upper[:, :2].ravel()
 
     def full(x: Array) -> Array:
         return np.pad(x.reshape(layout.n, 2), ((0, 0), (0, 1)))
@@ -83,7 +86,8 @@ def least_of_starts(layout: Layout, target: Array, count: int = 16) -> float:
     "places", [[(0.5, 0), (0, 0), (-0.5, 0)], [(0.4, 0.2), (0.4, -0.2), (-0.4, 0.2), (-0.4, -0.2)]]
 )
 def test_jets_in_line_are_turned_aside(places: list[tuple[float, float]], surge: float) -> None:
-    layout, target = pods(places), np.array([surge, 0, 0, 0, 0, 0])
+    layout = pods(places)
+    target = np.array([surge, 0, 0, 0, 0, 0])
     result = Allocator(layout).allocate(target)
     assert result.reachable
     assert result.power <= 1.02 * least_of_starts(layout, target)
@@ -99,7 +103,8 @@ FAR = [400.0, 0.0, 100.0, 0.0, 0.0, 5.0]
 
 def test_direction_stays_on_the_ray(heavy: Allocator) -> None:
     result = heavy.allocate(FAR, policy="direction")
-    along, wrench = FAR / heavy.scale, result.wrench / heavy.scale
+    along = FAR / heavy.scale
+    wrench = result.wrench / heavy.scale
     share = float(along @ wrench / (along @ along))
     assert 0.15 < share < 1.0
     assert np.linalg.norm(wrench - share * along) <= 2e-6
@@ -121,7 +126,8 @@ def test_ticks_stay_within_rates_and_arrive(heavy: Allocator) -> None:
     rates = layout.rates * heavy.settings.period_s
     result = heavy.allocate([0.0] * 6)
     for _ in range(15):
-        before, result = result, heavy.allocate([60, 0, 20, 0, 0, 1], previous=result)
+        before = result
+        result = heavy.allocate([60, 0, 20, 0, 0, 1], previous=result)
         assert (np.abs(result.command - before.command) <= rates + 1e-9).all()
     assert result.err_norm <= 1e-6
 

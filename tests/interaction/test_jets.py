@@ -52,15 +52,11 @@ def test_far_aside_nothing_is_lost() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_the_core_says_what_the_formula_says(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    known, places = (
-        Jets(2.5, 2.9, 30.0, 0.7, 0.8, 0.25, 0.1, 0.55),
-        places_of(random_jet_robot(rng, "r", (2, 9))),
-    )
+    known = Jets(2.5, 2.9, 30.0, 0.7, 0.8, 0.25, 0.1, 0.55)
+    places = places_of(random_jet_robot(rng, "r", (2, 9)))
     n = len(places.position)
-    force, inflow = (
-        rng.normal(size=(5, n, 3)) * 10.0 ** rng.uniform(-4, 2, (5, n, 1)),
-        rng.normal(size=(n, 3)),
-    )
+    force = rng.normal(size=(5, n, 3)) * 10.0 ** rng.uniform(-4, 2, (5, n, 1))
+    inflow = rng.normal(size=(n, 3))
     expected = [oracle.offset(known, places, own, inflow) for own in force]
     assert_allclose(known.of(places).offset(force, inflow), expected, rtol=1e-9, atol=1e-9)
 

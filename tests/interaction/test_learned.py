@@ -42,7 +42,9 @@ def unseen(count: int) -> list[tuple[Layout, Array]]:
 
 
 def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
-    laws, learned, expected = [], [], []
+    laws = []
+    learned = []
+    expected = []
     for layout, targets in unseen(8):
         known = replace(layout, interaction=network)
         for robot, errors in ((layout, laws), (known, learned)):

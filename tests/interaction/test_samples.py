@@ -77,11 +77,15 @@ def test_a_lone_table_is_refused(samples: list[Samples], tmp_path: Path) -> None
 
 
 def test_twenty_samples_fit_the_constants(samples: list[Samples]) -> None:
-    missed, expected = [], []
+    missed = []
+    expected = []
     for one in samples:
         known = fit_constants(Samples(one.layout, one.command[:20], one.wrench[:20]))
-        robot, command = replace(one.layout, interaction=known.jets), one.command[20:]
-        plant, scale, truth = Plant(robot), yardstick(one.layout), other(one.layout, command)
+        robot = replace(one.layout, interaction=known.jets)
+        command = one.command[20:]
+        plant = Plant(robot)
+        scale = yardstick(one.layout)
+        truth = other(one.layout, command)
         error, laws = ((Plant(layout).wrench(command) - truth) / scale for layout in (robot, one.layout))
         assert np.linalg.norm(error) <= np.linalg.norm(laws) / 3.0
         assert plant.interaction is not None

@@ -14,7 +14,9 @@ from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.actuators.thruster import Thruster, ThrusterCommand
 from finlab.layout import Fin
 
-AHEAD, UP, LAW = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), PowerLaw(2.0)
+AHEAD = (1.0, 0.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+LAW = PowerLaw(2.0)
 ROWS = ((1100, -40, 390), (1470, 0, 0), (1480, 0, 0), (1530, 0, 0), (1700, 10, 30), (1900, 50, 380))
 TABLE = PowerTable(tuple(tuple(map(float, row)) for row in ROWS), "us")
 FIN = Fin("fin", (0.1, 0.2, 0.3), 0.4)

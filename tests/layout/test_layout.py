@@ -49,12 +49,14 @@ def test_numpy_numbers_become_plain_ones():
 
 def test_force_columns_are_force_and_moment_of_a_newton():
     rng = np.random.default_rng(0)
-    position, angle = rng.normal(size=(7, 3, 3)), rng.uniform(-4, 4, (7, 3))
+    position = rng.normal(size=(7, 3, 3))
+    angle = rng.uniform(-4, 4, (7, 3))
     columns = force_effectiveness(position, angle)
     assert columns.shape == (7, 3, 3, 6)
     for b in range(7):
         for i in range(3):
-            c, s = math.cos(angle[b, i]), math.sin(angle[b, i])
+            c = math.cos(angle[b, i])
+            s = math.sin(angle[b, i])
             for k, axis in enumerate(np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])):
                 expected = np.concatenate([axis, np.cross(position[b, i], axis)])
                 np.testing.assert_allclose(columns[b, i, k], expected, atol=1e-14)

@@ -88,7 +88,8 @@ def test_hexa_keeps_all_six_axes_after_any_two_losses():
 
 
 def test_ucat_is_layout_a_with_a_body():
-    ucat, a = load_layout(SHIPPED["ucat"]), load_layout(SHIPPED["A"])
+    ucat = load_layout(SHIPPED["ucat"])
+    a = load_layout(SHIPPED["A"])
     assert ucat.fins == a.fins
     assert ucat.body.mass_kg == 19.0
     assert ucat.body.hull.shape == "ucat"
@@ -98,7 +99,8 @@ def test_ucat_is_layout_a_with_a_body():
 
 
 def test_turtle_hybrid_is_ucat_with_two_thrusters():
-    hybrid, ucat = load_layout("turtle_hybrid"), load_layout("ucat")
+    hybrid = load_layout("turtle_hybrid")
+    ucat = load_layout("ucat")
     assert (hybrid.fins, hybrid.body) == (ucat.fins, ucat.body)
     assert [part.type for part in hybrid.actuators[4:]] == ["thruster", "thruster"]
 

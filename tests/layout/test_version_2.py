@@ -93,7 +93,8 @@ def test_a_file_of_version_1_is_refused_with_how_to_convert_it(version):
 
 
 def test_a_horizontal_shaft_has_one_description():
-    c, s = math.cos(0.7), math.sin(0.7)
+    c = math.cos(0.7)
+    s = math.sin(0.7)
     by_axes = Fin("a", (0.1, 0.2, 0.0), shaft=(c, s, 0.0), zero=(-s, c, 0.0))
     by_angle = Fin("a", (0.1, 0.2, 0.0), 0.7)
     assert by_axes == replace(by_angle, mounting_angle=by_axes.mounting_angle)
@@ -111,7 +112,8 @@ def test_rounded_axes_become_exact():
 def test_a_mounting_angle_is_a_frame():
     angle = 0.7
     by_angle = Fin("a", (0.1, 0.2, 0.3), angle).frame
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     np.testing.assert_allclose(by_angle, [(c, s, 0), (-s, c, 0), (0, 0, 1)])
 
 

@@ -67,7 +67,8 @@ def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.n
     yaw than goes together."""
     time = 4.0 + dt * np.arange(n)
     demand = np.zeros((n, 6))
-    demand[:, 0], demand[:, 2] = 20.0 + 5.0 * np.sin(time / 7), 10.0 * np.cos(time / 3)
+    demand[:, 0] = 20.0 + 5.0 * np.sin(time / 7)
+    demand[:, 2] = 10.0 * np.cos(time / 3)
     demand[:, 5] = 2.0 * np.sin(time)
     hard = slice(n // 2, n // 2 + n // 6)
     demand[hard] = [surge, 0.0, 0.0, 0.0, 0.0, yaw]
@@ -117,7 +118,9 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
     stick = np.zeros((n, 6))  # roll, pitch, yaw, throttle, forward, lateral
-    stick[:, 2], stick[:, 3], stick[:, 4] = 0.1 * np.sin(time), 0.2 * np.cos(time / 3), 0.3
+    stick[:, 2] = 0.1 * np.sin(time)
+    stick[:, 3] = 0.2 * np.cos(time / 3)
+    stick[:, 4] = 0.3
     stick[hard] = [0.0, 0.0, 0.6, 0.0, 0.8, 0.0]
     output = np.clip(stick @ FRAMES["VECTORED_6DOF"].T, -1.0, 1.0)
     signs = np.array([1, -1, 1, 1, -1, 1, 1, 1.0])

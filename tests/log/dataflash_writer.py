@@ -15,7 +15,8 @@ def write_dataflash(
     """Writes messages by name, each with the letters of its columns and the columns, TimeUS first, in order
     of time, after all parameters."""
     stamps = np.zeros(len(parameters))
-    names, values = np.array([*parameters], "S16"), np.array([*parameters.values()])
+    names = np.array([*parameters], "S16")
+    values = np.array([*parameters.values()])
     every = {"PARM": ("QNf", {"TimeUS": stamps, "Name": names, "Value": values}), **messages}
     content = _packed(128, ["BBnNZ", "Type,Length,Name,Format,Columns"], b"FMT", 89)
     rows: list[tuple[float, bytes]] = []
@@ -26,7 +27,8 @@ def write_dataflash(
         table["head"] = bytes([0xA3, 0x95, number])
         for key, column in columns.items():
             table[key] = column
-        size, packed = kind.itemsize, table.tobytes()
+        size = kind.itemsize
+        packed = table.tobytes()
         parts = [packed[k : k + size] for k in range(0, len(packed), size)]
         rows += zip(columns["TimeUS"], parts, strict=True)
     rows.sort(key=lambda row: row[0])

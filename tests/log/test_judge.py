@@ -102,7 +102,8 @@ def test_the_robots_health_is_told(px4: Dive) -> None:
 
 @pytest.mark.parametrize("rest", [0.0, np.nan])
 def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: float, px4: Dive) -> None:
-    log, name = read_log(px4.path, px4.robot), px4.robot.names[1]
+    log = read_log(px4.path, px4.robot)
+    name = px4.robot.names[1]
     easy = slice(0, len(log) // 2 - 10)
     some = {key: getattr(log, key)[easy] for key in ("time", "span", "demand", "command")}
     assert judge(replace(log, **some), improve=False).stopped == ()
@@ -123,11 +124,13 @@ def test_a_thruster_that_ceases_to_turn_is_named_and_its_force_is_missing(
     speed = np.full((600, 8), 900.0)
     speed[200:, 2] = 0.0
     dive = write(tmp_path / "dive", n=600, speed=speed)
-    log, name = read_log(dive.path, dive.robot), dive.robot.names[2]
+    log = read_log(dive.path, dive.robot)
+    name = dive.robot.names[2]
     (event,) = (each for each in log.events if "stood still" in each.words)
     assert event.actuator == 2 and 0.0 <= event.time - dive.time[200] < 0.5
     whole = read_log(write(tmp_path / "whole", n=600).path, dive.robot)
-    judged, late = judge(log, improve=False), log.time >= event.time
+    judged = judge(log, improve=False)
+    late = log.time >= event.time
     force = np.outer(whole.command[:, 2, 0], columns(dive.robot)[2])
     missing = whole.span[late] @ np.abs(dive.demand - dive.given + force)[late]
     np.testing.assert_allclose(judged.missing, missing, rtol=0.01, atol=0.01)
@@ -160,7 +163,8 @@ def test_a_better_layout_is_proposed_and_replayed(px4: Dive) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_demands_taken_together_keep_their_impulse(seed: int, px4: Dive) -> None:
-    rng, scale = np.random.default_rng(seed), yardstick(px4.robot)
+    rng = np.random.default_rng(seed)
+    scale = yardstick(px4.robot)
     wrench = px4.demand + 0.02 * scale * rng.normal(size=px4.demand.shape)
     wrench[rng.random(len(wrench)) < 0.2, 1] = np.nan
     span = rng.uniform(0.01, 0.03, len(wrench))

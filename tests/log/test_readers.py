@@ -70,7 +70,8 @@ def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["px4", "sub"])
 def test_damaged_logs_end_in_a_sentence(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     dive: Dive = request.getfixturevalue(kind)
-    content, rng = dive.path.read_bytes()[:60_000], np.random.default_rng(0)
+    content = dive.path.read_bytes()[:60_000]
+    rng = np.random.default_rng(0)
     for seed in range(20):
         damaged = bytearray(content[: rng.integers(8, len(content))])
         for place in rng.integers(8, len(damaged), 1 + seed):

@@ -17,13 +17,15 @@ def write_ulog(
     log = ULog(None)
     log._initial_parameters = dict(parameters)
     for number, (name, (time, columns)) in enumerate(topics.items()):
-        fields, values = [("uint64_t", 0, "timestamp")], [("timestamp", np.round(time * 1e6).astype("<u8"))]
+        fields = [("uint64_t", 0, "timestamp")]
+        values = [("timestamp", np.round(time * 1e6).astype("<u8"))]
         for key, array in columns.items():
             kind = {"f": "float", "u": "uint16_t", "i": "int8_t"}[array.dtype.kind]
             array = array.astype({"float": "<f4", "uint16_t": "<u2", "int8_t": "<i1"}[kind])
             part, _, inner = key.partition(".")
             if inner:
-                about, kind = f"{part}_report:{kind} {inner};", f"{part}_report"
+                about = f"{part}_report:{kind} {inner};"
+                kind = f"{part}_report"
                 log._message_formats[kind] = ULog.MessageFormat(about.encode(), None)
             fields.append((kind, 0 if array.ndim == 1 else array.shape[1], part))
             end = f".{inner}" if inner else ""

@@ -31,7 +31,8 @@ def project(tmp_path: Path) -> Path:
 
 def python(project: Path, *argv: str, **variables: str) -> subprocess.CompletedProcess[str]:
     clean = {key: value for key, value in os.environ.items() if key not in ("CC", "FINLAB_TARGET")}
-    words, variables = [sys.executable, *argv], clean | variables
+    words = [sys.executable, *argv]
+    variables = clean | variables
     return subprocess.run(words, cwd=project, env=variables, capture_output=True, text=True, timeout=120)
 
 

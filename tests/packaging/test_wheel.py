@@ -56,7 +56,8 @@ def normal(name: str) -> str:
 
 def with_requirements(names: set[str]) -> set[str]:
     """Names of distributions and of all that they require without extras."""
-    waiting, seen = set(names), set[str]()
+    waiting = set(names)
+    seen = set[str]()
     while waiting:
         seen.add(name := waiting.pop())
         lines = map(Requirement, metadata.distribution(name).requires or ())

@@ -55,7 +55,8 @@ def sampled_miss(layout: Layout, force: Array, effectiveness: Array, rng: np.ran
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins any shaft", "rudders", "mixed", "all"])
 def test_the_expected_miss_is_that_of_sampled_errors(kind: str) -> None:
     rng = np.random.default_rng(11)
-    layout, flow = with_uncertainty(load(random_robot(kind, 1, 5)), rng), random_flow(kind, 1, 5)
+    layout = with_uncertainty(load(random_robot(kind, 1, 5)), rng)
+    flow = random_flow(kind, 1, 5)
     plant = plant_of(layout).at(flow)
     command = plant.sample(rng, (3,))
     expected = expected_miss(plant, command)
@@ -106,10 +107,8 @@ def test_a_table_knows_the_error_of_its_grid(grid: tuple[int, ...], noise: float
 
 
 def test_deviations_in_a_table_reach_the_answer(tmp_path: Path) -> None:
-    path, axes = (
-        tmp_path / "fin.csv",
-        (np.linspace(0, 0.6, 9), np.linspace(0, 2.1, 9), np.linspace(-3, 3, 19)),
-    )
+    path = tmp_path / "fin.csv"
+    axes = (np.linspace(0, 0.6, 9), np.linspace(0, 2.1, 9), np.linspace(-3, 3, 19))
     write_table(path, make_law(FinModelSpec("drag")), *axes)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([f"{lines[0]},sFx,sFy,sFz", *(f"{line},0,0.2,0.2" for line in lines[1:])]))

@@ -89,7 +89,9 @@ def test_slopes_are_those_of_the_tensors_own_differentiation(law):
 
 @every_law
 def test_symbols_give_the_same_thrust(law):
-    a, f, d = casadi.SX.sym("a"), casadi.SX.sym("f"), casadi.SX.sym("d")
+    a = casadi.SX.sym("a")
+    f = casadi.SX.sym("f")
+    d = casadi.SX.sym("d")
     formula = casadi.Function("thrust", [a, f, d], [law.thrust(a, f, d)])
     for command in commands(10):
         assert float(formula(*command)) == pytest.approx(float(law.thrust(*command)), rel=1e-12)

@@ -19,7 +19,8 @@ def wrench_by_hand(layout, command):
     """The contract's text, one fin at a time."""
     total = np.zeros(6)
     for fin, (amplitude, frequency, direction) in zip(layout.fins, command, strict=True):
-        p, rate = fin.model.values(), 2 * math.pi * frequency
+        p = fin.model.values()
+        rate = 2 * math.pi * frequency
         if fin.model.type == "drag":
             inertia = 2 * p["density"] * p["drag_coefficient"] * p["area"] * p["lever"] ** 2
             thrust = inertia * rate**2 * (1 - math.cos(2 * amplitude))
@@ -92,7 +93,8 @@ def of_four_kinds(tmp_path):
 @pytest.mark.parametrize("name", ["A", "mixed", "restricted", "of_four_kinds"])
 def test_derivatives_agree_with_differences(name, of_four_kinds):
     layout = of_four_kinds if name == "of_four_kinds" else load_layout(shipped_layouts()[name])
-    plant, command = Plant(layout), random_commands(layout, 3)
+    plant = Plant(layout)
+    command = random_commands(layout, 3)
     wrench, jacobian = plant.linearize(command)
     np.testing.assert_allclose(wrench, plant.wrench(command), atol=1e-13)
     matrix = jacobian.reshape(3, 6, layout.n_fins, 3)
@@ -122,7 +124,8 @@ def test_a_command_that_does_not_fit_is_refused(command, why):
 @pytest.mark.parametrize("number", range(3))
 @pytest.mark.parametrize("kind", KINDS)
 def test_wrench_and_watts_of_random_robots(kind: str, number: int) -> None:
-    own, rng = random_plant(kind, number, 5), np.random.default_rng(number)
+    own = random_plant(kind, number, 5)
+    rng = np.random.default_rng(number)
     plant = Plant(load(own.layout))
     commands = np.stack([own.draw(rng, share) for share in (0.0, 0.1, 0.5, 1.0)])
     wrench = own.wrench(commands)

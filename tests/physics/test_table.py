@@ -13,8 +13,10 @@ from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, make_law, plant_of, read_table, write_table
 
-DRAG, LIGHTHILL = make_law(FinModelSpec("drag")), make_law(FinModelSpec("lighthill"))
-AMPLITUDE, FREQUENCY = np.linspace(0.0, 0.7, 9), np.linspace(0.0, 2.4, 9)
+DRAG = make_law(FinModelSpec("drag"))
+LIGHTHILL = make_law(FinModelSpec("lighthill"))
+AMPLITUDE = np.linspace(0.0, 0.7, 9)
+FREQUENCY = np.linspace(0.0, 2.4, 9)
 CIRCLE = np.linspace(-math.pi, math.pi, 25)
 
 
@@ -197,9 +199,12 @@ def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     power = [0.0, 0.0, 0.0, 1.0, 1.0]
     rows = [f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)]
     (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
-    law, at = read_table(tmp_path / "t.csv"), np.zeros((401, 3))
-    at[:, 0], at[:, 1] = 0.15, np.linspace(0.0, 4.0, 401)
-    found, jacobian = law.power(at), law.power_gradient(at)
+    law = read_table(tmp_path / "t.csv")
+    at = np.zeros((401, 3))
+    at[:, 0] = 0.15
+    at[:, 1] = np.linspace(0.0, 4.0, 401)
+    found = law.power(at)
+    jacobian = law.power_gradient(at)
     assert found.min() == 0.0 and found.max() > 1.0
     dips = (at[:, 1] > 1.0) & (at[:, 1] < 2.0)
     assert not found[dips].any() and not jacobian[dips].any() and jacobian[:, 1].max() > 0.5

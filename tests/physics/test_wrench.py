@@ -31,7 +31,10 @@ def robots():
 
 def frames(angle):
     """Axes of fins with horizontal shafts, (..., 3, 3)."""
-    sin, cos, zero, one = torch.sin(angle), torch.cos(angle), torch.zeros_like(angle), torch.ones_like(angle)
+    sin = torch.sin(angle)
+    cos = torch.cos(angle)
+    zero = torch.zeros_like(angle)
+    one = torch.ones_like(angle)
     rows = [(cos, sin, zero), (-sin, cos, zero), (zero, zero, one)]
     return torch.stack([torch.stack(row, -1) for row in rows], -2)
 
@@ -40,8 +43,10 @@ def test_fin_axes_in_the_body_frame():
     angle = torch.tensor([0.0, math.pi / 2, -2.0], dtype=F64)
     for i, axis in enumerate([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]):
         got = body_force(torch.tensor([axis] * 3, dtype=F64), frames(angle))
-        sin, cos = torch.sin(angle), torch.cos(angle)
-        zero, one = torch.zeros_like(sin), torch.ones_like(sin)
+        sin = torch.sin(angle)
+        cos = torch.cos(angle)
+        zero = torch.zeros_like(sin)
+        one = torch.ones_like(sin)
         expected = [(cos, sin, zero), (-sin, cos, zero), (zero, zero, one)][i]
         torch.testing.assert_close(got, torch.stack(expected, -1))
 
@@ -49,7 +54,8 @@ def test_fin_axes_in_the_body_frame():
 def test_turning_the_whole_robot_turns_the_wrench(robots):
     command, position, angle = robots
     turn = 0.8
-    c, s = math.cos(turn), math.sin(turn)
+    c = math.cos(turn)
+    s = math.sin(turn)
     rotation = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=F64)
     wrench = drag_wrench(command, position, angle)
     turned = drag_wrench(command, position @ rotation.T, angle + turn)

@@ -69,7 +69,8 @@ def test_a_process_that_has_ended_is_one_sentence() -> None:
 
 
 def test_what_is_not_waited_for_is_ended() -> None:
-    others, made = set(multiprocessing.active_children()), map_parts(time.sleep, [0.0, 600.0, 600.0], jobs=2)
+    others = set(multiprocessing.active_children())
+    made = map_parts(time.sleep, [0.0, 600.0, 600.0], jobs=2)
     assert next(made) is None
     del made
     assert set(multiprocessing.active_children()) <= others

@@ -59,7 +59,8 @@ class Listener:
 
     def forget(self) -> None:
         """Begin anew."""
-        self.heard, self.bytes = [], 0
+        self.heard = []
+        self.bytes = 0
 
     def close(self) -> None:
         """Hang up."""

@@ -65,7 +65,8 @@ class StandIn(LeastErrorMethod):
 
     def _drawn(self, targets: Array, seed: int) -> tuple[Array, Array, NDArray[np.int64]]:
         """Refined commands, samples about them, and about which each is."""
-        layout, methods = self.layout, (self._inner, self._other)
+        layout = self.layout
+        methods = (self._inner, self._other)
         starts = [methods[k % 2]._solve(targets, seed=seed, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
         rng = np.random.default_rng(seed)
@@ -107,7 +108,9 @@ class SilentClient:
     """Stands for a browser: the server's own scene and panel, and a camera that takes everything."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
+        self.scene = server.scene
+        self.gui = server.gui
+        self.atomic = server.atomic
         self.camera = type("Camera", (), {})()
         self.kept: dict[str, str] = {}
         self.local_storage = SimpleNamespace(set_item=self.kept.__setitem__, get_item=self.kept.get)

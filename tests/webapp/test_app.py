@@ -74,7 +74,8 @@ def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> N
 def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
     server: viser.ViserServer, view: View
 ) -> None:
-    session, jobs = view.session, view.jobs
+    session = view.session
+    jobs = view.jobs
 
     def do(act: Callable[[], object]) -> None:
         on_loop(server, lambda: view.do(act))
@@ -82,7 +83,8 @@ def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
 
     do(session.fold_drawer)
     do(lambda: session.set_target(0, 0.9))
-    ranges, search = jobs.ranging.question, jobs.answering.search.question
+    ranges = jobs.ranging.question
+    search = jobs.answering.search.question
     assert ranges is not None and ranges.target[0] == 0.9 and jobs.analyst.question is None
     assert search is not None and search.kind == "", "the answer is proved, its modes are not looked for"
     do(lambda: session.show_task("Design"))

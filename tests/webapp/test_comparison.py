@@ -42,7 +42,8 @@ def test_all_methods_answer_one_after_the_other(worker: Pool) -> None:
 
 @pytest.mark.parametrize("robot", ["ucat", "bluerov2", "torpedo"])
 def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str, worker: Pool) -> None:
-    state, gate = State(load_layout(robot)), threading.Event()
+    state = State(load_layout(robot))
+    gate = threading.Event()
     comparison = Comparison(context_of(worker, solver=Solver()))
     comparison.start(state)
     until(lambda: bool(comparison.run.answers))
@@ -78,9 +79,11 @@ def test_the_table_tells_what_is_kept_least() -> None:
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None:
-    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"], method="mdn")
+    solver = Solver()
+    state = State(UCAT, target=PRESETS["Turn"], method="mdn")
     reply = solver.reply(state)
-    samples, modes = reply.answer.samples, solver.modes(reply)
+    samples = reply.answer.samples
+    modes = solver.modes(reply)
     assert samples is not None and modes.ways[0] == samples
     assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
     led = {samples.source[k] for k in range(len(samples)) if modes.ends[k] == 0}
@@ -94,7 +97,8 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> None:
-    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    solver = Solver()
+    state = State(UCAT, target=PRESETS["Turn"])
     reply = solver.reply(state)
     modes = solver.modes(reply)
     first, *others = (named.mode for named in modes.shown)
@@ -117,7 +121,8 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
-    solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
+    solver = Solver(load=load_stand_in)
+    target = PRESETS["Turn"]
     shipped = solver.allocator(State(UCAT, method="mdn"))
     state = State(UCAT, target=target, method="mdn", temperature=1.5)
     few = solver.allocator(state)
@@ -128,7 +133,8 @@ def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
 
 
 def test_an_allocator_is_kept_until_its_robot_changes() -> None:
-    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    solver = Solver()
+    state = State(UCAT, target=PRESETS["Turn"])
     first = solver.allocator(state)
     assert solver.allocator(state.with_target(0, 2.0).with_failure_toggled(UCAT.names[0])) is first
     moved = UCAT.replace_actuator(UCAT.names[0], position=(0.2, -0.1, 0.0))
@@ -136,7 +142,8 @@ def test_an_allocator_is_kept_until_its_robot_changes() -> None:
 
 
 def test_every_answer_keeps_least_what_is_asked() -> None:
-    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    solver = Solver()
+    state = State(UCAT, target=PRESETS["Turn"])
     power, effort = (solver.solve(replace(state, method=method)) for method in LEAST.values())
     assert power.power < effort.power
     assert power.effort is not None and effort.effort is not None and power.effort > effort.effort
@@ -159,7 +166,8 @@ def mine(untrained_checkpoint: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_trained_network_is_offered_and_answers(mine: str, layout_a: Layout) -> None:
-    solver, state = Solver(), State(layout_a, target=TARGET, method="paper")
+    solver = Solver()
+    state = State(layout_a, target=TARGET, method="paper")
     assert list(solver.networks()) == ["paper", mine] and solver.first_network == "paper"
     chosen = state.with_setting("network", mine)
     answers = [solver.solve(s).checkpoint for s in (state, chosen, state.with_setting("network", "paper"))]

@@ -83,7 +83,8 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
                 with pytest.raises(FinlabError, match="fault of"):
                     session.damage(part.name, kind, value)
             assert session.state.able.names == session.state.layout.names
-    name, known = session.state.layout.names[0], session.state.damage
+    name = session.state.layout.names[0]
+    known = session.state.damage
     session.rename(name, "other")
     assert session.state.damage.of("other") == known.of(name)
     session.mend_all()

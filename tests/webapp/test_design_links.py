@@ -44,7 +44,8 @@ def test_a_design_comes_back_whole(name: str) -> None:
 
 
 def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path) -> None:
-    path, turn = tmp_path / "fin.csv", np.linspace(-np.pi, np.pi, 9)
+    path = tmp_path / "fin.csv"
+    turn = np.linspace(-np.pi, np.pi, 9)
     write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
     model = stored_table(path.read_bytes(), files.table_folder())
     session = Session(load_layout("pair"))
@@ -124,14 +125,17 @@ def test_a_new_design_is_whole_and_can_be_taken_back() -> None:
 
 
 def test_saving_sends_the_design_and_notes_it() -> None:
-    session, browser = Session(load_layout("ucat")), Browser()
+    session = Session(load_layout("ucat"))
+    browser = Browser()
     session.rename_robot("My turtle")
     designs_of(session, browser).save()
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
 
 
 def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(monkeypatch: pytest.MonkeyPatch) -> None:
-    mine, theirs, browser = Session(load_layout("octo")), Session(load_layout("ucat")), Browser()
+    mine = Session(load_layout("octo"))
+    theirs = Session(load_layout("ucat"))
+    browser = Browser()
     mine.set_target(4, -1.0 / 3.0)
     scripts: list[str] = []
     monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))

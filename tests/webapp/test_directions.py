@@ -16,7 +16,8 @@ from webapp.session import Session
 
 ROBOTS = ("ucat", "bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid")
 FLOW = np.array([1.2, 0.1, -0.2, 0.0, 0.0, 0.0])
-POLAR, AXIAL = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
+POLAR = np.array([1.0, -1.0, 1.0])
+AXIAL = np.array([-1.0, 1.0, -1.0])
 MIRRORED = np.concatenate([POLAR, AXIAL])
 
 

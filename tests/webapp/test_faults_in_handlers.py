@@ -84,7 +84,8 @@ def test_every_widget_survives_a_fault_in_what_it_does(
     server: viser.ViserServer, app: App, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     client: Any = SilentClient(server)
-    session, loop = Session(load_layout("ucat")), server.get_event_loop()
+    session = Session(load_layout("ucat"))
+    loop = server.get_event_loop()
     session.select("front_left")
     with monkeypatch.context() as patch:  # while the page is built: widgets keep what they call
         for owner, name in intents():
@@ -92,7 +93,8 @@ def test_every_widget_survives_a_fault_in_what_it_does(
         view = on_loop(server, lambda: View(client, session, app._solver, app._pools, loop))
         assert faults(view) == []
         until(lambda: not view.busy)
-        before, told = session.state, 0
+        before = session.state
+        told = 0
         for handle in handles(server):
             for value in others(handle):
                 client.notes.clear()
@@ -150,7 +152,8 @@ def test_every_widget_survives_a_fault_in_what_is_written(
 
 
 def test_a_live_slot_works_on_one_question_and_then_on_the_newest(worker: Pool) -> None:
-    gate, asked = threading.Event(), list[int]()
+    gate = threading.Event()
+    asked = list[int]()
 
     def solve(question: int) -> int:
         asked.append(question)
@@ -166,7 +169,8 @@ def test_a_live_slot_works_on_one_question_and_then_on_the_newest(worker: Pool) 
 
 
 def test_another_slot_is_cancelled_and_a_stale_answer_is_never_taken(worker: Pool) -> None:
-    gate, seen = threading.Event(), list[bool]()
+    gate = threading.Event()
+    seen = list[bool]()
 
     def solve(question: int, work: Work[int]) -> int:
         assert gate.wait(30)

@@ -53,7 +53,8 @@ class Opened:
         self.session = Session(load_layout("ucat"))
         context = context_of(worker, self.session)
         assert isinstance(context.bell, LoneBell)
-        self.refused, self.stages = context.bell.refused, context.bell.stages
+        self.refused = context.bell.refused
+        self.stages = context.bell.stages
         self.fitting = Fitting(context)
 
     @property
@@ -63,7 +64,8 @@ class Opened:
 
 def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Path, worker: Pool) -> None:
     opened = Opened(worker)
-    before, fitting = opened.session.state, opened.fitting
+    before = opened.session.state
+    fitting = opened.fitting
     fitting.start("back_left", "../cell.csv", cell(tmp_path))
     with pytest.raises(FinlabError, match="under way already"):
         fitting.start("back_left", "cell.csv", b"")
@@ -91,10 +93,12 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
 def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Pool) -> None:
     opened = Opened(worker)
     opened.session.open_layout(load_layout("bluerov2"))
-    before, first = opened.session.state.layout, opened.session.state.layout.actuators[0]
+    before = opened.session.state.layout
+    first = opened.session.state.layout.actuators[0]
     opened.fitting.start(first.name, "t200.csv", T200.read_bytes())
     until(lambda: opened.session.state.layout != before)
-    found, part = opened.fitting.answer, opened.session.state.layout.actuators[0]
+    found = opened.fitting.answer
+    part = opened.session.state.layout.actuators[0]
     assert found is not None and isinstance(part, Thruster) and isinstance(part.model, PowerTable)
     assert part.force == (part.model.rows[0][1], part.model.rows[-1][1]) and part.axis == first.axis
     assert "Force -39.91 to 51.44 N" in fit_card(found) and "<b>table</b> of" in model_card(part)
@@ -158,7 +162,8 @@ def test_large_files_and_unknown_fins_are_refused_at_once(
 
 
 def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Pool) -> None:
-    opened, gate = Opened(worker), threading.Event()
+    opened = Opened(worker)
+    gate = threading.Event()
     before = opened.session.state
     worker.submit(lambda: gate.wait(30))
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
@@ -172,7 +177,9 @@ def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Poo
 def test_a_cancelled_fit_ends_at_its_next_step(
     tmp_path: Path, worker: Pool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened, begun, gate = Opened(worker), threading.Event(), threading.Event()
+    opened = Opened(worker)
+    begun = threading.Event()
+    gate = threading.Event()
     steps: list[int] = []
     component = fin_fit.Component
 
@@ -193,7 +200,8 @@ def test_a_cancelled_fit_ends_at_its_next_step(
 
 
 def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worker: Pool) -> None:
-    opened, gate = Opened(worker), threading.Event()
+    opened = Opened(worker)
+    gate = threading.Event()
     worker.submit(lambda: gate.wait(30))
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     opened.session.open_layout(load_layout("penta"))
@@ -204,7 +212,8 @@ def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worke
 
 
 def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Pool) -> None:
-    one, other = Opened(worker), Opened(worker)
+    one = Opened(worker)
+    other = Opened(worker)
     content = cell(tmp_path)
     one.fitting.start("back_left", "one.csv", content)
     other.fitting.start("front_left", "other.csv", content)

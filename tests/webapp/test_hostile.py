@@ -106,7 +106,8 @@ def link(text: str) -> str:
 def test_hostile_links_leave_the_page_quick(server: viser.ViserServer, view: View, text: str) -> None:
     before = view.session.state.layout
     on_loop(server, lambda: view.do(partial(view.designs.open_link, link(text))))
-    slowest, end = 0.0, time.monotonic() + 30.0
+    slowest = 0.0
+    end = time.monotonic() + 30.0
     while not view.client.notes and time.monotonic() < end:
         begin = time.monotonic()
         on_loop(server, lambda: None)

@@ -139,6 +139,7 @@ def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worke
     assert found is not None, improver.error
     assert found.layout.names == layout.names and not set(found.moved) & set(state.failed)
     assert found.layout.actuators[:lost] == layout.actuators[:lost]
-    room, left = Room(layout.without(state.failed), 0.02), found.layout.without(state.failed)
+    room = Room(layout.without(state.failed), 0.02)
+    left = found.layout.without(state.failed)
     assert room.broken(left.position[None], left.frames[None])[0] == 0.0
     assert mirror_pairs(left) == mirror_pairs(layout.without(state.failed))

@@ -217,7 +217,8 @@ def test_one_error_everywhere() -> None:
     state = State(layout, target=PRESETS["Turn"], method="paper")
     solver = Solver()
     reply = solver.reply(state)
-    answer, plant = reply.answer, plant_of(layout)
+    answer = reply.answer
+    plant = plant_of(layout)
     assert answer.candidates is not None and answer.wrench_expected is not None
     modes = [named.mode for named in solver.modes(reply).shown]
     told = [

@@ -27,7 +27,8 @@ AHEAD = (30.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @pytest.mark.parametrize("layout", [load_layout("ucat"), OWN], ids=["none", "own"])
 def test_the_switch_can_be_undone_and_remembers_the_robots_own(layout: Layout) -> None:
-    session, own = Session(layout), layout.interaction
+    session = Session(layout)
+    own = layout.interaction
     session.set_jets(own is None)
     assert session.state.layout == replace(layout, interaction=Jets() if own is None else None)
     assert session.history.undo_name in ("Count jets", "Leave jets out")
@@ -51,7 +52,8 @@ def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
     state = State(replace(HEAVY, interaction=Jets()), target=AHEAD, speed=speed)
     solver = Solver()
     both = solver.both(state)
-    best, blind = both.counted, both.blind
+    best = both.counted
+    blind = both.blind
     alone = Allocator(HEAVY).allocate(AHEAD)
     flow = np.array(state.flow) if state.flow else None
     miss = np.subtract(AHEAD, plant_of(state.layout).wrench(alone.command, flow=flow))
@@ -78,7 +80,8 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     switch = next(handle for handle in handles(tab.server) if getattr(handle, "label", "") == "Count jets")
     use(tab.server, tab.view, switch, True)
     tab.settle()
-    nodes, shown = tab.server.scene._handle_from_node_name, tab.view.shown
+    nodes = tab.server.scene._handle_from_node_name
+    shown = tab.view.shown
     assert shown is not None and shown.layout.interaction == Jets()
     for i, force in enumerate(shown.forces):
         jet = nodes[f"/robot/jets/{i}"]
@@ -110,9 +113,11 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
 
 
 def test_a_jet_is_as_wide_as_the_formula_says() -> None:
-    known, diameter = Jets(), 0.1
+    known = Jets()
+    diameter = 0.1
     mesh = cone(np.array([-0.6, 0.0, 0.0]), diameter, known.width, known.spread)
-    along, radius = -mesh.vertices[:-2, 0], np.hypot(*mesh.vertices[:-2, 1:].T)
+    along = -mesh.vertices[:-2, 0]
+    radius = np.hypot(*mesh.vertices[:-2, 1:].T)
     decay = known.spread * (radius / diameter) ** 2 / ((along / diameter) ** 2 + known.width**2)
     np.testing.assert_allclose(decay, 1.0)
     assert along.max() == pytest.approx(0.6) and radius.min() == pytest.approx(0.051, abs=1e-3)

@@ -21,7 +21,8 @@ from webapp.session.targets import PRESETS
 from webapp.tasks.answering import HOLD, Answering, Refining
 from webapp.tasks.solver import MAX_SHOWN, NO_MODES, Modes, NamedMode, Solver, named_modes
 
-PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
+PUSH = (0.3, 1.1, 0.0)
+REST = (0.05, 0.1, 0.0)
 
 
 def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
@@ -82,7 +83,8 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     assert len(modes.ends) == len(samples) == len(end)
     for source, place in zip(samples.source, modes.ends, strict=True):
         assert place < 0 or source in modes.shown[place].mode.sources, "the mode that its component led to"
-    still, moving = mode_plot(modes, 0, None, 200), mode_plot(modes, 0, 1, 200)
+    still = mode_plot(modes, 0, None, 200)
+    moving = mode_plot(modes, 0, 1, 200)
     assert still.count("data-press='mode'") == len(modes.shown)
     first, *others = (named.mode.effort for named in modes.shown)
     drawn = int((samples.effort <= max(first, *others, 2.0 * max(others))).sum())
@@ -120,13 +122,15 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
     answering.slot.attend()
     answering.ask()
     answering.search.attend()
-    modes, best = answering.modes, answering.seen().shown
+    modes = answering.modes
+    best = answering.seen().shown
     assert modes.steps == 2 and not answering.searching
     session.show_mode(1)
     refining.toggle()
     seen = []
     while session.step is not None:
-        proposal, shown = modes.ends.index(1), answering.seen().shown
+        proposal = modes.ends.index(1)
+        shown = answering.seen().shown
         assert shown is not None and refining.running
         np.testing.assert_array_equal(shown.command, modes.ways[session.step].command[proposal])
         seen.append(session.step)
@@ -157,10 +161,9 @@ def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float)
         float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
     ]
     labels = re.findall(r"<text x='([\d.]+)' y='([\d.]+)' class='digit'[^>]*>(\d+)<", plot)
-    across, numbers = (
-        across[::-1],
-        [(float(x), float(y)) for x, y, _ in labels][::-1],
-    )  # the best one is on top
+    # the best one is on top
+    across = across[::-1]
+    numbers = [(float(x), float(y)) for x, y, _ in labels][::-1]
     assert [int(k) for *_, k in labels][::-1] == list(range(1, MAX_SHOWN + 1))
     scale, start = np.polyfit(effort, across, 1)
     assert scale > 0 and np.abs(scale * effort + start - across).max() < 0.2, "each at its value"

@@ -18,7 +18,8 @@ from webapp.tasks.null_ways import MOST, null_modes
 from webapp.tasks.solver import Solver
 from webapp.tasks.ways_file import ways_csv
 
-HYBRID, BLUEROV = load_layout("turtle_hybrid"), load_layout("bluerov2_heavy")
+HYBRID = load_layout("turtle_hybrid")
+BLUEROV = load_layout("bluerov2_heavy")
 ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
 
 

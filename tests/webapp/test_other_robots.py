@@ -23,7 +23,8 @@ from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
-HYBRID, BLUEROV = load_layout("turtle_hybrid"), load_layout("bluerov2_heavy")
+HYBRID = load_layout("turtle_hybrid")
+BLUEROV = load_layout("bluerov2_heavy")
 FISH = Layout(
     "fish",
     (

@@ -68,7 +68,8 @@ def test_undo_is_of_the_robot_and_not_of_the_question(session: Session) -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e9, "1", None, True])
 def test_bad_targets_change_nothing(session: Session, value: object) -> None:
-    before, revision = session.state, session.revision
+    before = session.state
+    revision = session.revision
     with pytest.raises(FinlabError, match="Fx"):
         session.set_target(0, value)
     assert session.state == before and session.revision == revision

@@ -133,18 +133,21 @@ class Recorded:
 
 
 def test_forces_start_at_blades_and_fans_reach_as_far_as_they_beat() -> None:
-    layout, scene = load_layout("ucat"), Recorded()
+    layout = load_layout("ucat")
+    scene = Recorded()
     nodes: Any = ForceNodes(scene)  # type: ignore[arg-type]
     nodes.place(layout, (1.0, 1.0))
     forces = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 1e-6]])
     amplitude = np.array([0.5, 0.0, 0.0, 0.0])
     nodes.command(forces, amplitude, np.array([0.3, 0.0, 0.0, 0.0]))
-    arrows, fans = nodes._arrows.node, nodes._fans
+    arrows = nodes._arrows.node
+    fans = nodes._fans
     assert arrows.points.shape == (2, 2, 3) and arrows.visible and fans.visible
     np.testing.assert_allclose(arrows.points[:, 1] - arrows.points[:, 0], forces[[0, 2]], atol=1e-4)
     light = [255.0 * linear(FIN_COLORS[k]) for k in (0, 2)]
     np.testing.assert_allclose(arrows.colors, light, atol=0.5)
-    wedge, angles = unit_wedge().vertices, []
+    wedge = unit_wedge().vertices
+    angles = []
     assert fans.batched_wxyzs.shape == (WEDGES, 4)
     for wxyz, place, scale in zip(
         fans.batched_wxyzs, fans.batched_positions, fans.batched_scales, strict=True
@@ -177,7 +180,8 @@ def test_a_direction_follows_the_hand_on_a_sphere_and_jumps_to_axes() -> None:
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "catamaran", "torpedo", "turtle_hybrid", "fish"])
 def test_actuators_move_as_commanded_or_hang(name: str) -> None:
     for part in load_layout(shipped_layouts()[name]).actuators:
-        full, back = motion(part, np.array(part.upper)), motion(part, np.array(part.lower))
+        full = motion(part, np.array(part.upper))
+        back = motion(part, np.array(part.lower))
         hung = motion(part, None)
         assert hung.turns == hung.amplitude == 0.0
         if isinstance(part, (Thruster, Azimuth)):
@@ -241,7 +245,8 @@ def test_fins_differ_and_their_numbers_can_be_read() -> None:
         for other in FIN_COLORS[:k]:
             assert np.linalg.norm(oklab(fin) - oklab(other)) > 0.08
         light, number = (float(linear(c) @ (0.2126, 0.7152, 0.0722)) for c in (fin, _rgb(ink(fin))))
-        bright, dim = max(light, number) + 0.05, min(light, number) + 0.05
+        bright = max(light, number) + 0.05
+        dim = min(light, number) + 0.05
         assert bright / dim > 3.9, f"the number on {fin}"
 
 

@@ -33,8 +33,10 @@ MOST_CALLS = {"Candidates": 1850, "folded": 760}
 """Of the library's and the app's functions together; most are the library's: what is proved of the answer
 takes 230, and the candidates of a network 1,000."""
 MOST_OF_APP = {"Candidates": 620, "folded": 340}
-MOST_MESSAGES, MOST_BYTES = 12, 6000
-MOST_FILES, MOST_WRITTEN = 66, 2
+MOST_MESSAGES = 12
+MOST_BYTES = 6000
+MOST_FILES = 66
+MOST_WRITTEN = 2
 
 
 class Count:
@@ -91,7 +93,8 @@ class Count:
 
 @pytest.fixture(scope="module")
 def count() -> Iterator[Count]:
-    before, count = threading.getprofile(), Count()
+    before = threading.getprofile()
+    count = Count()
     threading.setprofile(count)
     yield count
     threading.setprofile(before)
@@ -111,7 +114,9 @@ def tab(count: Count) -> Iterator[Tab]:
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 @pytest.mark.parametrize("drawer", ["Candidates", "folded"])
 def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    session, write, written = tab.view.session, View._write_words, [0]
+    session = tab.view.session
+    write = View._write_words
+    written = [0]
 
     def counted(view: View) -> None:
         written[0] += 1
@@ -147,6 +152,7 @@ def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytes
             print(f"{calls:6} {'/'.join(code.co_filename.split('/')[-3:])} {code.co_name}")
     calls, of_app, files, _, _, size = map(max, zip(*steps[1:], strict=True))
     # On a busy machine an answer may be later than the page waits, and the page is written once more.
-    times, sent = min(step[3] for step in steps[1:]), min(step[4] for step in steps[1:])
+    times = min(step[3] for step in steps[1:])
+    sent = min(step[4] for step in steps[1:])
     assert 100 < calls <= MOST_CALLS[drawer] and 50 < of_app <= MOST_OF_APP[drawer] and files <= MOST_FILES
     assert 1 < times <= MOST_WRITTEN and 3 < sent <= MOST_MESSAGES and size <= MOST_BYTES

@@ -63,7 +63,8 @@ def shelf(worker: Pool) -> Iterator[Shelf]:
 def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     shelf.swim(10.0, "analytic")
     swimmer = shelf.begun()
-    figures, log = swimmer.shown.figures, swimmer.log()
+    figures = swimmer.shown.figures
+    log = swimmer.log()
     assert isinstance(figures, Figures)
     power = log.driving_power.sum(axis=1)
     assert swimmer.moment().record[:, POWER] == pytest.approx(power)
@@ -116,7 +117,8 @@ def chosen(name: str, **then: Any) -> SwimSettings:
 
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_every_scenario_plans_what_its_day_says(name: str) -> None:
-    day, settings = SCENARIOS[name], chosen(name)
+    day = SCENARIOS[name]
+    settings = chosen(name)
     plan = settings.plan(State(UCAT))
     assert plan.day == day
     assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s

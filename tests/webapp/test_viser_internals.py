@@ -34,8 +34,10 @@ def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.
     with ZipFile(_icons.ICONS_DIR / "tabler-icons.zip") as archive:
         names = ("anchor", "fish", "submarine")
         assert drawn == [archive.read(f"{name}.svg").decode() for name in names]
-    box, sphere = server.scene.add_box("/box"), server.scene.add_icosphere("/sphere")
-    box.dimensions, sphere.radius = (1.0, 2.0, 3.0), 0.5
+    box = server.scene.add_box("/box")
+    sphere = server.scene.add_icosphere("/sphere")
+    box.dimensions = (1.0, 2.0, 3.0)
+    sphere.radius = 0.5
     assert (box.dimensions, sphere.radius) == ((1.0, 2.0, 3.0), 0.5)
     assert "dimensions" not in sphere._prop_hints and "dimensions" in box._prop_hints
     stop_server(server)

@@ -83,7 +83,8 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     error = float(np.linalg.norm((wrench - target) / exact.scale))
     answer = delivering(exact, wrench)
     state = State(layout, target=tuple(target))  # type: ignore[arg-type]
-    said, verdict = str(answer_sentence(state, answer, False)), verdict_sentence(answer, True)
+    said = str(answer_sentence(state, answer, False))
+    verdict = verdict_sentence(answer, True)
     assert ("Nothing is left undone" in said) == (verdict == "Exact") == (error <= 1e-3)
     assert "100 %" not in said + verdict
     if verdict != "Exact":
@@ -221,7 +222,8 @@ def test_cards_say_what_a_layout_can_do() -> None:
 
 
 def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
-    rooms, option = ("analysis", "allocation", "exchange", "fit", "layout"), re.compile(r"--[a-z]+")
+    rooms = ("analysis", "allocation", "exchange", "fit", "layout")
+    option = re.compile(r"--[a-z]+")
     texts = [
         node.value
         for room in rooms

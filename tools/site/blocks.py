@@ -103,7 +103,8 @@ def with_output(page: str, notebook: Any) -> str:
 
 def output(cell: Any) -> str:
     """What a cell showed, in Markdown: what it printed, and its value as a table, a picture or text."""
-    parts, text = [], ""
+    parts = []
+    text = ""
     for each in cell.get("outputs", ()):
         data = each.get("data", {})
         if html := data.get("text/html"):

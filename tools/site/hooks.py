@@ -57,7 +57,8 @@ def gallery() -> dict[str, str | bytes]:
     for name, notebook in _shown.items():
         if not name.startswith("examples/"):
             continue
-        stem, page = Path(name).stem, ""
+        stem = Path(name).stem
+        page = ""
         for cell in notebook.cells:
             words = cell.cell_type == "markdown"
             page += (

@@ -47,13 +47,15 @@ def public(module: Any) -> dict[str, Any]:
 def python_pages() -> Pages:
     """A page for each package that has public names, and one for each name."""
     packages = [package(), *(each for _, each in sorted(package().modules.items()) if each.is_init_module)]
-    pages, index = {}, "# Python\n\n| import from | what is there |\n|---|---|\n"
+    pages = {}
+    index = "# Python\n\n| import from | what is there |\n|---|---|\n"
     home: dict[str, str] = {}
     for module in packages:
         names = public(module)
         if not names:
             continue
-        path, own = module.path, f"reference/python/{module.path}.md"
+        path = module.path
+        own = f"reference/python/{module.path}.md"
         pages[own] = (
             f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
         )
@@ -111,7 +113,8 @@ def format_pages() -> Pages:
 
 
 def _keys(part: str, about: dict[str, Any]) -> str:
-    row, must = "| `{}`{} | {} | {} |\n", about.get("required", [])
+    row = "| `{}`{} | {} | {} |\n"
+    must = about.get("required", [])
     meaning = _meanings(part)
     return "".join(
         row.format(key, " (required)" * (key in must), _value(of), of.get("description") or meaning(key))

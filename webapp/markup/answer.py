@@ -69,7 +69,8 @@ def nice_limit(value: float) -> float:
 
 def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> str:
     """Name, bars and figures of one axis, of which nothing is wished where it is free."""
-    digits, rest = 2 if axis < 3 else 3, None if wish is None or got is None else wish - got
+    digits = 2 if axis < 3 else 3
+    rest = None if wish is None or got is None else wish - got
     bars = [] if wish is None else [(0.0, wish, 1, "asked")]
     if got is not None:
         bars.append((0.0, got, 8, "delivered"))

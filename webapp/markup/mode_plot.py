@@ -119,7 +119,7 @@ def _trails(places: Array, ends: list[int]) -> str:
 def _labels(places: list[Point]) -> list[Point]:
     """Where the numbers of rings stand: above them, and above each other's."""
     labels: list[Point] = []
-    (width, height) = LABEL
+    width, height = LABEL
     for x, y in places:
         level = y - LIFT
         while [1 for u, v in labels if abs(x - u) < width and abs(level - v) < height]:

@@ -17,7 +17,8 @@ def pace_words(swimming: Swimming) -> str:
         return "arrived"
     if not swimming.running:
         return "paused"
-    rate, speed = swimming.pace.rate, swimming.pace.speed
+    rate = swimming.pace.rate
+    speed = swimming.pace.speed
     if rate is None or rate > 0.9 * speed:
         return f"running at {speed:.2g}×"
     return html("<span class='missing'>{:.1f}× of {:g}×, as fast as this machine can</span>", rate, speed)
@@ -89,7 +90,8 @@ def fit_card(result: Fitted) -> str:
     """What came of a file that was dropped on an actuator."""
     from finlab.fit.thruster_fit import ThrusterFit, summary  # scipy comes with it
 
-    name, fit = result.upload.name, result.fit
+    name = result.upload.name
+    fit = result.fit
     if fit is None:
         said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, result.upload.part.name)
         return html("<div class='fl said'>{}</div>", said)
@@ -109,7 +111,8 @@ def fit_card(result: Fitted) -> str:
         row(f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
     )
     parts = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
-    left, count = "No sample was left out.", len(fit.outliers)
+    left = "No sample was left out."
+    count = len(fit.outliers)
     if count:
         named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if count > MOST_NAMED else "")
         left = f"{count} {'sample contradicts' if count == 1 else 'samples contradict'} the others: {named}."

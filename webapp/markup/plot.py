@@ -38,9 +38,11 @@ class Axis(NamedTuple):
 def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
     """An axis that shows all of some values (N,), in the unit that `word` names, with round ticks, `most` at
     most."""
-    low, high = float(values.min()), float(values.max())
+    low = float(values.min())
+    high = float(values.max())
     margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
-    low, high = low - margin, high + margin
+    low = low - margin
+    high = high + margin
     decade = 10.0 ** math.floor(math.log10((high - low) / most))
     step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= most)
     places = range(math.ceil(low / step), math.floor(high / step) + 1)
@@ -99,7 +101,9 @@ class Plot(NamedTuple):
 
     def grid(self, upright: bool) -> str:
         """Lines and labels; upright lines or none."""
-        floor, left, end = self.floor, self.left, self.width - RIGHT
+        floor = self.floor
+        left = self.left
+        end = self.width - RIGHT
         across = np.array([value for value, _ in self.across.ticks])
         up = np.array([value for value, _ in self.up.ticks])
         right = self.place(across, 0.0)[0]

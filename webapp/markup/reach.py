@@ -14,7 +14,8 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
     if not np.isfinite(low):
         return ()
-    fine, ends = 1 if width >= 2.0 else 2 if width >= 0.2 else 3, []
+    fine = 1 if width >= 2.0 else 2 if width >= 0.2 else 3
+    ends = []
     for value in (low, high):
         digits = 0 if abs(value) >= 9.95 else fine
         rounded = round(value, digits)

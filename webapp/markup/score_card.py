@@ -64,7 +64,8 @@ def _figure(words: str, values: list[float | None]) -> str:
     """A row of one layout, or of both and a sign; a robot of one fin has no worst loss."""
     if not any(value is not None for value in values):
         return ""
-    signs, (old, now) = [""] * (len(values) - 1), (values[0], values[-1])
+    signs = [""] * (len(values) - 1)
+    old, now = (values[0], values[-1])
     if signs and now is not None and old is not None:
         same = abs(now - old) < 1e-3 * max(abs(now), abs(old), 1e-9)
         kind, sign = ("", "=") if same else ("given", "▲") if now > old else ("missing", "▼")
@@ -100,7 +101,8 @@ def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
 
 def _both(positive: float, negative: float) -> str:
     """Both signs; one number where they are equal to what is shown of them."""
-    a, b = three_digits(positive), three_digits(negative)
+    a = three_digits(positive)
+    b = three_digits(negative)
     if positive == negative == 0.0:
         return Markup("<span class='missing'>none</span>")
     return f"±{a}" if a == b else f"+{a} −{b}"

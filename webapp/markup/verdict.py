@@ -74,7 +74,8 @@ def rest_sentence(allocation: Allocation) -> str:
     """One sentence on what is left undone, and on what comes along unasked, axis by axis."""
     if allocation.reachable:
         return "Nothing is left undone."
-    rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)
+    rest = allocation.unallocated
+    size = np.abs(allocation.unallocated / allocation.scale)
     spoken = [k for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
     less = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] > 0.0]
     more = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] <= 0.0]

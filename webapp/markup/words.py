@@ -203,7 +203,8 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
 
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
     """Which of the first two numbers of commands (n, 2) are at their limits, but for free angles."""
-    layout, command = allocation.layout, allocation.command[:, :2]
+    layout = allocation.layout
+    command = allocation.command[:, :2]
     turns = _turning(layout)[:, :2]
     with np.errstate(invalid="ignore"):
         high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)

@@ -30,7 +30,8 @@ SNAPS: dict[str, Vector] = {
 
 def add_actuator(page: Page) -> None:
     """Widgets about the selected actuators."""
-    session, gui = page.session, page.gui
+    session = page.session
+    gui = page.gui
 
     def rename(name: str) -> None:
         if session.selected is not None:
@@ -51,7 +52,9 @@ def add_actuator(page: Page) -> None:
 
 
 def _add_place(page: Page) -> None:
-    session, gui, board = page.session, page.gui, page.board
+    session = page.session
+    gui = page.gui
+    board = page.board
 
     def turn(degrees: Any) -> None:
         session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))

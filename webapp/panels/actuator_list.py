@@ -70,7 +70,8 @@ def add_actuator_list(page: Page) -> None:
 def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     """All actuators with their places and directions; `selection` has the names of the selected ones."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
-    names, kinds = state.layout.names, sorted({part.type for part in state.layout.actuators})
+    names = state.layout.names
+    kinds = sorted({part.type for part in state.layout.actuators})
     robot = html(
         "<tr class='{}' {}><td colspan='5'>{}<span class='name whole'>{}</span></td></tr>",
         "" if selection else "chosen",
@@ -93,7 +94,8 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
 def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
     """A row; in a `mixed` list the first of several of a kind has that above it."""
     parts = state.layout.actuators
-    part, before = parts[index], parts[index - 1] if index else None
+    part = parts[index]
+    before = parts[index - 1] if index else None
     head = mixed and (before is None or before.type != part.type)
     places = [_minus(f"{value:.3f}") for value in part.position]
     twin = partner(state.links, part.name)
@@ -115,7 +117,8 @@ def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
 def points_words(part: Actuator) -> str:
     """Where an actuator points, in degrees: `60`, `60 ↑30`, `up`."""
     x, y, z = part.direction
-    turn, rise = math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
+    turn = math.degrees(math.atan2(y, x))
+    rise = math.degrees(math.atan2(z, math.hypot(x, y)))
     if abs(rise) > 90.0 - LEVEL:
         return "up" if rise > 0.0 else "down"
     sign = f" {'↑' if rise > 0.0 else '↓'}{abs(rise):.0f}" if abs(rise) > LEVEL else ""

@@ -71,7 +71,10 @@ def add_model(page: Page) -> None:
 
 def add_fit(page: Page) -> None:
     """Curves of the model, a file for the selected actuator, and what comes of it."""
-    session, gui, board, fitting = page.session, page.gui, page.board, page.jobs.fitting
+    session = page.session
+    gui = page.gui
+    board = page.board
+    fitting = page.jobs.fitting
 
     def upload(name: str, content: bytes) -> None:
         if session.selected is None:
@@ -122,7 +125,8 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
         return html("<div class='fl'>{}</div>", _table_words(part, doubts))
     model = getattr(part, "model", None)
     if isinstance(model, PowerTable):
-        (first, *_), (last, *_) = model.rows[0], model.rows[-1]
+        (first, *_) = model.rows[0]
+        (last, *_) = model.rows[-1]
         said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
         return html(f"<div class='fl dim'>{said}</div>", len(model.rows), first, last, model.unit)
     said = LAWS.get(part.model_type, f"a law of its own kind, {part.type}")
@@ -142,7 +146,8 @@ def _table_words(fin: Fin, doubts: bool) -> str:
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
     said = "" if doubt is None or not doubts else html("<div class='missing'>This fin is {}.</div>", doubt)
     if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
-        most_a, most_f = fin.limits.amplitude[1], fin.limits.frequency[1]
+        most_a = fin.limits.amplitude[1]
+        most_f = fin.limits.frequency[1]
         said += html(
             "<div class='missing'>The fin may be asked for {}° and {:.2f} Hz: beyond "
             "what was measured the force counts as at the edge.</div>",
@@ -189,7 +194,8 @@ def curves(part: Actuator) -> Sequence[Curves]:
         across = np.linspace(*part.limits.frequency, POINTS)
         amplitude = np.array(SHARES) * part.limits.amplitude[1]
         command = np.zeros((len(SHARES), POINTS, 1, 3))
-        command[..., 0, 0], command[..., 0, 1] = amplitude[:, None], across
+        command[..., 0, 0] = amplitude[:, None]
+        command[..., 0, 1] = across
         command[..., 0, 2] = np.mean(part.limits.zero_direction)
         force = np.linalg.norm(plant.force(command)[..., 0, :], axis=-1)
         names = [f"A {degrees(size)}°" for size in amplitude]

@@ -45,7 +45,8 @@ PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
 
 def add_body(page: Page) -> None:
     """Widgets about the robot."""
-    session, gui = page.session, page.gui
+    session = page.session
+    gui = page.gui
 
     def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
         full = list(_whole(_body(session.state.layout), key))
@@ -93,7 +94,8 @@ def _whole(body: Body, key: str) -> tuple[float, ...]:
 
 def _facts(layout: Layout) -> str:
     """The hull in figures, and what a swim would miss."""
-    body, water = _body(layout), displaced(layout)
+    body = _body(layout)
+    water = displaced(layout)
     lines = [f"The hull encloses {three_digits(water)} kg of water."]
     if body.mass_kg is not None:
         lift = lift_of(body)

@@ -66,10 +66,14 @@ def guide_card(stop: Stop | None, solved: bool) -> str:
     if stop is None:
         return ""
     course = TOUR if stop in TOUR else LESSONS
-    place, last = course.index(stop) + 1, len(course)
-    kind, title, parts = "tour", f"{place} of {last} · {stop.title}", [html("<p>{}</p>", stop.text)]
+    place = course.index(stop) + 1
+    last = len(course)
+    kind = "tour"
+    title = f"{place} of {last} · {stop.title}"
+    parts = [html("<p>{}</p>", stop.text)]
     if stop.exercise:
-        kind, title = f"fl-lesson {'done' if solved else 'open'}", f"Lesson {title}"
+        kind = f"fl-lesson {'done' if solved else 'open'}"
+        title = f"Lesson {title}"
         exercise = "<p class='exercise'><span class='mark'>{}</span>{}</p>"
         parts.append(html(exercise, "✓" if solved else "○", stop.exercise))
         if solved:
@@ -131,7 +135,8 @@ def add_file(page: Page) -> None:
 
 def add_history(page: Page) -> None:
     """Undo and redo, by name."""
-    session, icon = page.session, viser.Icon
+    session = page.session
+    icon = viser.Icon
     add_html(page.gui, marker("fl-history"))
     back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
     page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
@@ -141,7 +146,8 @@ def add_history(page: Page) -> None:
 
 def add_answering(page: Page) -> None:
     """Who answers, what is kept least, and where help is found."""
-    session, gui = page.session, page.gui
+    session = page.session
+    gui = page.gui
     about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
     least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
     page.board.show(least, visible=lambda layout: layout.is_of_fins)

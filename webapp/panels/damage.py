@@ -55,14 +55,17 @@ def add_fin_buttons(
 
 def add_damage(page: Page) -> None:
     """What is wrong with the selected actuator, or the first: every fault that its type may have."""
-    session, gui, board = page.session, page.gui, page.board
+    session = page.session
+    gui = page.gui
+    board = page.board
 
     def part() -> Actuator:
         return _part(session.selected, session.state.layout)
 
     def at_now() -> Array:
         """Where that actuator is [command]: the middle of its limits where nothing is known of it."""
-        now, own = page.shown, part()
+        now = page.shown
+        own = part()
         index = session.state.layout.index(own.name)
         known = now is not None and now.layout.names == session.state.layout.names
         command = now.command[index] if now is not None and known else np.full(3, np.nan)

@@ -51,7 +51,9 @@ class Section:
     no old figure stands under a new name."""
 
     def __init__(self, page: Page, place: places.Place, index: int) -> None:
-        self.place, self.name, self._session = place, f"at-{index}", page.session
+        self.place = place
+        self.name = f"at-{index}"
+        self._session = page.session
         self._met = False
         gui = page.gui
         self.group = page.board.group(self._fail)
@@ -85,7 +87,8 @@ class Frame:
     """All regions of one page with their sections."""
 
     def __init__(self, page: Page) -> None:
-        self._page, gui = page, page.gui
+        self._page = page
+        gui = page.gui
         gui.main_panel.dock_right()
         gui.set_panel_label("finlab")
         places.add_keys(page)
@@ -142,7 +145,8 @@ class Frame:
             "log": desk.task == places.LOG,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        swum, rows = 2 * (swimmer is not None), 0 if judged is None else plot_rows(judged)
+        swum = 2 * (swimmer is not None)
+        rows = 0 if judged is None else plot_rows(judged)
         rows = {places.SIMULATE: swum, places.LOG: rows}.get(desk.task, 0)
         is_timeline = drawer in (*DRAWERS[places.SIMULATE], DRAWERS[places.LOG][0])
         low = desk.task in (places.SIMULATE, places.LOG) and not rows
@@ -159,7 +163,8 @@ class Frame:
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
     def _listen(self) -> None:
-        session, robot = self._page.session, self._page.scenery.robot
+        session = self._page.session
+        robot = self._page.scenery.robot
         acts: dict[str, Callable[[str, str], object]] = {
             "task": lambda name, _: session.show_task(name),
             "drawer": lambda name, _: session.show_drawer(name),

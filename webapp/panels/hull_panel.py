@@ -29,7 +29,8 @@ LEAST = 0.1
 
 def add_hull(page: Page) -> None:
     """Widgets about the hull."""
-    session, gui = page.session, page.gui
+    session = page.session
+    gui = page.gui
 
     def load(name: str, content: bytes) -> None:
         page.deferred.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
@@ -92,10 +93,12 @@ def _add_turns(page: Page) -> None:
     session = page.session
 
     def turn(axis: str) -> None:
-        hull, rotation = _described(session.state.layout), Rotation.from_euler(axis, 90.0, degrees=True)
+        hull = _described(session.state.layout)
+        rotation = Rotation.from_euler(axis, 90.0, degrees=True)
         if hull is None:
             raise FinlabError("the hull is drawn from a shape; import a mesh first")
-        matrix, name = rotation.as_matrix(), f"Turn the hull about {axis}"
+        matrix = rotation.as_matrix()
+        name = f"Turn the hull about {axis}"
         page.deferred.make(
             lambda: _drawn(page, reshaped_hull(hull, lambda mesh: turned(mesh, matrix))),
             partial(put_on, name, hull),

@@ -42,7 +42,10 @@ def _findings(found: Findings | None, finding: bool, found_error: str | None) ->
 
 def add_improving(page: Page) -> None:
     """What to look for, and what was found."""
-    session, gui, board, improver = page.session, page.gui, page.board, page.jobs.improver
+    session = page.session
+    gui = page.gui
+    board = page.board
+    improver = page.jobs.improver
 
     def change(how: Callable[..., SearchRequest], *values: Any) -> None:
         session.draft = how(session.draft, *values)

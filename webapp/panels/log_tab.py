@@ -29,7 +29,8 @@ FIRST = (
 
 def add_log(page: Page) -> None:
     """The file, by whose laws it is judged, and what is said of it."""
-    log, gui = page.jobs.log, page.gui
+    log = page.jobs.log
+    gui = page.gui
     page.opening.add(SUFFIXES, log.open)
     add_html(gui, marker("fl-primary"))
     page.add_upload("Open a log", page.opening.open, icon=viser.Icon.FOLDER_OPEN, mime_type=SUFFIXES)
@@ -128,7 +129,8 @@ def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
     """Demand and what was given over time, of each axis that was asked for, and actuators at their limits."""
     if judged is None:
         return html("<div class='fl dim fl-timeline'>{}</div>", "The log is plotted here over time.")
-    line, parts = judged.timeline, []
+    line = judged.timeline
+    parts = []
     ends: Any = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
     across = exact_axis("time [s]", ends)
     for k in _asked_axes(judged):
@@ -136,7 +138,8 @@ def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
         up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), both), 4)
         words = ("asked", "given")
         parts.append(over_time(across, line.time, up, both, (ASKED, DELIVERED), words, log_moment))
-    shares, up = list(100.0 * line.limits.T), cost_axis("at a limit [%]", np.array((0.0, 100.0)), 4)
+    shares = list(100.0 * line.limits.T)
+    up = cost_axis("at a limit [%]", np.array((0.0, 100.0)), 4)
     colors = [fin_color(k) for k in range(judged.robot.n)]
     parts.append(over_time(across, line.time, up, shares, colors, (), log_moment))
     return html("<div class='fl fl-timeline'>{}</div>", parts)

@@ -43,7 +43,10 @@ PLOT_PX = 152
 
 def add_candidates(page: Page) -> None:
     """Plot and table, the refinement as a picture, and how widely the mixture is drawn from."""
-    session, gui, jobs, board = page.session, page.gui, page.jobs, page.board
+    session = page.session
+    gui = page.gui
+    jobs = page.jobs
+    board = page.board
     page.add_html(lambda modes, mode, step: mode_plot(modes, mode, step, PLOT_PX))
 
     def choose(key: str, _held: str) -> None:
@@ -62,7 +65,8 @@ def add_candidates(page: Page) -> None:
     warmth = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
     page.bind_number(warmth, partial(session.set_setting, "temperature"), _temperature)
     board.show(warmth, visible=lambda modes: bool(modes.ways))
-    solver, hint = page.solver, "What method paper answers with: the shipped network, or one trained in runs."
+    solver = page.solver
+    hint = "What method paper answers with: the shipped network, or one trained in runs."
     networks = gui.add_dropdown("Network", tuple(solver.networks()), hint=hint)
     page.bind(
         networks, partial(session.set_setting, "network"), lambda network: network or solver.first_network
@@ -83,7 +87,8 @@ def add_saving(page: Page) -> None:
     """The ways as a file."""
 
     def save() -> None:
-        best, modes = page.jobs.answering.seen().best, page.jobs.answering.modes
+        best = page.jobs.answering.seen().best
+        modes = page.jobs.answering.modes
         if best is not None and modes.shown and not page.jobs.answering.searching:
             page.designs.ways(best, modes)
 
@@ -139,7 +144,8 @@ def mode_table(modes: Modes, mode: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the fins."""
     if not modes.shown:
         return ""
-    of_fins, rows = any(not math.isnan(way.effort) for way, _, _ in modes.shown), []
+    of_fins = any(not math.isnan(way.effort) for way, _, _ in modes.shown)
+    rows = []
     for k, (way, name, badge) in enumerate(modes.shown):
         rows.append(
             html(

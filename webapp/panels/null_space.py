@@ -34,7 +34,8 @@ def add_null_space(page: Page) -> None:
                 continue
             low, high = known.ranges[k]
             step = 10.0 ** math.floor(math.log10(max(high - low, 1e-3)) - 2.5)
-            low, high = (math.ceil(low / step) * step, math.floor(high / step) * step)
+            low = math.ceil(low / step) * step
+            high = math.floor(high / step) * step
             value = shifts[k] if k < len(shifts) else 0.0
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
             put(slider, label=f"{known.names[k]} [N]", hint=f"Shares: {known.about[k]}.", step=step, **ends)

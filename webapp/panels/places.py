@@ -91,12 +91,16 @@ PLACES = (
 )
 
 
-CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
+CTRL = "cmd/ctrl"
+CTRL_SHIFT = "cmd/ctrl+shift"
+ALT = "alt"
 
 
 def add_keys(page: Page) -> None:
     """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow keys."""
-    session, robot, swimming = page.session, page.scenery.robot, page.jobs.swimming
+    session = page.session
+    robot = page.scenery.robot
+    swimming = page.jobs.swimming
 
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])

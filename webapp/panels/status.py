@@ -150,9 +150,11 @@ def corner(
 
 
 def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str) -> list[str]:
-    color, verdict = COLORS[verdict_of(allocation, in_reach)], verdict_sentence(allocation, in_reach)
+    color = COLORS[verdict_of(allocation, in_reach)]
+    verdict = verdict_sentence(allocation, in_reach)
     if refined:
-        color, verdict = DEAD, refined
+        color = DEAD
+        verdict = refined
     pill = "pill long" if len(verdict) > LONG else "pill"
     missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace("-", "−")
@@ -165,7 +167,8 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
         kept = f"least {word}" if is_least else word
         cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
-    method, ms = allocation.method, allocation.solve_ms
+    method = allocation.method
+    ms = allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
     error = "<span class='dim'>error</span> <b class='err'>{}</b>"

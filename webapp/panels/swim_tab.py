@@ -48,7 +48,9 @@ def _about(swim: SwimSettings, method: str) -> str:
 
 def add_run(page: Page) -> None:
     """Start, stop, and what can go wrong at any moment."""
-    session, gui, swimming = page.session, page.gui, page.jobs.swimming
+    session = page.session
+    gui = page.gui
+    swimming = page.jobs.swimming
 
     def start() -> None:
         swimming.start(session.swim.plan(session.state))
@@ -151,7 +153,8 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
         duration_s: of the whole swim [s].
     """
     rows = np.nan_to_num(record[:: 1 + len(record) * n // MOST])
-    seconds, power = rows[:, TIME], rows[:, POWER]
+    seconds = rows[:, TIME]
+    power = rows[:, POWER]
     if len(rows) > 1:
         ones = np.ones(max(1, min(len(rows), round(SMOOTH_S / float(seconds[1] - seconds[0])))))
         power = np.convolve(power, ones, "same") / np.convolve(np.ones(len(rows)), ones, "same")

@@ -44,7 +44,9 @@ def add_commands(page: Page) -> None:
 
 def add_target(page: Page) -> None:
     """Buttons and sliders."""
-    session, gui, board = page.session, page.gui, page.board
+    session = page.session
+    gui = page.gui
+    board = page.board
     presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
@@ -107,8 +109,10 @@ def add_speed(page: Page) -> None:
 
 
 def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
-    session, step = page.session, 0.01 if axis < 3 else 0.001
-    label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
+    session = page.session
+    step = 0.01 if axis < 3 else 0.001
+    label = f"{AXES[axis]} [{AXIS_UNITS[axis]}]"
+    hint = AXIS_WORDS[axis].capitalize()
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
@@ -145,7 +149,8 @@ def _sentence(ranges_error: str | None) -> str:
 
 
 def _hint(axis: int, low: float, reach: float) -> str:
-    word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
+    word = AXIS_WORDS[axis].capitalize()
+    unit = AXIS_UNITS[axis]
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."

@@ -112,7 +112,8 @@ class ActuatorNode:
             name, GIZMO_SIZE, disable_rotations=True, disable_sliders=True, **idle
         )
         self._axes = scene.add_frame(f"{name}/turn", show_axes=False)
-        parent, self._color = f"{name}/turn", fin_color(index)
+        parent = f"{name}/turn"
+        self._color = fin_color(index)
         self._moving = Shape(scene, f"{parent}/blade", self._color)
         self._spinning = Shape(scene, f"{parent}/blade/propeller", LIGHT.metal, side="double")
         self._mount = Shape(scene, f"{parent}/shaft", LIGHT.metal)
@@ -152,9 +153,12 @@ class ActuatorNode:
     ) -> None:
         """Show an actuator with its strut to the hull; `sizes` are of actuators and of arrows, `moved` shows
         its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that holds it."""
-        frame, place, (size, arrows) = np.array(part.frame), np.array(part.position), sizes
+        frame = np.array(part.frame)
+        place = np.array(part.position)
+        size, arrows = sizes
         slenderness, scale = shape_of(part, size)
-        is_fin, is_pod = part.LOOKS == "fin", part.LOOKS == "pod"
+        is_fin = part.LOOKS == "fin"
+        is_pod = part.LOOKS == "pod"
         inward = hull.anchor(place) - place
         self._moving.show(_moving, part.LOOKS, slenderness)
         self._mount.show(_mount, part.LOOKS, bool(inward @ frame[0] >= 0.0))

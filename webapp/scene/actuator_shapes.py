@@ -42,7 +42,8 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     if across is None:
         across = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
     # Cross products; `np.cross` takes ten times as long for few vectors.
-    left, right = tangent[:, [1, 2, 0]], tangent[:, [2, 0, 1]]
+    left = tangent[:, [1, 2, 0]]
+    right = tangent[:, [2, 0, 1]]
     first = left * across[[2, 0, 1]] - right * across[[1, 2, 0]]
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = left * first[:, [2, 0, 1]] - right * first[:, [1, 2, 0]]
@@ -57,8 +58,10 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
 def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
     """Triangles of a tube of so many rings, with a fan at each end whose middle points come last."""
     k = np.arange(sides)
-    n, last = np.roll(k, -1), (rows - 1) * sides
-    start, end = np.full(sides, rows * sides), np.full(sides, rows * sides + 1)
+    n = np.roll(k, -1)
+    last = (rows - 1) * sides
+    start = np.full(sides, rows * sides)
+    end = np.full(sides, rows * sides + 1)
     return np.concatenate([grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
 
 
@@ -179,7 +182,8 @@ def duct(along: int) -> Mesh:
 @cache
 def propeller(along: int) -> Mesh:
     """Three twisted blades, ahead of the struts; a node shows both their sides."""
-    radius, share = np.linspace(0.2, 0.9, 9), np.linspace(-0.5, 0.5, 5)
+    radius = np.linspace(0.2, 0.9, 9)
+    share = np.linspace(-0.5, 0.5, 5)
     pitch = np.arctan(0.42 / radius)[:, None]
     chord = (0.42 * np.sqrt(np.clip(1.0 - ((radius - 0.55) / 0.62) ** 2, 0.0, 1.0)))[:, None] * share
     place = np.stack([0.1 + chord * np.sin(pitch), radius[:, None] + 0 * chord, chord * np.cos(pitch)], -1)
@@ -188,7 +192,8 @@ def propeller(along: int) -> Mesh:
     faces = triangles(a, a + 1, a + 5, a + 1, a + 6, a + 5)
     blades = []
     for turn in 2.0 * np.pi * np.arange(N_BLADES) / N_BLADES:
-        c, s = np.cos(turn), np.sin(turn)
+        c = np.cos(turn)
+        s = np.sin(turn)
         blades.append(Mesh(place.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces))
     return _along(joined(*blades), along)
 

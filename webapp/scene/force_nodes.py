@@ -124,7 +124,8 @@ def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
 
 def unit_wedge() -> Mesh:
     """A narrow piece of the ring that a blade sweeps about its shaft, in the middle of its width."""
-    inner, outer = 0.035, CHORD - 0.004
+    inner = 0.035
+    outer = CHORD - 0.004
     ends = np.array([[inner, -1.0], [outer, -1.0], [outer, 1.0], [inner, 1.0]])
     radius, side = ends.T
     vertices = np.stack([0.0 * radius, -radius, radius * side * math.tan(WEDGE)], axis=1)
@@ -153,6 +154,7 @@ def _skew(rotation: Array) -> Array:
 
 def turned_about_x(wxyz: Array, angle: Array) -> Array:
     """Quaternions (..., 4) that turn by angles (...) [rad] about x before they turn by others (..., 4)."""
-    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    c = np.cos(angle / 2)
+    s = np.sin(angle / 2)
     w, x, y, z = np.moveaxis(wxyz, -1, 0)
     return np.stack([w * c - x * s, w * s + x * c, y * c + z * s, z * c - y * s], axis=-1)

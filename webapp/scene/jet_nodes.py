@@ -40,7 +40,8 @@ class JetNodes:
             self._hide(0)
             return
         diameter = known.places.diameter
-        jets, taken = jets_of(force, diameter), known.at_rest(force)
+        jets = jets_of(force, diameter)
+        taken = known.at_rest(force)
         speed = np.where(diameter > 0.0, jets.speed, 0.0)
         share = speed / max(float(speed.max()), 1e-9)
         ways = -np.round((LONGEST * diameter * share)[:, None] * jets.ahead, 3)

@@ -47,9 +47,12 @@ class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
     def __init__(self, client: viser.ClientHandle, session: Session, board: Board, intents: Intents) -> None:
-        self._client, self._session, self._do = client, session, intents.do
+        self._client = client
+        self._session = session
+        self._do = intents.do
         self._board = board
-        scene, session = self._client.scene, self._session
+        scene = self._client.scene
+        session = self._session
         self.root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
@@ -64,7 +67,8 @@ class RobotScene:
         self._moves: list[Motion] = []
         self._works: list[bool] = []
         self._size = view_size(session.state.layout)
-        self._arrow_size, self._top = 1.0, 0.0
+        self._arrow_size = 1.0
+        self._top = 0.0
         self._flaps = ""
         shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
         for show in (*shows, self._offer):
@@ -100,13 +104,16 @@ class RobotScene:
 
     def frame(self) -> None:
         """Bring the selected fin, or the whole robot, into the middle of the view, seen from where it is."""
-        session, (place, target) = self._session, self.camera
+        session = self._session
+        place, target = self.camera
         layout = session.state.layout
         hull = hull_of(layout)
-        center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
+        center = np.array(hull.center)
+        size = 2.6 * float(np.linalg.norm(hull.half))
         if session.selected is not None:
             place_of = layout.position[layout.index(session.selected)]
-            center, size = place_of, 0.55 * min(arrow_size(layout), 2.0 * part_size(layout))
+            center = place_of
+            size = 0.55 * min(arrow_size(layout), 2.0 * part_size(layout))
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
@@ -133,8 +140,10 @@ class RobotScene:
         dragged: int | None,
         swims: bool,
     ) -> None:
-        hull, sizes = hull_of(drawn), (part_size(drawn), arrow_size(drawn))
-        self._arrow_size, self._top = sizes[1], hull_top(drawn)
+        hull = hull_of(drawn)
+        sizes = (part_size(drawn), arrow_size(drawn))
+        self._arrow_size = sizes[1]
+        self._top = hull_top(drawn)
         while len(self._fins) < drawn.n:
             self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[drawn.n :]:
@@ -146,7 +155,8 @@ class RobotScene:
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])
-            moved, pinned = part.name == edited, part.name in stuck
+            moved = part.name == edited
+            pinned = part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
         self._forces.place(drawn, sizes)
         self._works = []
@@ -154,7 +164,8 @@ class RobotScene:
             self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
         else:
             index = drawn.index(edited)
-            part, color = drawn.actuators[index], fin_color(index)
+            part = drawn.actuators[index]
+            color = fin_color(index)
             self._direction.show(np.array(part.position), np.array(part.direction), sizes[1], color)
 
     def _push(
@@ -167,11 +178,14 @@ class RobotScene:
     ) -> None:
         lost = failed if moment is None else moment.lost
         if moment is not None:
-            commands, forces = moment.motion, moment.force
+            commands = moment.motion
+            forces = moment.force
         elif shown is not None:
-            commands, forces = shown.command, shown.forces
+            commands = shown.command
+            forces = shown.forces
         else:
-            commands, forces = np.full((drawn.n, 3), np.nan), np.zeros((drawn.n, 3))
+            commands = np.full((drawn.n, 3), np.nan)
+            forces = np.zeros((drawn.n, 3))
         scaled = LENGTH / scale.newtons
         works = [
             part.name not in lost and math.isfinite(commands[i, 0]) for i, part in enumerate(drawn.actuators)
@@ -216,11 +230,15 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        demanded, delivered, missing = np.array(target), np.zeros(6), np.zeros(6)
+        demanded = np.array(target)
+        delivered = np.zeros(6)
+        missing = np.zeros(6)
         if moment is not None:
-            demanded, delivered = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
+            demanded = moment.asked * FORCES_ONLY
+            delivered = moment.delivered * FORCES_ONLY
         elif shown is not None:
-            delivered, missing = shown.wrench, missing_part(shown)
+            delivered = shown.wrench
+            missing = missing_part(shown)
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
@@ -267,7 +285,8 @@ class RobotScene:
 
     def _turn(self, phase: str, aim: Array) -> None:
         session = self._session
-        name, (x, y, z) = session.selected, (float(v) for v in aim)
+        name = session.selected
+        x, y, z = (float(v) for v in aim)
         if name is not None:
             self._do(partial(session.point, name, (x, y, z), held=True))
         if phase == "end":

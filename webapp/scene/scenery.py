@@ -37,7 +37,9 @@ class Scenery:
         self, client: viser.ClientHandle, session: Session, swimming: Swimming, board: Board, intents: Intents
     ) -> None:
         """`board` lets it show the facts, `intents` takes what a user does in the view."""
-        self._client, self._session, self._swimming = client, session, swimming
+        self._client = client
+        self._session = session
+        self._swimming = swimming
         self._stop: Stop | None = None
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
@@ -70,7 +72,8 @@ class Scenery:
         self._swam = FIRST
         if (target, shown) != self._fitted:
             try:
-                self._scale, self._fitted = fitting_scale(target, shown, self._scale), (target, shown)
+                self._scale = fitting_scale(target, shown, self._scale)
+                self._fitted = (target, shown)
             except Exception as error:
                 self._scale = FIRST
                 self._fault(error)
@@ -102,7 +105,8 @@ class Scenery:
     def follow_guide(self) -> None:
         """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
         one, or to leave, ends a swim. At its end the camera stands where it stood before."""
-        session, before = self._session, self._stop
+        session = self._session
+        before = self._stop
         stop = self._stop = session.guide.stop
         if stop is before:
             return
@@ -133,7 +137,9 @@ class SwimScene:
 
     def __init__(self, client: viser.ClientHandle, swimming: Swimming, root: viser.FrameHandle) -> None:
         """`root` carries the robot."""
-        self._client, self._swimming, self._root = client, swimming, root
+        self._client = client
+        self._swimming = swimming
+        self._root = root
         scene = client.scene
         self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)
         self._reference = scene.add_icosphere(
@@ -162,10 +168,12 @@ class SwimScene:
             return
         if swimmer is not self._shown:
             self._begin(swimmer)
-        self._behind, self._ahead = self._ahead or moment, moment
+        self._behind = self._ahead or moment
+        self._ahead = moment
         self._clock = self._behind.time
         put(self._reference, position=moment.reference)
-        path, flow = swimmer.path, swimmer.shown.flow
+        path = swimmer.path
+        flow = swimmer.shown.flow
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
         places = moment.record[:, PLACE : PLACE + 3]
@@ -177,7 +185,8 @@ class SwimScene:
 
     def _begin(self, swimmer: Swimmer) -> None:
         """Another swim: its way, the robot at its start, and the camera where all of it can be seen."""
-        self._shown, self._ahead = swimmer, None
+        self._shown = swimmer
+        self._ahead = None
         self._goal.show(_goal, swimmer.path)
         put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
         start = swimmer.shown.pose
@@ -197,7 +206,9 @@ class SwimScene:
 
     def animate(self, elapsed: float) -> None:
         """Move on by some time on the wall [s], towards the last moment and never beyond it."""
-        swimming, behind, ahead = self._swimming, self._behind, self._ahead
+        swimming = self._swimming
+        behind = self._behind
+        ahead = self._ahead
         if (
             behind is None
             or ahead is None
@@ -207,7 +218,8 @@ class SwimScene:
             return
         self._clock = min(self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time)
         share = (self._clock - behind.time) / (ahead.time - behind.time)
-        start, end = behind.pose, ahead.pose.copy()
+        start = behind.pose
+        end = ahead.pose.copy()
         if start[3:] @ end[3:] < 0:
             end[3:] *= -1.0
         self._pose((1 - share) * start + share * end)

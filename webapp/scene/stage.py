@@ -62,7 +62,8 @@ class Stage:
         # Surfaces that mirror a picture, viser's default, take twice the time without a graphics card.
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
-        mesh, bow = hull.mesh, _bow(hull)
+        mesh = hull.mesh
+        bow = _bow(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
         self._axes = scene.add_frame(

@@ -49,7 +49,8 @@ class Scale(NamedTuple):
 def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale) -> Scale:
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
     demanded = np.array(target)
-    forces, torques = [demanded[:3]], [demanded[3:]]
+    forces = [demanded[:3]]
+    torques = [demanded[3:]]
     if shown is not None:
         forces += [shown.wrench[:3], *shown.forces]
         torques += [missing_part(shown)[3:], shown.wrench[3:]]
@@ -109,7 +110,8 @@ class WrenchNodes:
         self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
         for node in self._nodes:
             node.scale = size
-        asked, delivered = size * scale * target[:3], size * scale * got[:3]
+        asked = size * scale * target[:3]
+        delivered = size * scale * got[:3]
         starts = np.stack([np.zeros(3), delivered])
         ways = np.stack([delivered, size * scale * missing[:3]])
         self._forces.show(starts, ways, [DELIVERED, MISSING], size)
@@ -234,8 +236,10 @@ class DirectionHandle:
 
     def __init__(self, client: viser.ClientHandle, on_turn: Callable[[str, Array], None]) -> None:
         """`on_turn` gets `update` or `end`, and a direction (3,) in the body frame."""
-        self._client, self._on_turn = client, on_turn
-        self._size, self._direction = 1.0, np.array([1.0, 0.0, 0.0])
+        self._client = client
+        self._on_turn = on_turn
+        self._size = 1.0
+        self._direction = np.array([1.0, 0.0, 0.0])
         scene = client.scene
         self._root = scene.add_frame("/robot/direction", show_axes=False, visible=False)
         way = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
@@ -250,9 +254,11 @@ class DirectionHandle:
     def _dragging(self, sign: float) -> Callable[[Any], Any]:
         async def dragged(event: Any) -> None:
             if event.phase != "start":
-                center, eye = np.array(self._root.position), np.array(self._client.camera.position)
+                center = np.array(self._root.position)
+                eye = np.array(self._client.camera.position)
                 aim = np.array(event.end_position) - eye
-                before, radius = sign * self._direction, NEEDLE * self._size
+                before = sign * self._direction
+                radius = NEEDLE * self._size
                 self._direction = sign * snapped(on_sphere(eye - center, aim, radius, before))
                 self._turn()
                 self._on_turn(event.phase, self._direction)
@@ -263,7 +269,8 @@ class DirectionHandle:
         """Show the direction (3,) of what stands at a place (3,) [m]; None hides it."""
         put(self._root, visible=place is not None)
         if place is not None:
-            self._size, self._direction = size, direction
+            self._size = size
+            self._direction = direction
             put(self._root, position=place)
             put(self._needle, scale=size)
             for end, sign in self._ends:

@@ -68,8 +68,11 @@ class Core:
         """After any change of the state: a choice of mode is void, an actuator that is gone is not selected;
         one that is called otherwise now stays so."""
         self.revision += 1
-        self.mode, self.step, self.shifts = 0, None, ()
-        old, names = before.layout.names, self.state.layout.names
+        self.mode = 0
+        self.step = None
+        self.shifts = ()
+        old = before.layout.names
+        names = self.state.layout.names
         called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
         now = (name if name in names else called.get(name) for name in self.chosen)
         self.chosen = tuple(name for name in now if name is not None)
@@ -85,7 +88,8 @@ class Core:
     def _step(self, verb: str, source: Steps, sink: Steps) -> str:
         if not source:
             raise FinlabError(f"there is nothing to {verb}")
-        before, (name, state) = self.state, source.pop()
+        before = self.state
+        name, state = source.pop()
         sink.append((name, before))
         self.history.replace(state.asking(before))
         self.settle(before)

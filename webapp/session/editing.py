@@ -35,7 +35,8 @@ class Session(Core):
         self.guide.stop = None  # nothing comes back
         self._commit("Start over", self._first)
         self.saved = self._first.layout
-        self.chosen, self.mode = (), 0
+        self.chosen = ()
+        self.mode = 0
 
     # Robots.
 
@@ -97,7 +98,8 @@ class Session(Core):
     def set_jets(self, on: Any) -> None:
         """Whether jets count: by the robot's own interaction where it was opened or saved with one, else by
         the usual constants."""
-        layout, saved = self.state.layout, self.saved
+        layout = self.state.layout
+        saved = self.saved
         own = saved.interaction if saved.names == layout.names else None
         interaction = (layout.interaction or own or Jets()) if on else None
         changed = self.state.with_layout(replace(layout, interaction=interaction))
@@ -124,7 +126,8 @@ class Session(Core):
 
     def rename(self, name: str, wanted: str) -> None:
         """An actuator with another name; whatever is known of it goes on under that."""
-        wanted, layout = wanted.strip(), self.state.layout
+        wanted = wanted.strip()
+        layout = self.state.layout
         if wanted != name:
             if wanted in layout.names:
                 raise FinlabError(f"there is an actuator {wanted!r:.70} already; give another name")
@@ -247,8 +250,10 @@ class Session(Core):
         merge_key: str | None = None,
     ) -> None:
         """One step for several actuators; twins follow unless they are among them already."""
-        before, links = self.state.layout, self.state.links
-        layout, done = before, set[str]()
+        before = self.state.layout
+        links = self.state.links
+        layout = before
+        done = set[str]()
         for name in reversed(names):  # the one that was chosen last leads its twin
             if partner(links, name) not in done:
                 layout = followed(before, change(layout, name), links, name)

@@ -88,7 +88,8 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
     stem = file_stem(layout.name)
     inside, tables = with_tables_inside(layout)
     inside, hull = design_files.with_hull_inside(inside)
-    text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
+    text = yaml_text(layout_to_dict(inside)).encode()
+    parts = {**tables, **hull}
     return design_name(layout), pack({f"{stem}.yaml": text, **parts}) if parts else text
 
 
@@ -143,7 +144,8 @@ def packed(layout: Layout, most: int = MAX_LINK) -> str:
 def unpacked(text: str) -> design_files.Opened:
     """The design in a link, checked like an upload; it may be anything. FinlabError: it holds no design, or a
     wrong one."""
-    kind, coded = text[:1], text[1:]
+    kind = text[:1]
+    coded = text[1:]
     try:
         data = base64.b64decode(coded + "=" * (-len(coded) % 4), altchars=b"-_", validate=True)
         if kind == PLAIN:

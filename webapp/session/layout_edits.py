@@ -78,7 +78,8 @@ def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
 def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     """The layout with copies of an actuator, so that `count` of them stand evenly around a body axis.
     FinlabError: the actuator stands on the axis, or there is no such axis."""
-    part, axis = layout.part(name), np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
+    part = layout.part(name)
+    axis = np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
         raise FinlabError(f"{name} stands on the {around} axis, so its copies would all be in one place")
     all_of_them = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
@@ -238,7 +239,8 @@ def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
     twin = partner(links, name)
     if twin is None or twin not in layout.names:
         return layout
-    wanted, old = layout.part(name).image(), layout.part(twin)
+    wanted = layout.part(name).image()
+    old = layout.part(twin)
     count = len(old.AXES)
     past = np.sum(np.array(before.part(name).image().frame) * before.part(twin).frame, axis=1)
     frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]

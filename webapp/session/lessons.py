@@ -77,7 +77,8 @@ class _Course(Struct, forbid_unknown_fields=True):
 
 _FILE = Path(__file__).with_name("lessons.yaml")
 _course = checked(parse_yaml(_FILE.read_text("utf-8"), _FILE.name), _Course)
-TOUR, LESSONS = _course.tour, _course.lessons
+TOUR = _course.tour
+LESSONS = _course.lessons
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
 KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
 """What of a session comes back at the end."""
@@ -97,19 +98,23 @@ class Guide:
     def open(self, name: str) -> None:
         """Prepare the state of a stop; what was there before comes back at the end. FinlabError: there is no
         such stop."""
-        stop, session = BY_NAME[chosen(name, "lesson", BY_NAME)], self._session
+        stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
+        session = self._session
         if self.stop is None:
             self._left = {key: getattr(session, key) for key in KEPT}
         self._enter(History(stop.state))  # what can be undone is what is done here
-        self.stop, self.solved = stop, False
-        session.saved, session.chosen = stop.state.layout, ()
+        self.stop = stop
+        self.solved = False
+        session.saved = stop.state.layout
+        session.chosen = ()
         session.desk = Desk()
         session.show_drawer(stop.drawer)
         session.mode = stop.mode
         session.display = replace(session.display, drawn="none")
 
     def _enter(self, history: History) -> None:
-        before, self._session.history = self._session.state, history
+        before = self._session.state
+        self._session.history = history
         self._session.settle(before)
 
     def go(self, steps: int) -> None:

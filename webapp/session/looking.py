@@ -112,7 +112,8 @@ class SearchRequest:
                 *reach, turn = self.way
                 around = Bounds.around(part, reach, math.radians(turn))
                 if is_mirrored(part, part):  # it stays in the mirror plane
-                    y, angle = part.position[1], azimuth(part)
+                    y = part.position[1]
+                    angle = azimuth(part)
                     tilt = around.tilt if abs(part.frame[0][1]) < 0.5 else (0.0, 0.0)
                     around = replace(around, y=(y, y), mounting_angle=(angle, angle), tilt=tilt)
                 bounds[part.name] = around

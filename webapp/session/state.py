@@ -223,8 +223,10 @@ class History:
         same = merge_key is not None and merge_key == self.merge_key
         if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
             self.past.append((name, self.state))
-            self.past, self.future = self.past[-MAX_STEPS:], []
-        self.merge_key, self._merge_time = merge_key, now
+            self.past = self.past[-MAX_STEPS:]
+            self.future = []
+        self.merge_key = merge_key
+        self._merge_time = now
         self.state = state
 
     def replace(self, state: State) -> None:

@@ -69,7 +69,8 @@ class SwimSettings:
             FinlabError: the scenario takes more fins away than the robot has, or the controller is not for
                 this robot.
         """
-        day, layout = self.day, self.day.believed(state.able)
+        day = self.day
+        layout = self.day.believed(state.able)
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         make_controller(self.controller, layout)
         affected = _affected(layout, state.failed, day)

@@ -41,7 +41,10 @@ class Findings:
 @lru_cache(maxsize=32)
 def find(question: Question) -> Findings:
     """Answer a question; takes about a second, but all first pages ask the same."""
-    layout, failed, saved, flow = question.layout, question.failed, question.saved, question.flow
+    layout = question.layout
+    failed = question.failed
+    saved = question.saved
+    flow = question.flow
     other = saved != layout
     # An actuator that the other layout does not have cannot have failed there.
     lost = tuple(name for name in failed if name in saved.names)

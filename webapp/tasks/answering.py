@@ -55,7 +55,9 @@ class Answering:
         """Answer what the page's session asks."""
         self._session: Session = context.session
         self._shown: tuple[Allocation, Array, Allocation] | None = None
-        pool, bell, solver = context.pools.answers, context.bell, context.solver
+        pool = context.pools.answers
+        bell = context.bell
+        solver = context.solver
         self.slot: Slot[State, Reply] = Slot(pool, bell, solver.reply, live=True, title="No answer")
         self.search: Slot[Search, Modes] = Slot(
             pool, bell, find_ways, rest_s=SEARCH_REST_S, title="No candidates"
@@ -80,8 +82,12 @@ class Answering:
 
     def seen(self) -> Seen:
         """What is seen of the newest answer now."""
-        session, search, reply = self._session, self.search, self.slot.answer
-        busy, modes, mode = self.busy, search.answer or NO_MODES, session.mode
+        session = self._session
+        search = self.search
+        reply = self.slot.answer
+        busy = self.busy
+        modes = search.answer or NO_MODES
+        mode = session.mode
         searching = busy or search.answered is not search.question
         known = search.answered is not None and search.answered.reply is reply
         best = shown = None if reply is None else reply.answer
@@ -118,7 +124,8 @@ class Answering:
         found, where these can be seen."""
         session = self._session
         self.slot.ask(session.state)
-        reply, before = self.slot.answer, self.search.question
+        reply = self.slot.answer
+        before = self.search.question
         if reply is None:
             self.search.forget()
             return
@@ -145,7 +152,8 @@ class Refining:
     """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said."""
 
     def __init__(self, context: Context, answering: Answering) -> None:
-        self._session, self._bell = context.session, context.bell
+        self._session = context.session
+        self._bell = context.bell
         self._answering = answering
         self._due: float | None = None
         self._held = 0
@@ -160,7 +168,8 @@ class Refining:
         if self.running:
             self.stop()
             return
-        session, modes = self._session, self._answering.modes
+        session = self._session
+        modes = self._answering.modes
         if self._answering.searching or not modes.steps:
             raise FinlabError("the network proposes nothing here whose refinement could be shown")
         if modes.proposal_of(session.mode) is None:  # the answer of another method: then the network's best
@@ -186,7 +195,9 @@ class Refining:
         """Take the next step, when its time has come."""
         if self._due is None or time.monotonic() < self._due:
             return False
-        session, steps, self._due = self._session, self._answering.modes.steps, None
+        session = self._session
+        steps = self._answering.modes.steps
+        self._due = None
         looked_at = session.opened == WAYS[0]
         if self._answering.searching or not steps or not looked_at:
             session.step = None

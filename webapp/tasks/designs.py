@@ -49,8 +49,11 @@ class Designs:
         notify: Callable[..., None],
     ) -> None:
         """`notify` shows a note: title and sentence, and whether it is `calm`."""
-        self._client, self._session, self._solver = client, session, solver
-        self._deferred, self._notify = deferred, notify
+        self._client = client
+        self._session = session
+        self._solver = solver
+        self._deferred = deferred
+        self._notify = notify
 
     def new(self, kind: str) -> None:
         """A robot with one hull and one actuator of a type."""
@@ -101,7 +104,8 @@ class Designs:
 
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
-        layout, target = self._session.state.layout, self._session.state.target
+        layout = self._session.state.layout
+        target = self._session.state.target
 
         def show(text: str) -> None:
             wrench = WRENCH + ",".join(f"{value:.6g}" for value in target)
@@ -113,7 +117,8 @@ class Designs:
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried out on the
         page does not go to the robot."""
-        now, solver = self._session.state, self._solver
+        now = self._session.state
+        solver = self._solver
         shipped = State(now.layout, method=now.method)
         self._export(
             file_stem(now.layout.name) + files.BUNDLE,

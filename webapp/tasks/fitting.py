@@ -78,7 +78,8 @@ class Fitting(Slot[Upload, Fitted]):
 
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        found, session = self.answer, self._session
+        found = self.answer
+        session = self._session
         if found is not None:
             old = found.upload.part
             alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
@@ -88,14 +89,17 @@ class Fitting(Slot[Upload, Fitted]):
 
     def attend(self) -> bool:
         """Put what was found on its actuator. FinlabError: that is another one by now."""
-        was_busy, came = self.busy, super().attend()
+        was_busy = self.busy
+        came = super().attend()
         if was_busy and not self.busy and self.answer is not None:
             self._put_on(self.answer)
         return came
 
     def _put_on(self, fitted: Fitted) -> None:
-        upload, session = fitted.upload, self._session
-        name, layout = upload.part.name, session.state.layout
+        upload = fitted.upload
+        session = self._session
+        name = upload.part.name
+        layout = session.state.layout
         if name not in layout.names or _model(layout.part(name)) != _model(upload.part):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
@@ -156,7 +160,8 @@ def _bench(path: Path, done: Upload) -> Fitted:
     from finlab.fit.thruster_fit import fit_thruster
 
     def within(table: PowerTable) -> dict[str, Any]:
-        least, most = table.rows[0][1], table.rows[-1][1]
+        least = table.rows[0][1]
+        most = table.rows[-1][1]
         return {"model": table, "force": (max(least, 0.0) if done.part.TURNS else least, most)}
 
     with suppress(LayoutError):

@@ -101,8 +101,10 @@ class Improver(Slot[Search, Improvement]):
 
 def improve(search: Search, work: Work[Search]) -> Improvement:
     """The best layout that is found until the work is cancelled, or all rounds are done."""
-    layout, state = search.state.layout, search.state
-    left, rests = layout.without(state.failed), time.monotonic()
+    layout = search.state.layout
+    state = search.state
+    left = layout.without(state.failed)
+    rests = time.monotonic()
 
     def report(progress: Progress) -> None:
         nonlocal rests

@@ -29,7 +29,9 @@ class Jobs:
     def __init__(self, context: Context) -> None:
         self._session = context.session
         self._robot: tuple[str, tuple[str, ...]] | None = None
-        bell, pools, solver = context.bell, context.pools, context.solver
+        bell = context.bell
+        pools = context.pools
+        solver = context.solver
         self.answering = Answering(context)
         self.refining = Refining(context, self.answering)
         self.ranging: Slot[State, Ranges] = Slot(pools.brief, bell, find_ranges, rest_s=REST_S)
@@ -47,7 +49,8 @@ class Jobs:
 
     def ask(self) -> None:
         """Have what can be seen worked out; a question that was asked already costs nothing."""
-        session, state = self._session, self._session.state
+        session = self._session
+        state = self._session.state
         robot = state.layout.name, state.layout.names
         if self._robot != robot:
             # What is known of another robot must not stand under this one's name.

@@ -14,7 +14,8 @@ MOST = 6
 """Directions that have a slider."""
 NAMED, MOST_NAMED = 0.1, 4
 """Share of a direction from which an actuator is named by its number, and how many are."""
-OTHER, MEAN = "another way", "average of 1 and 2"
+OTHER = "another way"
+MEAN = "average of 1 and 2"
 
 
 def null_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:

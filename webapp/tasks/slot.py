@@ -169,8 +169,12 @@ class Slot(Generic[Question, Answer]):
             watched: whether `solve` also gets the `Work`: to report, and to see that it is cancelled.
             title: heading of the note that tells of an error; empty where the page says it elsewhere.
         """
-        self._pool, self._bell, self._solve = pool, bell, solve
-        self._rest_s, self._live, self._watched = rest_s, live, watched
+        self._pool = pool
+        self._bell = bell
+        self._solve = solve
+        self._rest_s = rest_s
+        self._live = live
+        self._watched = watched
         self.title = title
         self._work: Work[Question] | None = None
         self._due: float | None = None
@@ -254,7 +258,8 @@ class Slot(Generic[Question, Answer]):
         work.future.add_done_callback(partial(self._bell.ring_from_thread, self))
 
     def _cancel(self) -> None:
-        work, self._work = self._work, None
+        work = self._work
+        self._work = None
         if work is not None:
             work.cancelled.set()
             if work.future is not None:
@@ -266,7 +271,9 @@ class Deferred:
 
     def __init__(self, pool: Pool, bell: Bell, do: Callable[[Callable[[], object]], None]) -> None:
         """`do` carries out an intent of the user: what is done with a result, or a refusal."""
-        self._pool, self._bell, self._do = pool, bell, do
+        self._pool = pool
+        self._bell = bell
+        self._do = do
         self._begun: dict[Hashable, tuple[Future[Any], Callable[[Any], object]]] = {}
         self._next: dict[Hashable, tuple[Callable[[], Any], Callable[[Any], object]]] = {}
 

@@ -83,7 +83,8 @@ def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple
     a network proposed for it, and its refinement."""
     layout = answer.layout
     modes = find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
-    shown, last = named_modes(modes, badge), ways[-1].command
+    shown = named_modes(modes, badge)
+    last = ways[-1].command
     signatures = mode_signature(last, force_sizes(layout, last))
     ends = np.full(len(last), -1)
     for k, named in reversed(list(enumerate(shown))):
@@ -174,7 +175,8 @@ class Solver:
     def allocator(self, state: State) -> Allocator:
         """The allocator for a state's robot, method and settings, one of the last few or made now; fails
         where it cannot be made."""
-        layout, method = state.layout, state.method
+        layout = state.layout
+        method = state.method
         temperature = state.temperature if method in DRAWING else None
         network = (state.network or self.first_network) if method == "paper" else ""
         key = layout, method, temperature, network
@@ -222,7 +224,8 @@ class Solver:
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
         milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
-        answer, state = reply.answer, reply.state
+        answer = reply.answer
+        state = reply.state
         _ = answer.bound  # to prove what is least takes longer than to find it
         if answer.unknown_fins or not answer.reachable:
             _ = answer.notes  # the page shows them
@@ -234,7 +237,8 @@ class Solver:
         if not (reply.in_reach and answer.effort is not None and asks):  # effort is of fins
             return NO_MODES
         if state.method == "mdn" and answer.candidates is not None:
-            own, badge = answer.candidates.rows([0]), "network"
+            own = answer.candidates.rows([0])
+            badge = "network"
         else:
             costs = np.array([answer.effort]), np.array([answer.power])
             error = np.array([answer.err_norm])

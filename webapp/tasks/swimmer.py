@@ -92,7 +92,8 @@ def figures_of(rows: Array, period_s: float) -> Figures | None:
     """What a whole record (N, ...) with a row per period [s] comes to; None where it has no rows."""
     if not len(rows):
         return None
-    power, duration = rows[:, POWER], len(rows) * period_s
+    power = rows[:, POWER]
+    duration = len(rows) * period_s
     return Figures(
         track_m=float(np.sqrt(np.mean(rows[:, ERROR] ** 2))),
         depth_m=float(np.sqrt(np.mean(rows[:, DEPTH_ERROR] ** 2))),
@@ -107,8 +108,12 @@ class Swimmer:
 
     def __init__(self, plan: Plan, swim: ClosedLoop) -> None:
         """Take over a swim that is at its start."""
-        self.method, self.swim, self._plan = plan.method, swim, plan
-        self.layout, self.fins, self.period_s = swim.layout, swim.layout.names, swim.period_s
+        self.method = plan.method
+        self.swim = swim
+        self._plan = plan
+        self.layout = swim.layout
+        self.fins = swim.layout.names
+        self.period_s = swim.period_s
         times = np.linspace(0.0, swim.task.duration_s, POINTS)
         self.path: Array = np.array([swim.task.setpoint(float(t)).position for t in times])
         """The way to go (POINTS, 3) [m]."""
@@ -153,7 +158,8 @@ class Swimmer:
 
     def moment(self) -> Moment:
         """What there is to show after the last step; called on the thread that swims."""
-        swim, n = self.swim, len(self.fins)
+        swim = self.swim
+        n = len(self.fins)
         last = self._ticks[-1] if self._ticks else None
         chances = np.zeros(n) if last is None else last.fault_probability
         rows = np.array(self._rows) if self._rows else np.zeros((0, FORCES + 2 * n))
@@ -181,7 +187,8 @@ class Swimmer:
 
 def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
     """The swim of a plan with an allocator, at its start."""
-    layout, day = plan.layout, plan.day
+    layout = plan.layout
+    day = plan.day
     swim = ClosedLoop(
         layout,
         allocator,

@@ -67,7 +67,8 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
 
     def attend(self) -> bool:
         """Take the robot, or what it has swum. FinlabError: it cannot go on."""
-        was_busy, came = self.busy, super().attend()
+        was_busy = self.busy
+        came = super().attend()
         if not was_busy or self.busy:
             return came
         if isinstance(self.answer, Swimmer):
@@ -87,7 +88,9 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
     def halt(self) -> None:
         """Give up and forget."""
         self.forget()
-        self.swimmer, self.running, self.active = None, False, False
+        self.swimmer = None
+        self.running = False
+        self.active = False
         self._acts.clear()
         self.pace.start_anew()
 
@@ -130,7 +133,8 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
 
     def _submit(self, n_steps: int) -> None:
         if self.swimmer is not None and not self.busy:
-            acts, self._acts = tuple(self._acts), []
+            acts = tuple(self._acts)
+            self._acts = []
             self.ask(Stretch(n_steps, self.swimmer, acts))
 
 
@@ -139,7 +143,9 @@ def swum(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Mo
     if isinstance(question, Plan):
         allocator = solver.allocator(State(question.layout, method=question.method))
         return Swimmer(question, closed_loop(question, allocator))
-    end, done, swimmer = time.monotonic() + BUDGET_S, 0, question.swimmer
+    end = time.monotonic() + BUDGET_S
+    done = 0
+    swimmer = question.swimmer
     for act in question.acts:
         act(swimmer)
     while done < question.n_steps and not swimmer.swim.done:
@@ -187,5 +193,6 @@ class Pace:
         """Simulated time per time on the wall over the last moments; None before it is known."""
         if len(self._past) < 2:
             return None
-        (wall, start), (now, end) = self._past[0], self._past[-1]
+        wall, start = self._past[0]
+        now, end = self._past[-1]
         return (end - start) / (now - wall) if now - wall > 0.5 else None

@@ -38,7 +38,8 @@ class TableBound:
         self._axes: list[list[Any]] = []
         each = []
         for k in (2, 0, 1):
-            knots, limits = closed_axes(law.grid)[k], (float(lower[k]), float(upper[k]))
+            knots = closed_axes(law.grid)[k]
+            limits = (float(lower[k]), float(upper[k]))
             *axis, ends = _axis(knots, law.periodic and k == 2, *limits, k == 2)
             self._axes.append(axis)
             each.append(ends)
@@ -54,7 +55,9 @@ class TableBound:
 
     def _block(self, price: Array) -> Array:
         factor = np.zeros((len(price) + 1, self._values.shape[-1]))
-        factor[:-1, :3], factor[-1, 3:] = price, 1.0  # at last power
+        # at last power
+        factor[:-1, :3] = price
+        factor[-1, 3:] = 1.0
         cells = self._cells(factor) if self._kept is None else np.tensordot(factor, self._kept, 1)
         inner = 1, 2, 3
         bound, corner = self._bounds(cells[:-1], cells[-1:], self._ends)
@@ -65,7 +68,8 @@ class TableBound:
         most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
         places: list[NDArray[np.intp]] = list(np.nonzero(left))
         row, *place = places
-        bound, ends = bound[left], self._ends[*place]
+        bound = bound[left]
+        ends = self._ends[*place]
         pair = np.stack([cells[row, *place], cells[-1, *place]], axis=1)
         for _ in range(ROUNDS):
             if not 0 < 8 * len(row) <= MOST_CELLS:
@@ -75,7 +79,10 @@ class TableBound:
             np.maximum.at(best, row, corner)
             left = bound > (best + CLOSE * np.abs(best) + slack)[row]
             np.maximum.at(most, row[~left], bound[~left])
-            pair, ends, row, bound = pair[left], ends[left], row[left], bound[left]
+            pair = pair[left]
+            ends = ends[left]
+            row = row[left]
+            bound = bound[left]
         np.maximum.at(most, row, bound)
         return np.asarray(np.maximum(most, best) + ROUNDING * slack / NOTHING)
 
@@ -102,9 +109,11 @@ class TableBound:
             return np.minimum(_largest(paid - power, 3), _largest(paid, 3)), _largest(corner - least, 3)
         # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
         # tangent in the middle.
-        amplitude, frequency = ends[..., 1, :], ends[..., 2, :]
+        amplitude = ends[..., 1, :]
+        frequency = ends[..., 2, :]
         exact = self._blade.power(amplitude[..., None], frequency[..., None, :])
-        middle, one = amplitude.mean(axis=-1), np.ones(())
+        middle = amplitude.mean(axis=-1)
+        one = np.ones(())
         across = (amplitude[..., 1] - amplitude[..., 0])[..., None] * (np.arange(4) / 3.0 - 0.5)
         slope = self._blade.power_gradient(middle, one)[0][..., None]
         tangent = self._blade.power(middle, one)[..., None] + slope * across
@@ -123,7 +132,8 @@ def _split(pair: Array, ends: Array, row: NDArray[np.intp]) -> tuple[Array, Arra
     for _ in range(3):
         pair = np.tensordot(pair, _SPLIT, ([2], [1]))
     eighths = pair.reshape(-1, 2, 2, 4, 2, 4, 2, 4).transpose(0, 2, 4, 6, 1, 3, 5, 7).reshape(-1, 2, 4, 4, 4)
-    first, last = ends[..., 0], ends[..., 1]
+    first = ends[..., 0]
+    last = ends[..., 1]
     middle = 0.5 * (first + last)
     halves = np.stack([np.stack([first, middle], -1), np.stack([middle, last], -1)], axis=-2)
     once = ~((first == last)[:, None] & (_EIGHTHS == 1)).any(axis=-1).ravel()
@@ -135,9 +145,11 @@ def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) ->
     """Of the cells of an axis with knots (n,), cut at limits: the places (c, 4) of their neighbours in a
     table with a rim, the Bernstein coefficients by the values there (c, 4, 4), and the ends (c, 2), twice
     the first one outside the knots, where the nearer one counts."""
-    middle, cuts = 0.5 * (knots[0] + knots[-1]), knots
+    middle = 0.5 * (knots[0] + knots[-1])
+    cuts = knots
     if turns:
-        low, high = low - ROUNDING, high + ROUNDING
+        low = low - ROUNDING
+        high = high + ROUNDING
         cuts = np.add.outer(TURN * np.arange(-3, 4), np.append(knots, middle + 0.5 * TURN)).ravel()
     cuts = np.unique([low, *cuts[(cuts > low) & (cuts < high)], high])
     ends = np.stack([cuts[:-1], cuts[1:]], axis=-1) if len(cuts) > 1 else np.array([[low, low]])

@@ -131,10 +131,17 @@ class Fin(Actuator):
     }
     WRITTEN: ClassVar[Collection[str]] = ("limits", "model")
     type: ClassVar[str] = "fin"
-    LAW, GROUP = FinLaw, FinGroup
-    NUMBERS, COMMAND = (("A", "rad"), ("f", "Hz"), ("phi", "rad")), FinCommand
-    AXES, PUSHES, ANGLE, HELD = ("shaft", "zero"), (1, 2), 2, 2
-    FAULTS, LOOKS, OTHER = ("weak", "torn", "stuck", "running"), "fin", "Zero"
+    LAW = FinLaw
+    GROUP = FinGroup
+    NUMBERS = (("A", "rad"), ("f", "Hz"), ("phi", "rad"))
+    COMMAND = FinCommand
+    AXES = ("shaft", "zero")
+    PUSHES = (1, 2)
+    ANGLE = 2
+    HELD = 2
+    FAULTS = ("weak", "torn", "stuck", "running")
+    LOOKS = "fin"
+    OTHER = "Zero"
     BOXES = (
         Box("A [°]", "amplitude", "Half of the beat: least and most, up to 90.", 5.0, True, pair=True),
         Box("f [Hz]", "frequency", f"Least and most, up to {MAX_FREQUENCY:g} Hz.", pair=True),
@@ -204,7 +211,8 @@ class Fin(Actuator):
         """The fin's own axes in the body frame: shaft, zero, shaft x zero."""
         if self.shaft is None or self.zero is None:
             angle = self.mounting_angle or 0.0
-            c, s = math.cos(angle), math.sin(angle)
+            c = math.cos(angle)
+            s = math.sin(angle)
             return (c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)
         return self.shaft, self.zero, axes.cross(self.shaft, self.zero)
 
@@ -266,7 +274,8 @@ class Fin(Actuator):
         return fin_table(self).largest
 
     def damaged(self, faults: Faults) -> Self:
-        own, model = self.limits, self.model if faults.torn is None else self.model.scaled(faults.torn)
+        own = self.limits
+        model = self.model if faults.torn is None else self.model.scaled(faults.torn)
         if faults.running is not None:
             amplitude, frequency, direction = ((value, value) for value in faults.running)
             return replace(self, model=model, limits=Limits(amplitude, frequency, direction))
@@ -279,7 +288,8 @@ class Fin(Actuator):
 
     @property
     def limits_words(self) -> str:
-        (a, b), (c, d) = self.limits.amplitude, self.limits.frequency
+        a, b = self.limits.amplitude
+        c, d = self.limits.frequency
         arc = axes.arc_words(*self.limits.zero_direction)
         return f"A {a:g}..{b:g} rad, f {c:g}..{d:g} Hz, {arc}, {self.model.type}"
 
@@ -298,7 +308,8 @@ class Fin(Actuator):
         there."""
         level = self.mounting_angle is not None
         frame = np.array(self.frame) * axes.MIRROR * ([[1.0], [-1.0], [1.0]] if level else 1.0)
-        limits, (low, high) = self.limits, self.limits.zero_direction
+        limits = self.limits
+        low, high = self.limits.zero_direction
         if not axes.is_full_turn(high - low):
             middle = float(axes.wrapped((math.pi if level else 0.0) - 0.5 * (low + high)))
             half = 0.5 * (high - low)

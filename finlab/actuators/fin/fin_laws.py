@@ -93,8 +93,14 @@ class Soft(PlanarLaw):
 
     def __init__(self, k: Any, p: Any, x0: Any, q: Any, e: Any, phi_e: Any, d: Any) -> None:
         """Takes thrust scale [N], exponents, saturation [rad Hz], unevenness, its angle and lean [rad]."""
-        self._k, self._p, self._x0, self._q, self._e, self._phi_e = k, p, x0, q, e, phi_e
-        self.offset, self.unevenness = d, (e, phi_e)
+        self._k = k
+        self._p = p
+        self._x0 = x0
+        self._q = q
+        self._e = e
+        self._phi_e = phi_e
+        self.offset = d
+        self.unevenness = (e, phi_e)
         self.uniform = not np.any(e)
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:

@@ -69,7 +69,8 @@ class FinGroup(Group):
         """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process.
         Raises DataError: a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
-        self._tables, self._effectiveness = tables, effectiveness
+        self._tables = tables
+        self._effectiveness = effectiveness
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
@@ -165,7 +166,9 @@ class _Box:
     """One fin's law within the limits of amplitude and frequency, in its strongest direction."""
 
     def __init__(self, law: FinLaw, lower: Array, upper: Array) -> None:
-        self.law, self.lower, self.upper = law, lower, upper
+        self.law = law
+        self.lower = lower
+        self.upper = upper
         self.turn = float(np.clip(0.0, lower[2], upper[2]))
         if not law.uniform:
             turns, across = self.all_round
@@ -177,7 +180,8 @@ class _Box:
     def all_round(self) -> tuple[Array, Array]:
         """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by a coarse
         grid."""
-        low, high = self.lower[2], self.upper[2]
+        low = self.lower[2]
+        high = self.upper[2]
         if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
         turns = np.linspace(low, high, POINTS + 1)
@@ -225,7 +229,8 @@ class _Box:
             command = self.command(starts)
             worth = (price * self.force(command) - self.power(command)).T
             beat = starts[worth.argmax(axis=1), row]
-        low, high = self.lower[:2], self.upper[:2]
+        low = self.lower[:2]
+        high = self.upper[:2]
         span = high - low
         longest = 2.0 * span / (np.array(GRID) - 1.0)
         value = worth.max(axis=1)
@@ -260,21 +265,25 @@ class _Box:
 
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
-        corner, zero = self.upper[None, :2], np.zeros(1)
+        corner = self.upper[None, :2]
+        zero = np.zeros(1)
         if float(self.force(self.command(corner))[0]) >= strongest * (1.0 - ROUNDING):
-            moves, saving = self.upper[:2] > self.lower[:2], self._slope(zero, corner)
+            moves = self.upper[:2] > self.lower[:2]
+            saving = self._slope(zero, corner)
             marginal_force = (self._slope(zero + 1.0, corner) - saving)[0][moves]
             if (marginal_force > 1e-3 * strongest).all():
                 price = -saving[0][moves] / marginal_force
                 top = float(price.max()) if len(price) else NOTHING
                 if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
                     return top
-        low, high = NOTHING, 1.0 / NOTHING
+        low = NOTHING
+        high = 1.0 / NOTHING
         for _ in range(5):
             prices = np.geomspace(low, high, 33)
             enough = self.force(self.best(prices)) >= (1.0 - PEAK) * strongest
             first = int(enough.argmax()) if enough.any() else len(prices) - 1
-            low, high = float(prices[max(first - 1, 0)]), float(prices[first])
+            low = float(prices[max(first - 1, 0)])
+            high = float(prices[first])
         return high
 
 
@@ -291,7 +300,9 @@ def _table_bound(box: _Box) -> Callable[[Array], Array]:
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
     """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the amplitude,
     the frequency, and both with a constant product."""
-    a, b, c = curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]
+    a = curve[:, 0, 0]
+    b = curve[:, 0, 1]
+    c = curve[:, 1, 1]
     det = a * c - b * b
     ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]
     steps = []
@@ -307,9 +318,11 @@ def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
 
 def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
     """Middle and half of the arc of force directions [rad], gauge (POINTS,) or None, and deflection."""
-    lower, upper = box.lower, box.upper
+    lower = box.lower
+    upper = box.upper
     full = bool(is_full_turn(upper[2] - lower[2]))
-    middle, half = 0.5 * float(lower[2] + upper[2]), np.pi if full else 0.5 * float(upper[2] - lower[2])
+    middle = 0.5 * float(lower[2] + upper[2])
+    half = np.pi if full else 0.5 * float(upper[2] - lower[2])
     if law.uniform:
         force = law.force(np.append(upper[:2], box.turn))
         lean = float(wrapped(np.arctan2(force[2], force[1]) - box.turn))
@@ -319,9 +332,11 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
     direction = turns + np.unwrap(wrapped(direction - turns))
     if not full:
         ends = np.interp([lower[2], upper[2]], turns, direction)
-        middle, half = 0.5 * float(ends.sum()), 0.5 * float(np.diff(ends)[0])
+        middle = 0.5 * float(ends.sum())
+        half = 0.5 * float(np.diff(ends)[0])
     angle = np.arange(POINTS) * (TURN / POINTS)
-    place, width = (angle - direction[0]) % TURN, float(direction[-1] - direction[0])
+    place = (angle - direction[0]) % TURN
+    width = float(direction[-1] - direction[0])
     # Beyond what its law knows a fin is taken to be as at the nearer end.
     place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
     turn = np.interp(place, direction - direction[0], turns)

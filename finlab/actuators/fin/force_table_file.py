@@ -143,7 +143,8 @@ def _check_units(rows: Array, source: str) -> None:
         raise DataError(
             f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283)"
         )
-    largest, thrust = np.abs(rows[:, 3:6]).max(), np.abs(rows[:, 4:6]).max()
+    largest = np.abs(rows[:, 3:6]).max()
+    thrust = np.abs(rows[:, 4:6]).max()
     if largest > MOST or thrust < LEAST:
         raise DataError(
             f"{source}: thrust goes up to {thrust:.3g}, the largest force is {largest:.3g}, expected "
@@ -161,7 +162,8 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
     order = place.argsort(kind="stable")
     repeated = np.flatnonzero(np.diff(place[order]) == 0)
     if len(repeated):
-        first, second = order[repeated[0]], order[repeated[0] + 1]
+        first = order[repeated[0]]
+        second = order[repeated[0] + 1]
         raise DataError(
             f"{source}: the same A, f, phi appears in two rows, lines {lines[first]} and {lines[second]}; "
             "keep one"

@@ -69,10 +69,12 @@ class Px4(LeastErrorMethod):
     settings: Px4Settings
 
     def prepare(self) -> None:
-        lower, upper = self.plant.lower[:, 0], self.plant.upper[:, 0]
+        lower = self.plant.lower[:, 0]
+        upper = self.plant.upper[:, 0]
         held, self._kept = held_of(self.plant)
         self._most = np.where(held, 1.0, np.maximum(upper, -lower))
-        self._low, self._high = lower / self._most, upper / self._most
+        self._low = lower / self._most
+        self._high = upper / self._most
         effectiveness = SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most * ~held)[ROWS]
         self.mix, self.setpoint_scale = normalised(np.linalg.pinv(effectiveness, rcond=ROUNDS_OFF))
         self.setpoint_unit: Array = np.empty(6)
@@ -83,7 +85,8 @@ class Px4(LeastErrorMethod):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         wanted = targets - self._kept
         part = (self.setpoint_scale * SIGNS * wanted[:, ROWS])[:, None, :] * self.mix
-        u, form = part.sum(axis=-1), self.settings.desaturation
+        u = part.sum(axis=-1)
+        form = self.settings.desaturation
         if form == "axes":
             for axis in (SWAY, SURGE, YAW, HEAVE, PITCH, ROLL):
                 u = self._desaturated(u, axis)
@@ -100,7 +103,8 @@ class Px4(LeastErrorMethod):
     def _desaturated(self, u: Array, axis: int, reduce_only: bool = False, margin: float = 0.0) -> Array:
         """Outputs (N, n) moved along a column of the mix towards their limits: a whole step, then half of
         the next. With `reduce_only` they are moved down alone, in the direction of the axis."""
-        column, high = self.mix[:, axis], self._high + margin * (self._high - self._low)
+        column = self.mix[:, axis]
+        high = self._high + margin * (self._high - self._low)
         first = _gain(u, column, self._low, high)
         moved = u + first[:, None] * column
         moved = moved + 0.5 * _gain(moved, column, self._low, high)[:, None] * column
@@ -166,7 +170,8 @@ class ArduSub(LeastErrorMethod):
         self._per = np.divide(self.factors, actual, out=np.zeros_like(self.factors), where=actual > 1e-9)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        lower, upper = self.plant.lower[:, 0], self.plant.upper[:, 0]
+        lower = self.plant.lower[:, 0]
+        upper = self.plant.upper[:, 0]
         force = np.zeros((len(targets), self.plant.n))
         for group in GROUPS:
             columns = list(group)

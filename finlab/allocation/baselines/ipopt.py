@@ -43,14 +43,17 @@ class ForceProgram:
     `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
 
     def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
-        self._inverse, n = inverse, inverse.plant.n
+        self._inverse = inverse
+        n = inverse.plant.n
         self._most = np.maximum(inverse.largest, 1e-9)
-        share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
+        share = casadi.MX.sym("share", 2 * n)
+        target = casadi.MX.sym("target", 6)
         per = np.repeat(self._most, 2)
         wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
         self._parts: list[_Line | _Plane | _Held] = []
         for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
-            own, most = share[2 * i : 2 * i + 2], float(self._most[i])
+            own = share[2 * i : 2 * i + 2]
+            most = float(self._most[i])
             if inverse.held[i]:
                 self._parts.append(_Held())
             elif isinstance(response, Plane):
@@ -113,7 +116,8 @@ class _Line:
 
     def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
         reverse = 0.0 if line.reverse is None else line.reverse.largest
-        low, high = max(line.low, -reverse) / most, min(line.high, line.table.largest) / most
+        low = max(line.low, -reverse) / most
+        high = min(line.high, line.table.largest) / most
         self.ends = [(low, high), (0.0, 0.0)]
         """Least and largest value of both variables."""
         grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.table.largest])) / most
@@ -140,8 +144,11 @@ class _Plane:
     """One actuator of two directions in CasADi; `share` (2,) is its force over the largest one."""
 
     def __init__(self, casadi: Any, plane: Plane, share: Any) -> None:
-        middle, half, table = plane.middle, plane.half, plane.table
-        self._middle, self._half = middle, half
+        middle = plane.middle
+        half = plane.half
+        table = plane.table
+        self._middle = middle
+        self._half = half
         self.ends = [(-np.inf, np.inf)] * 2
         """See `_Line`."""
         self.convex = plane.gauge is None and (half <= 0.5 * np.pi or half >= np.pi)
@@ -150,12 +157,14 @@ class _Plane:
         ahead = strongest * (np.cos(middle) * share[0] + np.sin(middle) * share[1])
         aside = strongest * (np.cos(middle) * share[1] - np.sin(middle) * share[0])
         size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
-        low, high = float(table.force[0]) / table.largest, 1.0
+        low = float(table.force[0]) / table.largest
+        high = 1.0
         if plane.gauge is not None:
             end = max(half, NARROW)
             turn = casadi.atan2(aside, ahead + SMOOTH)  # at rest it has a slope, too
             turn = casadi.fmin(casadi.fmax(turn, -end), end)
-            count, along = len(plane.gauge), end * DIRECTIONS
+            count = len(plane.gauge)
+            along = end * DIRECTIONS
             known = np.append(plane.gauge, plane.gauge[0])
             gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
             high = _spline(casadi, along, gauge)(turn)
@@ -225,7 +234,8 @@ class Ipopt(ModelBased):
 
     def _answer(self, target: Array, seed: int) -> Array:
         """The command (n, 3) for a target (6,): the cheapest that delivers it, else the nearest."""
-        over, ends = thread_time() + self.settings.time_limit_s, list[Array]()
+        over = thread_time() + self.settings.time_limit_s
+        ends = list[Array]()
         for start in self._program.starts(target, self.settings.n_starts, seed):
             if ends and thread_time() > over:
                 break

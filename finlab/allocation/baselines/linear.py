@@ -56,7 +56,8 @@ class Qp(ModelBased):
         return LinearMap(self.plant, self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        linear, plant = self._map, self.plant
+        linear = self._map
+        plant = self.plant
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
@@ -95,11 +96,13 @@ class PaperSqp(ModelBased):
         starts = [0.5 * (plant.lower + plant.upper), *random]
         answers = np.empty((len(targets), plant.n, 3))
         for i, target in enumerate(targets):
-            over, least = thread_time() + self.settings.time_limit_s, np.inf
+            over = thread_time() + self.settings.time_limit_s
+            least = np.inf
             for start in starts:
                 command, errors = self.descent(target, start)
                 if errors[-1] < least:
-                    answers[i], least = command, errors[-1]
+                    answers[i] = command
+                    least = errors[-1]
                 if least <= SOLVED**2 or thread_time() > over:
                     break
         return answers
@@ -107,20 +110,23 @@ class PaperSqp(ModelBased):
     def descent(self, target: Array, start: Array) -> tuple[Array, list[float]]:
         """Returns the command (n, 3) to which a start (n, 3) leads for a target (6,) [N, N m], and J_norm of
         every iterate, the start's first."""
-        plant, width = self.plant, self.plant.width
+        plant = self.plant
+        width = self.plant.width
         free = width.ravel() > 0.0
 
         def residual(command: Array) -> Array:
             return (target - plant.wrench(command)) / self.sigma
 
-        command, missing = start, residual(start)
+        command = start
+        missing = residual(start)
         errors = [float(missing @ missing)]
         for _ in range(self.settings.n_steps if free.any() else 0):
             jacobian = (plant.linearize(command)[1] / self.sigma[:, None] * width.ravel())[:, free]
             place = ((command - plant.lower).ravel()[free] / width.ravel()[free]).clip(0.0, 1.0)
             step = np.zeros(free.size)
             step[free] = box_qp(jacobian, missing, self.settings.regularization, -place, 1.0 - place)
-            slope, length = -2.0 * float(missing @ (jacobian @ step[free])), 1.0
+            slope = -2.0 * float(missing @ (jacobian @ step[free]))
+            length = 1.0
             for _ in range(HALVINGS):
                 tried = np.clip(command + length * step.reshape(-1, 3) * width, plant.lower, plant.upper)
                 after = residual(tried)
@@ -129,7 +135,8 @@ class PaperSqp(ModelBased):
                 length *= 0.5
             else:
                 break
-            command, missing = tried, after
+            command = tried
+            missing = after
             errors.append(float(missing @ missing))
             if errors[-1] <= (0.1 * SOLVED) ** 2 or length * np.abs(step).max() < SHORTEST:
                 break

@@ -183,16 +183,19 @@ class FixedFrequency(ModelBased):
 
     @cached_property
     def _inverse(self) -> PseudoInverse:
-        layout, fins = self.layout, []
+        layout = self.layout
+        fins = []
         for fin in layout.actuators:
-            (low, high), wanted = fin.value("frequency"), self.settings.frequency
+            low, high = fin.value("frequency")
+            wanted = self.settings.frequency
             held = min(max(wanted, low), high)
             fins.append(fin.with_value("frequency", (held, held)))
         plant = plant_of(replace(layout, actuators=tuple(fins))).counting(layout.commanded)
         return PseudoInverse(plant.at(self.plant.flow), self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        inverse, lower = self._inverse, self.plant.lower
+        inverse = self._inverse
+        lower = self.plant.lower
         force = inverse.force(targets)
         share = np.linalg.norm(force, axis=-1) / np.maximum(inverse.largest, 1e-9)
         force /= np.maximum(share.max(axis=1), 1.0)[:, None, None]

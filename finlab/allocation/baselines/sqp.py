@@ -57,7 +57,8 @@ class Sqp(ModelBased):
         return CommandProblem.of(self.plant, self.sigma), solve
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        (problem, solve), plant = self._program, self.plant
+        problem, solve = self._program
+        plant = self.plant
         answer = self._inverse.command(targets)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
         for i, target in enumerate(targets / self.sigma):
@@ -75,7 +76,8 @@ class Sqp(ModelBased):
 def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
     """Returns what finds the commands of least cost, by the meter, near a start that deliver a target, by
     SciPy's SLSQP with at most some steps; `sigma` (6,) divides the wrenches."""
-    axes, width = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None]), plant.width
+    axes = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None])
+    width = plant.width
     free = width.ravel() > 0.0
     usual = max(float(meter(plant.sample(np.random.default_rng(0), (16,))).mean()), 1e-300)
 

@@ -31,9 +31,12 @@ class Compiled:
         """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick
         (6,) and ticks of a period; what a squared force costs beside its power is `doubt`, see
         `price_of_doubt`. Errors as for `FinGroup`."""
-        self.count, self._actuators, self._yardstick = layout.n, layout.actuators, yardstick
+        self.count = layout.n
+        self._actuators = layout.actuators
+        self._yardstick = yardstick
         self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
-        self._effectiveness, self._counts = plant.effectiveness, plant.counts.astype(np.float64)
+        self._effectiveness = plant.effectiveness
+        self._counts = plant.counts.astype(np.float64)
         self.doubt = doubt
         """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
@@ -58,7 +61,8 @@ class Compiled:
                 weight = float(self.weight[place])
                 drags = isinstance(response, Line) and response.drag is not None
                 doubted = with_square(response, weight) if weight and not drags else response
-                responses[place], forms[place] = doubted, form
+                responses[place] = doubted
+                forms[place] = form
         self.beside = self.beside_of_working(np.ones(self.count, bool))
         """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
         self.robot = DualRobot(
@@ -104,7 +108,8 @@ class Compiled:
     def radial_worth(self, group: Group, places: Places, worth: Worth) -> Array | None:
         """Returns what forces are worth by the laws of a group at some places; see `Group.radial_worth`.
         Where all actuators are alike, one answers for all."""
-        ahead, back = worth.ahead[:, places], worth.back[:, places]
+        ahead = worth.ahead[:, places]
+        back = worth.back[:, places]
         ends = np.stack([worth.low[0, places], worth.high[0, places]], axis=-1)
         for alike, one in self._alike:
             if alike is group:

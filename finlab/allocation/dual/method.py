@@ -85,7 +85,8 @@ class Dual(Method):
             return self._last[1]
         other = super().at(flow)
         if other is not self:
-            other.compiled, other._last = self.compiled.at(other.plant.inflow(None)), None
+            other.compiled = self.compiled.at(other.plant.inflow(None))
+            other._last = None
             other._spans = {}
             self._last = key, other
         return other

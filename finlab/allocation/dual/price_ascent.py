@@ -18,13 +18,15 @@ HEATS = np.geomspace(0.3, 0.003, 14)
 def raised_price(plant: Plant, scale: Array, wrench: Array, price: Array, command: Array) -> Array:
     """Returns prices (6,) [W/N, W/(N m)] for a wrench (6,) that a command (n, 3) gives, from others on, by a
     plant; errors count on the yardstick `scale` (6,)."""
-    low, high = plant.layout.lower, plant.layout.upper
+    low = plant.layout.lower
+    high = plant.layout.upper
     draw = np.random.default_rng(0).uniform(-1.0, 1.0, (DRAWN, *command.shape)) * (high - low)
     drawn = (command + np.geomspace(10.0 * CLOSE, 1.0, DRAWN)[:, None, None] * draw).clip(low, high)
     drawn[0] = command
     given = np.einsum("kna,naw->nkw", plant.force(drawn), plant.effectiveness) / scale
     power = plant.power(drawn).T
-    target, inner = wrench / scale, price * scale
+    target = wrench / scale
+    inner = price * scale
 
     def smoothed(inner: Array, heat: float) -> tuple[float, Array]:
         """The dual's negative [W], and the shares (n, DRAWN) of the commands."""
@@ -43,7 +45,8 @@ def raised_price(plant: Plant, scale: Array, wrench: Array, price: Array, comman
             damped = hessian + (ridge * np.trace(hessian) + NOTHING) * np.eye(6)
             step = heat * np.linalg.solve(damped, target - mean.sum(axis=0))
             if smoothed(inner + step, heat)[0] <= value:
-                inner, ridge = inner + step, 0.1 * ridge
+                inner = inner + step
+                ridge = 0.1 * ridge
                 break
             ridge *= 10.0
     return inner / scale

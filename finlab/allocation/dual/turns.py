@@ -38,8 +38,10 @@ WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 
 def whole_of(dual: Any) -> Whole:
     """Returns the robot of a method `Dual` in the core, with what its actuators do to each other."""
-    plant, robot = dual.plant, dual.compiled.robot
-    known, inflow = plant.interaction, plant.met_by_all(None)
+    plant = dual.plant
+    robot = dual.compiled.robot
+    known = plant.interaction
+    inflow = plant.met_by_all(None)
     frames = robot.axes @ plant.layout.frames
     jets = known.table if isinstance(known, JetInteraction) else None
     return Whole(robot.block, Beside(frames, plant.counts, inflow, jets, known.effect))
@@ -52,7 +54,8 @@ def settled(dual: Any, targets: Array, policy: Policy, now: Now, prices: Array |
     notes: set[str] = set()
     for target in targets:
         found = _settled(dual, target, policy, now, prices)
-        command, aim = dual.exact(found, now), found.aim
+        command = dual.exact(found, now)
+        aim = found.aim
         if policy.kind == "direction" and not found.within.all():
             command, aim = _on_the_ray(dual, target[None], command, now)
         if dual.error(command, target[None], now)[0] > NEARLY:
@@ -91,7 +94,8 @@ def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array |
     works = slice(None) if now.lost is None else ~now.lost
     dearer = (1.0 + 10.0 * CLOSE) * float(dual.plant.power(laws.command)[:, works].sum())
     if best.power > dearer:
-        back, lines = 1.0 - 2.0 * np.eye(len(laws.force[0]))[..., None], dual.compiled.robot.lines
+        back = 1.0 - 2.0 * np.eye(len(laws.force[0]))[..., None]
+        lines = dual.compiled.robot.lines
         for _ in range(ROUNDS):
             if not better(back * best.found.force, BACK):
                 break
@@ -111,12 +115,15 @@ def _on_the_ray(dual: Any, target: Array, command: Array, now: Now) -> tuple[Arr
     along = target / dual.scale
     problem = dual.problem_now(now)
     share = float((problem.wrench(command) * along).sum() / max((along * along).sum(), 1e-300))
-    low, high, best = 0.0, min(max(share * (1.0 + CLOSE), 0.0), 1.0), command
+    low = 0.0
+    high = min(max(share * (1.0 + CLOSE), 0.0), 1.0)
+    best = command
     for k in range(ROUNDS):
         tried = high if k == 0 else 0.5 * (low + high)
         ends = refine(problem, tried * along, best, ROUNDS, 0.1 * NEARLY)
         if ends.error[0] <= NEARLY:
-            low, best = tried, ends.command
+            low = tried
+            best = ends.command
         else:
             high = tried
         if high - low <= CLOSE * high:
@@ -131,7 +138,8 @@ def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
     patterns of Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in
     a symmetric robot has no slope that would turn it aside, and which of two jets gives way is a choice
     between minima."""
-    planes, rng = np.flatnonzero(~lines), np.random.default_rng(0)
+    planes = np.flatnonzero(~lines)
+    rng = np.random.default_rng(0)
     signs = WALSH[np.arange(len(planes)) % len(WALSH)]
     angle = np.zeros((len(WALSH) + 1 + RANDOM, len(lines)))
     own = np.concatenate([signs, -signs[:, :1], rng.normal(size=(len(planes), RANDOM))], axis=1)
@@ -139,6 +147,7 @@ def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
     size = np.ones(angle.shape)
     size[len(WALSH) + 1 :] = rng.uniform(0.0, 2.0, (RANDOM, len(lines)))
     size[:, lines] = rng.uniform(0.0, 2.0, (len(size), lines.sum()))
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     turned = np.stack([cos * force[:, 0] - sin * force[:, 1], sin * force[:, 0] + cos * force[:, 1]], axis=-1)
     return np.asarray(size[..., None] * turned)

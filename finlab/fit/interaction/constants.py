@@ -40,7 +40,8 @@ def fit_constants(samples: Samples) -> Fitted:
     """Returns the constants that fit samples best. Raises DataError: there are fewer than five."""
     if len(samples.wrench) < LEAST_SAMPLES:
         raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
-    (force, missed, scale), places = left_by_laws(samples), places_of(samples.layout)
+    force, missed, scale = left_by_laws(samples)
+    places = places_of(samples.layout)
     start = np.log([getattr(Jets(), name) for name in FITTED])
 
     def jets_at(logarithms: Array) -> Jets:
@@ -76,7 +77,8 @@ def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]
     """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares together are
     the variances of normal errors (N, 6), what a model lacks and noise: root mean squares over all shares,
     each as likely as it makes the errors."""
-    shares, floors = np.geomspace(3e-3, 10.0, 60), np.geomspace(1e-4, 0.3, 40)
+    shares = np.geomspace(3e-3, 10.0, 60)
+    floors = np.geomspace(1e-4, 0.3, 40)
     costs = np.empty((len(shares), len(floors)))
     for i, share in enumerate(shares):
         variance = (share * each) ** 2 + (floors[:, None, None] * size) ** 2 + 1e-18

@@ -57,17 +57,21 @@ class Left(NamedTuple):
 def left_by_laws(samples: Samples) -> Left:
     """Returns what the laws leave of samples, whatever interaction their layout names."""
     layout = replace(samples.layout, interaction=None)
-    plant, scale = Plant(layout), yardstick(layout)
+    plant = Plant(layout)
+    scale = yardstick(layout)
     own = plant.force(samples.command)
     return Left(body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale)
 
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:
     """Writes an NPZ file; a `DataError` where it cannot be written."""
-    n, most = max(one.layout.n for one in samples), max(len(one.command) for one in samples)
-    command, wrench = np.full((len(samples), most, n, 3), np.nan), np.full((len(samples), most, 6), np.nan)
+    n = max(one.layout.n for one in samples)
+    most = max(len(one.command) for one in samples)
+    command = np.full((len(samples), most, n, 3), np.nan)
+    wrench = np.full((len(samples), most, 6), np.nan)
     for k, one in enumerate(samples):
-        command[k, : len(one.command), : one.layout.n], wrench[k, : len(one.wrench)] = one.command, one.wrench
+        command[k, : len(one.command), : one.layout.n] = one.command
+        wrench[k, : len(one.wrench)] = one.wrench
     text = json.dumps([layout_to_dict(one.layout) for one in samples])
     content = BytesIO()
     np.savez_compressed(content, layouts=np.array(text), command=command, wrench=wrench)

@@ -85,7 +85,8 @@ class Table:
         """The text of a row's cell, its interval in brackets behind it; empty where the row has no such
         key."""
         show = FORMATS[column.format]
-        value, ends = row.get(column.key), row.get(column.interval or "")
+        value = row.get(column.key)
+        ends = row.get(column.interval or "")
         if value is None:
             return ""
         return (

@@ -27,7 +27,9 @@ EXPERIMENTS = (
     *("trajectory", "faults", "velocity", "swims", "interaction"),
 )
 """Names, those of their modules in `finlab.research.evaluation.experiments`, in the order of the report."""
-MOST, MOST_SEED = 1_000_000, 2**63 - 1  # largest whole number of an option, and of a seed
+# largest whole number of an option, and of a seed
+MOST = 1_000_000
+MOST_SEED = 2**63 - 1
 Item = TypeVar("Item")
 
 
@@ -72,7 +74,8 @@ class Experiment:
             raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
         values = {name: chosen.get(name, each.default) for name, each in options.items()}
         for name, value in values.items():
-            least, most = 0 if options[name].default == 0 else 1, MOST_SEED if name == "seed" else MOST
+            least = 0 if options[name].default == 0 else 1
+            most = MOST_SEED if name == "seed" else MOST
             if type(value) is int and not least <= value <= most:
                 said = f"at least {least}" if value < least else f"at most {most}"
                 raise DataError(f"{name.replace('_', '-')}: expected a number of {said}, got {value}")

@@ -18,7 +18,9 @@ from finlab.research.evaluation.document import Block, Row, to_markdown
 from finlab.research.evaluation.experiment import EXPERIMENTS, check_names, load_experiment, progress
 from finlab.whole_file import make_folder, write_whole
 
-PAGE, TABLES = "report.md", "tables.json"  # what a report's folder holds
+# what a report's folder holds
+PAGE = "report.md"
+TABLES = "tables.json"
 SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
@@ -38,7 +40,9 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
     check_names("sections", names, ("all", *EXPERIMENTS))
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
-    start, rows, blocks = time.process_time(), dict[str, list[Row]](), list[Block]()
+    start = time.process_time()
+    rows = dict[str, list[Row]]()
+    blocks = list[Block]()
     commit = _commit()
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += "" if "all" in names else f" --sections {','.join(chosen)}"

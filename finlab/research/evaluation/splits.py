@@ -115,7 +115,8 @@ def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ..
 def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of fins."""
     layout = random_layout(rng, name)
-    (first, *others), angle = layout.fins, layout.mounting_angle[0]
+    (first, *others) = layout.fins
+    angle = layout.mounting_angle[0]
     if rng.uniform() < 0.5:
         turns = rng.uniform(-NEAR_ANGLE, NEAR_ANGLE, len(others)) / 2
         turns += math.pi * rng.integers(0, 2, len(others))
@@ -132,7 +133,8 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
 
 def _fins(rng: np.random.Generator, name: str, mixed: bool = False) -> tuple[Layout, tuple[str, ...]]:
     """All fins of one random model, or each of a random model of its own."""
-    layout, model = random_layout(rng, name), random_fin_model(rng)
+    layout = random_layout(rng, name)
+    model = random_fin_model(rng)
     models = [model, *(random_fin_model(rng) if mixed else model for _ in layout.fins[1:])]
     fins = (replace(fin, model=own) for fin, own in zip(layout.fins, models, strict=True))
     return replace(layout, actuators=tuple(fins)), ()

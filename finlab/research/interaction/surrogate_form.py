@@ -23,22 +23,23 @@ def trained_surrogate(
     """Trains it, and returns what it says of a robot: from forces (K, n, 3) [N] in the body frame to what
     comes beside their wrenches (K, 6) [N, N m]."""
     torch.manual_seed(seed)
-    net, describe, affine = (
-        nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3)),
-        nn.Sequential(nn.Linear(7, 64), nn.GELU()),
-        nn.Linear(64, 12),
-    )
+    net = nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3))
+    describe = nn.Sequential(nn.Linear(7, 64), nn.GELU())
+    affine = nn.Linear(64, 12)
 
     def rows(layout: Layout, force: Array, scale: Array, n: int) -> torch.Tensor:
         """Features (K, n, 9): place, force and size, whether there is an actuator, and the unit of arms."""
         x = np.zeros((len(force), n, 9))
-        x[:, : layout.n, :3], x[:, : layout.n, 3:6] = layout.position / 0.3, force / scale[0]
-        x[:, : layout.n, 6], x[:, : layout.n, 7] = places_of(layout).diameter / 0.1, 1.0
+        x[:, : layout.n, :3] = layout.position / 0.3
+        x[:, : layout.n, 3:6] = force / scale[0]
+        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
+        x[:, : layout.n, 7] = 1.0
         x[..., 8] = scale[0] / scale[3]
         return torch.tensor(x, dtype=torch.float32)
 
     def wrench(x: torch.Tensor) -> torch.Tensor:
-        known, alive = x[..., :7], x[..., 7:8]
+        known = x[..., :7]
+        alive = x[..., 7:8]
         share = net(known) * alive
         torque = torch.linalg.cross(0.3 * x[..., :3], share, dim=-1) * x[..., 8:]
         total = torch.cat([share, torque], dim=-1).sum(dim=1)
@@ -47,7 +48,8 @@ def trained_surrogate(
         result: torch.Tensor = total * (1.0 + stretch) + shift
         return result
 
-    most, left = max(one.layout.n for one in samples), [left_by_laws(one) for one in samples]
+    most = max(one.layout.n for one in samples)
+    left = [left_by_laws(one) for one in samples]
     pairs = zip(samples, left, strict=True)
     known = torch.cat([rows(one.layout, own.force, own.scale, most) for one, own in pairs])
     missed = torch.tensor(np.concatenate([own.missed for own in left]), dtype=torch.float32)

@@ -53,7 +53,8 @@ class Rows(NamedTuple):
 
     def of(self, samples: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Features and vectors of some samples (B,), and to which of these each row belongs."""
-        first, count = self.starts[samples], self.starts[samples + 1] - self.starts[samples]
+        first = self.starts[samples]
+        count = self.starts[samples + 1] - self.starts[samples]
         owner = torch.repeat_interleave(torch.arange(len(samples)), count)
         place = torch.arange(len(owner)) - torch.repeat_interleave(torch.cumsum(count, 0) - count, count)
         rows = torch.repeat_interleave(first, count) + place
@@ -77,7 +78,9 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
     """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots, or none
     with a jet."""
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
-    left, size, robot = [], [], []
+    left = []
+    size = []
+    robot = []
     for k, one in enumerate(samples):
         force, missed, scale = left_by_laws(one)
         left.append(missed)
@@ -102,8 +105,10 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
 def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
     """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R, k, 6),
     and how many rows each of forces (K, n, 3) [N] has (K,)."""
-    pairs, lever = Pairs(places), LearnedInteraction({}, 1.0, places).lever / scale
-    source, receiver = force[:, pairs.source], force[:, pairs.receiver]
+    pairs = Pairs(places)
+    lever = LearnedInteraction({}, 1.0, places).lever / scale
+    source = force[:, pairs.source]
+    receiver = force[:, pairs.receiver]
     rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
     rows["hull"] = hull_rows(places, force), lever * float(places.hull[1].all())
     result = {}
@@ -127,7 +132,8 @@ def train(
     data = data_set(samples)
     robots = torch.from_numpy(np.random.default_rng(seed).permutation(len(samples)))
     held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT * len(samples)))])
-    known, unknown = torch.nonzero(~held)[:, 0], torch.nonzero(held)[:, 0]
+    known = torch.nonzero(~held)[:, 0]
+    unknown = torch.nonzero(held)[:, 0]
     weights = {name: value.requires_grad_() for name, value in first_weights(seed).items()}
     identity = {"recipe": str(settings), "seed": seed, "samples": len(data.left)}
 

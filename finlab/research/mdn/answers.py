@@ -49,8 +49,11 @@ class EffortRobot(NamedTuple):
 
     def within(self, box: Box) -> "EffortRobot":
         """The same robot, each fin kept within what may follow a previous command."""
-        fins, free, (lower, upper) = self.forces.fins, box.free[:, 2], (box.lower[:, 2], box.upper[:, 2])
-        middle, half = 0.5 * (lower + upper), np.where(free, np.pi, 0.5 * (upper - lower))
+        fins = self.forces.fins
+        free = box.free[:, 2]
+        lower, upper = (box.lower[:, 2], box.upper[:, 2])
+        middle = 0.5 * (lower + upper)
+        half = np.where(free, np.pi, 0.5 * (upper - lower))
         arcs = replace(fins, middle=middle + fins.deflection(middle), half=half)
         forces = self.forces._replace(fins=arcs)
         commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
@@ -65,7 +68,8 @@ def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
     idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])
     fins = EffortFins.of(layout)
     forces = effort_problem(plant.effectiveness[:, 1:] / scale, fins, turning, idle)
-    effort, commands = EffortMeter(plant.upper), CommandProblem.of(plant, scale)
+    effort = EffortMeter(plant.upper)
+    commands = CommandProblem.of(plant, scale)
     return EffortRobot(plant, forces, commands, effort, robot_view(forces))
 
 
@@ -166,7 +170,8 @@ def distinct(score: Array, root: AnyArray, keep: int, apart: float) -> tuple[NDA
     """Places (N, P) of scores (N, K), `keep` at most, the least first, and their ranks; those last, ranked
     behind `LAST`, whose forces (N, K, n), as roots of shares, differ by less than `apart` from ones before
     them: several proposals mostly lead to the same forces."""
-    left, row = score.copy(), np.arange(len(score))
+    left = score.copy()
+    row = np.arange(len(score))
     chosen = np.empty((len(score), min(keep, score.shape[1])), np.intp)
     rank = np.empty(chosen.shape)
     for k in range(chosen.shape[1]):

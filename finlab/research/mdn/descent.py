@@ -50,7 +50,8 @@ def effort_problem(
     effectiveness: Array, fins: effort_fins.EffortFins, direction_cost: Array, idle_direction: Array
 ) -> EffortProblem:
     """A problem from normalized wrenches (n, 2, 6) per newton of each fin's planar force."""
-    x, z = effectiveness[:, 0], effectiveness[:, 1]
+    x = effectiveness[:, 0]
+    z = effectiveness[:, 1]
     xx, xz, zz = (np.einsum("ni,nj->nij", *pair) for pair in ((x, x), (x, z), (z, z)))
     products = np.concatenate([xx + zz, xx - zz, xz + xz.swapaxes(1, 2)])
     # The ridge of a sum is the sum of the ridges.
@@ -96,7 +97,8 @@ def wrench(problem: EffortProblem, force: AnyArray) -> Array:
 
 def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
-    row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
+    row = problem.fins.lookup(reached.size / reached.gauge)
+    direction = reached.direction
     turn = wrapped(direction - problem.fins.deflection(direction))
     command = np.stack([row[..., effort_fins.AMPLITUDE], row[..., effort_fins.FREQUENCY], turn], axis=-1)
     effort = row[..., effort_fins.EFFORT] + problem.direction_cost * turn * turn
@@ -108,7 +110,8 @@ def _respond(
 ) -> tuple[AnyArray, Array, AnyArray]:
     """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by the
     quadratics that touch the efforts at the present forces."""
-    row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
+    row = problem.fins.lookup(reached.size / reached.gauge)
+    direction = reached.direction
     # The same command gives less in weaker directions, so a newton more costs more there.
     across = np.exp(row[..., effort_fins.MOBILITY]) * reached.gauge**2 * cut
     softness = 1.0 / row[..., effort_fins.STIFFNESS]

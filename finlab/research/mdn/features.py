@@ -79,11 +79,13 @@ VECTORS = (6, 8, 12, 15)
 
 def robot_view(problem: EffortProblem) -> RobotView:
     """What the network sees of one robot, whatever the target; see the table above."""
-    fins, n = problem.fins, len(problem.fins.maximum)
+    fins = problem.fins
+    n = len(problem.fins.maximum)
     full = fins.half >= np.pi
     evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
     direction = fins.middle + fins.half * np.where(full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None])
-    gauge, unit = np.broadcast_to(fins.gauges(direction), direction.shape), np.exp(1j * direction)
+    gauge = np.broadcast_to(fins.gauges(direction), direction.shape)
+    unit = np.exp(1j * direction)
     top = np.maximum(fins.table[:, -1, EFFORT], 1e-12)
     shares = [fins.lookup(share * fins.largest)[..., EFFORT] / top for share in SHARES]
     reach = gauge * fins.largest / fins.maximum
@@ -109,7 +111,10 @@ def robot_view(problem: EffortProblem) -> RobotView:
     gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(6)
     solver = np.linalg.solve(gram, scaled.T)
     across = (scaled @ solver).reshape(n, 2, n, 2)
-    xx, xz, zx, zz = across[:, 0, :, 0], across[:, 0, :, 1], across[:, 1, :, 0], across[:, 1, :, 1]
+    xx = across[:, 0, :, 0]
+    xz = across[:, 0, :, 1]
+    zx = across[:, 1, :, 0]
+    zz = across[:, 1, :, 1]
     a = 0.5 * ((xx + zz) + 1j * (zx - xz))
     b = 0.5 * ((xx - zz) + 1j * (zx + xz))
     return RobotView(
@@ -133,17 +138,20 @@ def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Se
     frame = frame / np.abs(frame)
     back = frame.conj()
     nodes = np.empty((rows, n, NODE_SIZE), dtype=np.float32)
-    nodes[..., 0], nodes[..., 1] = np.sqrt(size), size / (1.0 + size)
+    nodes[..., 0] = np.sqrt(size)
+    nodes[..., 1] = size / (1.0 + size)
     nodes[..., 2] = np.log(size + 1e-3) / 7.0
     nodes[..., 6:] = static
     for place in VECTORS:
         turned = (static[..., place] + 1j * static[..., place + 1]) * back
-        nodes[..., 6 + place], nodes[..., 7 + place] = turned.real, turned.imag
+        nodes[..., 6 + place] = turned.real
+        nodes[..., 7 + place] = turned.imag
     a = a * back[:, :, None] * frame[:, None]
     b = b * back[:, :, None] * back[:, None]
     pairs = np.stack([a.real, a.imag, b.real, b.imag], axis=-1).astype(np.float32)
     own = np.arange(n)
-    nodes[..., 3], nodes[..., 4:6] = pairs[:, own, own, 0], pairs[:, own, own, 2:]
+    nodes[..., 3] = pairs[:, own, own, 0]
+    nodes[..., 4:6] = pairs[:, own, own, 2:]
     return Seen(nodes, pairs, frame)
 
 
@@ -174,7 +182,8 @@ def propose(
     component = np.argsort(-weight, axis=1)[:, :n_candidates]
     root = mean[place, component]
     if n_candidates > m:
-        rng, more = np.random.default_rng(seed), n_candidates - m
+        rng = np.random.default_rng(seed)
+        more = n_candidates - m
         uniform = rng.random((rows, more, 1), dtype=np.float32)
         parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
         cumulative = weight.cumsum(1)

@@ -88,7 +88,9 @@ class Mdn(LearnedMethod):
         self._one_thread = single_threaded_products()
 
     def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:
-        target, previous, seed = targets / self.sigma, wanted.get("previous"), wanted.get("seed", 0)
+        target = targets / self.sigma
+        previous = wanted.get("previous")
+        seed = wanted.get("seed", 0)
         if len(target) == 1:
             with self._one_thread():
                 reached = self._found(policy, target, seed)
@@ -111,7 +113,8 @@ class Mdn(LearnedMethod):
         with self._one_thread():
             proposal = self.proposals(wanted, seed)
             ways = traced(self.robot, wanted[0], proposal.force[0].astype(complex), WHOLE)
-        names, count = names_of(proposal), len(ways[0])
+        names = names_of(proposal)
+        count = len(ways[0])
         every = self._judged(wanted, np.concatenate(ways), names * len(ways))
         return tuple([every.rows(slice(k, k + count)) for k in range(0, len(every.command), count)])
 
@@ -159,7 +162,8 @@ class Mdn(LearnedMethod):
     def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
         """What is found for one target within what the servos allow after a previous command (n, 3): the way
         that the robot moves now is kept, and where another is worth it, all fins go towards that."""
-        first, plant = free.answers, self.plant
+        first = free.answers
+        plant = self.plant
         rates = Rates(plant, self.layout.rates * self.settings.period_s)
         if rates.allow(previous, first.command[0, 0]):
             return free
@@ -181,7 +185,8 @@ class Mdn(LearnedMethod):
 
     def _refined(self, reached: Found) -> tuple[Array, tuple[str, ...]]:
         """The refined commands (P, n, 3) for a single target, and the components they come from."""
-        names, origin = names_of(reached.proposal), reached.answers.origin[0].tolist()
+        names = names_of(reached.proposal)
+        origin = reached.answers.origin[0].tolist()
         return reached.answers.command[0], tuple(names[k] if k >= 0 else STARTS[k] for k in origin)
 
     def _cheapest(self, proposal: Proposal) -> tuple[Array, tuple[str, ...]]:

@@ -45,11 +45,13 @@ class ForceNetworkConfig:
     def shapes(self) -> Shapes:
         """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
-        width, m = self.width, self.n_components
+        width = self.width
+        m = self.n_components
         shapes = linear_shapes("enter", NODE_SIZE, width) | norm_shapes("norm", width)
         shapes |= linear_shapes("head", width, 3 * m) | linear_shapes("weight", width, m)
         for i in range(self.layers):
-            name, look = f"layers.{i}", f"layers.{i}.look"
+            name = f"layers.{i}"
+            look = f"layers.{i}.look"
             shapes |= {f"{look}.attention": (self.heads, width // self.heads)}
             shapes |= {f"{look}.target.weight": (width, width), f"{look}.pair.weight": (width, PAIR_SIZE)}
             shapes |= linear_shapes(f"{look}.source", width, width)

@@ -24,7 +24,9 @@ LEAK = 0.2
 
 def linear(w: Weights, name: str, x: Values) -> Values:
     """Features (..., out) of features (..., in); a layer without a bias has none to add."""
-    xp, weight, bias = library_of(x), w[f"{name}.weight"], w.get(f"{name}.bias")
+    xp = library_of(x)
+    weight = w[f"{name}.weight"]
+    bias = w.get(f"{name}.bias")
     if xp is not np:
         return xp.nn.functional.linear(x, weight, bias)
     # One product of two matrices is much faster than numpy's loop over stacked small ones.
@@ -34,7 +36,8 @@ def linear(w: Weights, name: str, x: Values) -> Values:
 
 def layer_norm(w: Weights, name: str, x: Values) -> Values:
     """Layer normalization of features (..., width), with scale and shift."""
-    weight, bias = w[f"{name}.weight"], w[f"{name}.bias"]
+    weight = w[f"{name}.weight"]
+    bias = w[f"{name}.bias"]
     xp = library_of(x)
     if xp is not np:
         return xp.nn.functional.layer_norm(x, x.shape[-1:], weight, bias, EPSILON)
@@ -60,7 +63,8 @@ def graph_attention(
     (B, n, width) of the same; heads are concatenated. Features of pairs (B, n, n, F), where there are any,
     count in what is scored, and what is scored is then the message, too. No node listens to one where `mask`
     (B, n) is False."""
-    xp, vectors = library_of(x), w[f"{name}.attention"]
+    xp = library_of(x)
+    vectors = w[f"{name}.attention"]
     source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
     seen = source[:, None] if pairs is None else linear(w, f"{name}.pair", pairs) + source[:, None]
     hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)

@@ -51,7 +51,8 @@ class NetworkConfig:
     def shapes(self) -> Shapes:
         """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
-        width, m = self.width, self.n_components
+        width = self.width
+        m = self.n_components
         shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)
         shapes |= linear_shapes("join", 2 * width, width)
         for name in self._named("graph", self.graph_layers):

@@ -149,8 +149,10 @@ class Paper(LearnedMethod, LeastErrorMethod):
         """Refined commands (N, K, n, 3), inside the limits."""
         if self.settings.refinement == "none":
             return command
-        shape, steps = command.shape, self.settings.n_steps
-        flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
+        shape = command.shape
+        steps = self.settings.n_steps
+        flat = command.reshape(-1, *shape[2:])
+        target = np.repeat(wanted, shape[1], axis=0)
         parts = [self._adam(flat[k], target[k], steps) for k in blocks_of(len(flat))]
         return np.concatenate(parts).reshape(shape)
 
@@ -161,14 +163,18 @@ class Paper(LearnedMethod, LeastErrorMethod):
         directions that turn fully go on beyond the seam.
         """
         lower, upper = self.limits
-        x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
-        mean, square = np.zeros_like(x), np.zeros_like(x)
+        x = to_normalized(command, lower, upper)
+        half = np.float32(0.5) * (upper - lower)
+        mean = np.zeros_like(x)
+        square = np.zeros_like(x)
         keep_mean, keep_square = ADAM_DECAY
-        best, least = x.copy(), np.full(len(x), np.inf, np.float32)
+        best = x.copy()
+        least = np.full(len(x), np.inf, np.float32)
         for step in range(steps + 1):
             score, jacobian = self._score_and_gradient(to_command(x, lower, upper), target)
             better = score < least
-            best[better], least[better] = x[better], score[better]
+            best[better] = x[better]
+            least[better] = score[better]
             if step == steps:
                 break
             gradient = half * jacobian
@@ -201,7 +207,8 @@ class Paper(LearnedMethod, LeastErrorMethod):
     def _candidates(self, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), in their order."""
         wrench = self.surrogate.wrench(command).astype(np.float64)
-        error, inside = np.linalg.norm((wrench - target) / self.scale, axis=-1), self._inside(command)
+        error = np.linalg.norm((wrench - target) / self.scale, axis=-1)
+        inside = self._inside(command)
         return Candidates(inside, wrench, error, *costs(self.layout, inside), (source,) * len(command))
 
 

@@ -106,8 +106,11 @@ class Training:
     ) -> None:
         """Takes weights by name, which are changed in place; a folder, made if need be, for log, curves and
         state; and the settings that a resumed run must share, as plain values."""
-        self.weights, self.settings, self.place = weights, settings, place
-        self.folder, self.identity = make_folder(folder), identity
+        self.weights = weights
+        self.settings = settings
+        self.place = place
+        self.folder = make_folder(folder)
+        self.identity = identity
         self.optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate)
         self.average = {name: w.detach().clone() for name, w in weights.items()} if settings.ema else {}
         self.done, self.seconds = 0, 0.0
@@ -144,17 +147,20 @@ class Training:
     def run(self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0) -> None:
         """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how far it is,
         now and then and at the end; `spent` are seconds that this call took so far, on other work."""
-        settings, first = self.settings, self.done
+        settings = self.settings
+        first = self.done
         limit = math.inf if settings.seconds is None else settings.seconds
         started = time.monotonic() - self.seconds - spent
-        saved, silent = time.monotonic(), self.place.rank > 0 or not sys.stderr.isatty()
+        saved = time.monotonic()
+        silent = self.place.rank > 0 or not sys.stderr.isatty()
         with tqdm(total=settings.steps, initial=first, unit="step", smoothing=0.05, disable=silent) as bar:
             terms: dict[str, Tensor] = {}
             while self.done < settings.steps and (self.done == first == 0 or self.seconds < limit):
                 step = self.done
                 rate = learning_rate(settings, step, self.seconds / limit)
                 terms = self._step(terms_of, step, rate)
-                self.done, self.seconds = step + 1, time.monotonic() - started
+                self.done = step + 1
+                self.seconds = time.monotonic() - started
                 bar.update()
                 if step % LOG_EVERY == 0:
                     bar.set_postfix_str(f"loss {self._log(terms, rate):.4g}")
@@ -209,7 +215,9 @@ class Training:
             for ours, read in ((self.weights, state["weights"]), (self.average, state["average"])):
                 for name, value in ours.items():
                     value.copy_(read[name])
-        self.done, self.seconds, self.rows = state["done"], state["seconds"], state["rows"]
+        self.done = state["done"]
+        self.seconds = state["seconds"]
+        self.rows = state["rows"]
 
 
 _KEPT = ("identity", "weights", "average", "done", "seconds", "rows")

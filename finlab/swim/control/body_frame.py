@@ -60,7 +60,8 @@ class WaypointController:
         self.layout = layout
         self.axes, self.free = _axes(layout, self.name)
         pace, inertia, drag, self.most = _model(layout, self.period_s)
-        slow, turn = SLOW * pace, TURN * pace
+        slow = SLOW * pace
+        turn = TURN * pace
         self.lead_s = 2.0 * DAMPING / slow
         """How far ahead of now the waypoint is [s]."""
         spring = np.maximum(inertia * slow**2, drag / self.lead_s)
@@ -150,11 +151,14 @@ class VelocityController:
         """Takes the robot; errors as `make_controller`."""
         self.axes, self.free = _axes(layout, self.name)
         pace, inertia, drag, most = _model(layout, self.period_s)
-        slow, fast = SLOW * pace, SPEED * pace
-        mass, heavy = 1.1 * float(inertia[0]), float(inertia[2])
+        slow = SLOW * pace
+        fast = SPEED * pace
+        mass = 1.1 * float(inertia[0])
+        heavy = float(inertia[2])
         damped = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0)
         self.surge = Pid(damped, fast**2 * mass, 0.1 * float(inertia[0]), float(most[0]), self.period_s)
-        a, b = 2.0 * DAMPING * slow, 0.5 * slow
+        a = 2.0 * DAMPING * slow
+        b = 0.5 * slow
         damped = max(heavy * (a + b) - float(drag[2]), 0.0)
         spring = heavy * (slow**2 + a * b)
         self.depth = Pid(spring, heavy * slow**2 * b, damped, float(most[2]), self.period_s)

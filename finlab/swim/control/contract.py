@@ -135,7 +135,8 @@ class Completion:
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
         chosen = mask_of(axes)
-        wanted, held = planar[chosen], planar[~mask_of((*axes, *free))]
+        wanted = planar[chosen]
+        held = planar[~mask_of((*axes, *free))]
         left, values, right = np.linalg.svd(wanted)
         rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
         self.controllable = rank == len(wanted)

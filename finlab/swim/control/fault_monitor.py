@@ -72,7 +72,8 @@ class FaultMonitor:
         self._torn, self._lost, self._told, self._back, self._coming_back = np.zeros((5, n), dtype=bool)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
-        self._suspect, self._sure = 0, 0
+        self._suspect = 0
+        self._sure = 0
         self._held = np.full(n, np.nan)
         self._since = self._model.motion.direction.copy()
         self._coarse = np.ones(n)
@@ -98,9 +99,11 @@ class FaultMonitor:
             command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None before the
                 first.
         """
-        beliefs, m = self._beliefs, measurement
+        beliefs = self._beliefs
+        m = measurement
         seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
-        last, self._velocity = self._velocity, m.velocity
+        last = self._velocity
+        self._velocity = m.velocity
         if last is None or command is None:
             beliefs.state[:8] = seen
             return self.verdict()
@@ -141,7 +144,8 @@ class FaultMonitor:
         rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the
         drives allow from what was returned last, as does the way back to what is commanded.
         """
-        lost, direction = self._lost & ~self._told, self._model.motion.direction
+        lost = self._lost & ~self._told
+        direction = self._model.motion.direction
         wanted = self._probe.added(command, lost, direction)
         own = (np.isfinite(wanted[:, :1]) & ~(wanted == command)).any(axis=1) | self._coming_back
         rests = np.isnan(self._sent[:, :1])
@@ -154,7 +158,8 @@ class FaultMonitor:
     def verdict(self) -> Diagnosis:
         """What is believed now."""
         beliefs = self._beliefs
-        strength, by_kind = beliefs.strength.copy(), beliefs.probability
+        strength = beliefs.strength.copy()
+        by_kind = beliefs.probability
         probability = beliefs.changed
         stuck = ~np.isnan(self._held)
         damage = Damage()
@@ -168,7 +173,8 @@ class FaultMonitor:
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""
-        names, parts = self.layout.names, self.layout.actuators
+        names = self.layout.names
+        parts = self.layout.actuators
         far = np.abs(strength - self._coarse) > 0.75 * COARSE
         steps = np.clip(np.round(strength / COARSE), 1, round(1 / COARSE)) * COARSE
         self._coarse = np.where(far, steps, self._coarse)
@@ -234,6 +240,7 @@ class FaultMonitor:
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
-        self._lost[fin], self._back[fin] = strength < LOST_BELOW, strength < OPPOSED_BELOW
+        self._lost[fin] = strength < LOST_BELOW
+        self._back[fin] = strength < OPPOSED_BELOW
         self._torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
         self._held[fin] = stuck if strength >= LOST_BELOW else math.nan

@@ -92,8 +92,10 @@ class Hypotheses:
 
     def __init__(self, n_fins: int, inertia: Array, settings: MonitorSettings) -> None:
         """Starts at rest, whole; takes the body's mass and moments (6,) with those of the water."""
-        self.n_fins, self.settings = n_fins, settings
-        s, size = settings, FIRST_FIN + n_fins
+        self.n_fins = n_fins
+        self.settings = settings
+        s = settings
+        size = FIRST_FIN + n_fins
         self.state = np.zeros(size)
         """State z (14 + n) that is taken for true."""
         self.state[STRENGTH] = 1.0
@@ -109,17 +111,20 @@ class Hypotheses:
         self._turned_off: Array = np.einsum("ii->i", self.off[:, -1, STRENGTH])
         variance = np.zeros(size)
         variance[MOTION] = variance[TILT] = 1e-4
-        variance[CURRENT], variance[TORQUE] = s.current**2, s.torque**2
+        variance[CURRENT] = s.current**2
+        variance[TORQUE] = s.torque**2
         variance[STRENGTH] = s.strength**2
         self._first = np.diag(variance)
         self.covariance = self._first.copy()
         """Covariance (14 + n, 14 + n) of each."""
         noise = np.zeros(size)
-        noise[CURRENT], noise[TORQUE] = s.current_drift**2, s.torque_drift**2
+        noise[CURRENT] = s.current_drift**2
+        noise[TORQUE] = s.torque_drift**2
         noise[RISING] *= (s.rising_current / s.current) ** 2
         noise[STRENGTH] = s.strength_drift**2
         motion = np.array([s.force_noise**2] * 3 + [s.torque_noise**2] * 3) / inertia**2
-        self._noise, self._motion_noise = noise, motion
+        self._noise = noise
+        self._motion_noise = motion
         self._sensors = np.diag([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
         self._slow_sensors = self._sensors[3:, 3:].copy()
         self._most = np.full(n_fins, s.strength**2)
@@ -135,7 +140,8 @@ class Hypotheses:
 
     def _settle(self) -> None:
         """All beliefs begin, at their prior probabilities."""
-        pairs, m = self.pairs, len(LEVELS) + 1
+        pairs = self.pairs
+        m = len(LEVELS) + 1
         level = np.append(LEVELS, 0.0) - self.strength[:, None]
         level[:, -1] = 0.0
         possible = np.abs(level) > APART
@@ -158,9 +164,13 @@ class Hypotheses:
 
     def _begin_anew(self, seen: Array) -> None:
         """Of the motion only what is measured (8,) is known; what has been learned of strengths stays."""
-        self.state[:8], self.state[CURRENT], self.state[TORQUE] = seen, 0.0, 0.0
+        self.state[:8] = seen
+        self.state[CURRENT] = 0.0
+        self.state[TORQUE] = 0.0
         self.covariance = self._first.copy()
-        self._age_s, self.misfit, self.distance = 0.0, 1.0, 0.0
+        self._age_s = 0.0
+        self.misfit = 1.0
+        self.distance = 0.0
         self._settle()
 
     def _of_fins(self, values: Array) -> Array:
@@ -192,12 +202,15 @@ class Hypotheses:
         """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
         self._age_s += dt
         if not self.settled:
-            opposed, likely = self.off[:, OPPOSED].copy(), self.probability[:, OPPOSED].copy()
+            opposed = self.off[:, OPPOSED].copy()
+            likely = self.probability[:, OPPOSED].copy()
             self._settle()
-            self.off[:, OPPOSED], self.probability[:, OPPOSED] = opposed, likely
+            self.off[:, OPPOSED] = opposed
+            self.probability[:, OPPOSED] = likely
             self.doubt = float(self._probability.sum())
             return np.ones_like(self.probability)
-        fresh, kept = dt * (1.0 - self.doubt), 1.0 - dt / self.settings.doubt_s
+        fresh = dt * (1.0 - self.doubt)
+        kept = 1.0 - dt / self.settings.doubt_s
         new = self._rate * fresh
         self._probability *= kept
         self._probability += new
@@ -244,7 +257,8 @@ class Hypotheses:
         distances = distance.tolist()
         if not distances[0] < ASTRAY:
             return self._begin_anew(seen)
-        self.distance, least = distances[0], min(distances)
+        self.distance = distances[0]
+        least = min(distances)
         # Where fins are not what the model says, even the best belief is far off: trust it less.
         surprise = min(least / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
         self.misfit = min(max(self.misfit * math.exp(ADAPTING * surprise), 1.0), MOST_MISFIT)
@@ -259,7 +273,8 @@ class Hypotheses:
         weight = self._probability * np.exp(better - best)
         total = sum(weight.tolist())
         every = total + (1.0 - self.doubt) * math.exp(-best)
-        self._probability, self.doubt = weight / every, total / every
+        self._probability = weight / every
+        self.doubt = total / every
 
     @property
     def settled(self) -> bool:
@@ -295,6 +310,7 @@ class Hypotheses:
     def _doubt(self, fin: int, std: float) -> None:
         """The strength of a fin is known no better than that."""
         row = FIRST_FIN + fin
-        self.covariance[row], self.covariance[:, row] = 0.0, 0.0
+        self.covariance[row] = 0.0
+        self.covariance[:, row] = 0.0
         self.covariance[row, row] = self._most[fin] = std**2
         self._settle()

@@ -19,7 +19,10 @@ from finlab.swim.vehicle.attitude import quaternion_of, rotation_of_quaternion, 
 from finlab.swim.vehicle.fossen import complete_body, jacobian
 from finlab.swim.vehicle.vehicle import Vehicle
 
-MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11, 14)
+MOTION = slice(0, 6)
+TILT = slice(6, 8)
+CURRENT = slice(8, 11)
+TORQUE = slice(11, 14)
 RISING = 10
 FIRST_FIN = 14
 STRENGTH = slice(FIRST_FIN, None)
@@ -64,7 +67,8 @@ class MotionModel:
         # Roll swings within a second: an oscillation over a period is a turn, and a step along it would grow.
         # (Of a robot that is heavy at the top the frequency is imaginary, and the cosine a hyperbolic one.)
         swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
-        sine, cosine = np.sin(swing * period_s), np.cos(swing * period_s)
+        sine = np.sin(swing * period_s)
+        cosine = np.cos(swing * period_s)
         self._constant[range(3, 5), range(6, 8)] = (-swing * sine).real
         self._constant[range(6, 8), range(3, 5)] = (sine / swing).real
         self._constant[range(6, 8), range(6, 8)] = cosine.real
@@ -72,7 +76,8 @@ class MotionModel:
         self._force = np.zeros((2, layout.n, 6))
         self._thrust = np.zeros((layout.n, 3))
         self._turned_off = np.array(["stuck" in part.FAULTS for part in layout.actuators])
-        self._unsure_s, self._any_unsure = np.zeros(layout.n), False
+        self._unsure_s = np.zeros(layout.n)
+        self._any_unsure = False
         self.unsure = np.zeros(layout.n, dtype=bool)
         """Which actuators (n,) turn about by command just now; which way round is unknown."""
 
@@ -91,7 +96,8 @@ class MotionModel:
                 turn as commanded.
             other: where they might be instead; NaN likewise.
         """
-        motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
+        motion = state[MOTION].tolist()
+        current = state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
         quaternion = quaternion_of(roll, pitch, yaw - self._dt * motion[5])
         rotation = rotation_of_quaternion(*quaternion)

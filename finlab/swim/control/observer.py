@@ -25,7 +25,9 @@ from finlab.swim.vehicle.vehicle import Vehicle
 
 AXES = [0, 1, 2, 5]
 """Surge, sway, heave and yaw among the six."""
-MOTION, UNKNOWN, CURRENT = slice(0, 4), slice(4, 7), slice(7, 9)
+MOTION = slice(0, 4)
+UNKNOWN = slice(4, 7)
+CURRENT = slice(7, 9)
 DRIVEN = [0, 2, 3]
 """Where what is in the state, and which of the motions the unknown accelerations (3,) change."""
 UNKNOWN_FORCE = 0.006
@@ -85,7 +87,8 @@ class MotionObserver:
 
     def __init__(self, layout: Layout, period_s: float) -> None:
         """Takes a layout, whose body is completed by U-CAT's, and the time between calls [s]."""
-        self._vehicle, self._dt = Vehicle(complete_body(layout)), period_s
+        self._vehicle = Vehicle(complete_body(layout))
+        self._dt = period_s
         self._dynamics = self._vehicle.dynamics
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
@@ -115,15 +118,18 @@ class MotionObserver:
     def step(self, measurement: Measurement, wrench: Array) -> Estimate:
         """Takes a measurement and the wrench (6,) that the fins have given since the last one, as far as
         known [N, N m]; returns what is believed."""
-        m, before = measurement, self._estimate
+        m = measurement
+        before = self._estimate
         pose = np.array([m.position[0], m.position[1], -m.depth, m.roll, m.pitch, m.yaw])
         if before is None:
             self._state[MOTION] = self._seen(m)
         else:
             self._predict(before, wrench)
             self._correct(m)
-            dt, (x, y, z) = self._dt, before.position.tolist()
-            roll, pitch = before.roll + dt * float(m.rates[0]), before.pitch + dt * float(m.rates[1])
+            dt = self._dt
+            x, y, z = before.position.tolist()
+            roll = before.roll + dt * float(m.rates[0])
+            pitch = before.pitch + dt * float(m.rates[1])
             yaw = float(self._poses[0][5]) + dt * float(self._state[3])  # counted on over the seam
             counted = np.array([x, y, z, roll, pitch, yaw])
             counted[:3] += dt * in_world(self._state, roll, pitch, yaw)
@@ -145,8 +151,10 @@ class MotionObserver:
             return now
         known = np.array([now, *past])
         back = np.minimum(np.array(ages) / self._dt, len(past))
-        row, each = np.minimum(back.astype(int), len(past) - 1), np.arange(len(now))
-        after, before = known[row, each], known[row + 1, each]
+        row = np.minimum(back.astype(int), len(past) - 1)
+        each = np.arange(len(now))
+        after = known[row, each]
+        before = known[row + 1, each]
         return np.asarray(after + (back - row) * (before - after))
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
@@ -173,7 +181,8 @@ class MotionObserver:
         """
         velocity = np.array([setpoint.velocity for setpoint in setpoints])
         acceleration = np.array([setpoint.acceleration for setpoint in setpoints])
-        (x, y), (ax, ay) = (velocity[:, :2] - current).T, acceleration[:, :2].T
+        x, y = (velocity[:, :2] - current).T
+        ax, ay = acceleration[:, :2].T
         speed = np.hypot(x, y)
         turning = (x * ay - y * ax) / np.maximum(speed * speed, slow * slow)
         faster = (x * ax + y * ay) / np.maximum(speed, 1e-3)
@@ -189,8 +198,11 @@ class MotionObserver:
 
     def _predict(self, before: Estimate, wrench: Array) -> None:
         """The state over one period, and how much less is known of it."""
-        dt, state, transition = self._dt, self._state, self._transition
-        cosine, sine = math.cos(before.yaw), math.sin(before.yaw)
+        dt = self._dt
+        state = self._state
+        transition = self._transition
+        cosine = math.cos(before.yaw)
+        sine = math.sin(before.yaw)
         c, d = state[CURRENT].tolist()
         flow = state[MOTION].copy()
         flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
@@ -207,10 +219,12 @@ class MotionObserver:
 
     def _correct(self, m: Measurement) -> None:
         """What the sensors have seen; a velocity counts where it is a new one."""
-        seen, (_, _, dvl, imu) = self._seen(m), m.ages
+        seen = self._seen(m)
+        _, _, dvl, imu = m.ages
         missed = seen - self._then(self._motions, self._state[MOTION], [dvl, dvl, dvl, imu])
         if not max(map(abs, missed.tolist())) < ASTRAY:
-            self._state[:], self._covariance = 0.0, self._first
+            self._state[:] = 0.0
+            self._covariance = self._first
             self._state[MOTION] = seen
             return
         rows = slice(3 if m.velocity is self._last_velocity else 0, 4)
@@ -228,7 +242,8 @@ class MotionObserver:
             [0.0, 0.0, 0.0, *attitude, u, v, w, *m.rates[:2].tolist(), r], (0.0,) * 6
         )
         drift = np.array([jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw])
-        velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
+        velocity = self._state[:3].copy()
+        current = self._state[CURRENT].copy()
         world = in_world(velocity, roll, pitch, yaw)
         pitching = float(m.rates[1]), jacobian[11], self._vehicle.inertia[4]
         return Estimate(position, roll, pitch, yaw, velocity, r, world, current, *pitching, drift)

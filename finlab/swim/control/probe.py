@@ -36,10 +36,12 @@ class Probe:
         share = np.linspace(0.0, 1.0, SIZES)[:, None]
         self._frequency = layout.lower[:, 1] + share * (layout.upper[:, 1] - layout.lower[:, 1])
         self._thrust = np.maximum.accumulate(self._plant.thrust(self._amplitude, self._frequency))
-        self._lower, self._upper = layout.lower[:, 2], layout.upper[:, 2]
+        self._lower = layout.lower[:, 2]
+        self._upper = layout.upper[:, 2]
         self._full = is_full_turn(self._upper - self._lower)
         self._least = settings.least_push
-        self._every, self._length = round(settings.probe_every_s / period_s), round(LENGTH_S / period_s)
+        self._every = round(settings.probe_every_s / period_s)
+        self._length = round(LENGTH_S / period_s)
         self._side = np.zeros(layout.n)
         self._parts = layout.actuators
         self._of_fins = layout.is_fin
@@ -74,7 +76,8 @@ class Probe:
             return self._command(index, 0.0, math.copysign(FORCE_N, math.sin(direction)))
         row = [0.0, 0.0, 0.0]
         if part.THRUST is not None:
-            low, high = part.lower[part.THRUST], part.upper[part.THRUST]
+            low = part.lower[part.THRUST]
+            high = part.upper[part.THRUST]
             force = max(SHARE * max(high, -low), 2.0 * getattr(part, "dead_band", 0.0))
             if part.TURNS:
                 row[part.HELD] = direction
@@ -86,7 +89,8 @@ class Probe:
         those before it, so that together they lift little; a side is kept until a fin is busy again."""
         known = np.isfinite(command[:, 0])
         force = self._plant.force(np.where(known[:, None], command, 0.0))
-        ahead, size = force[:, 1], np.hypot(force[:, 1], force[:, 2])
+        ahead = force[:, 1]
+        size = np.hypot(force[:, 1], force[:, 2])
         self._side[size > BUSY * self._least] = 0.0
         idle = np.flatnonzero(known & self._of_fins & (size < self._least))
         if not len(idle) or known.sum() < FEWEST:

@@ -82,7 +82,8 @@ def gains_for(layout: Layout) -> TrackingGains:
     velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
     most = most_of(layout)
     body = dynamics_of(complete_body(layout))
-    linear, quadratic = body.linear[0], max(body.quadratic[0], 1e-9)
+    linear = body.linear[0]
+    quadratic = max(body.quadratic[0], 1e-9)
     steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)
     return TrackingGains(
         velocity=velocity * pace,
@@ -101,7 +102,8 @@ class TrackingController:
 
     def __init__(self, layout: Layout) -> None:
         """Takes the robot as its designer knows it."""
-        self.layout, self.gains = layout, gains_for(layout)
+        self.layout = layout
+        self.gains = gains_for(layout)
         self.axes = axes_of(layout)
         self._sways = "Fy" in self.axes
         self._dives = "Ty" in self.axes
@@ -114,10 +116,12 @@ class TrackingController:
     def reset(self) -> None:
         """Forget all that was seen."""
         self._observer = MotionObserver(self.layout, self.period_s)
-        self._passing, self._rising = 0.0, 0.0
+        self._passing = 0.0
+        self._rising = 0.0
         self._away: Array | None = None
         self._smoothing = 1.0 - math.exp(-self.period_s / SMOOTH_S)
-        self._wrench, self._bound = np.zeros(6), self._most
+        self._wrench = np.zeros(6)
+        self._bound = self._most
         self.estimate: Estimate | None = None
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
@@ -126,7 +130,8 @@ class TrackingController:
         now = self.estimate = self._observer.step(measurement, delivered)
         wanted = self._velocity(now, setpoint)
         u_wanted, yaw_rate = self._surge_and_turn(now, wanted, setpoint)
-        cy, sy = math.cos(now.yaw), math.sin(now.yaw)
+        cy = math.cos(now.yaw)
+        sy = math.sin(now.yaw)
         ax, ay, az = setpoint.acceleration.tolist()
         miss = np.array(
             [
@@ -182,11 +187,15 @@ class TrackingController:
     def _surge_and_turn(self, now: Estimate, wanted: Array, setpoint: Setpoint) -> tuple[float, float]:
         """Surge speed over ground [m/s] and yaw rate [rad/s] that bring the robot to a velocity (3,)."""
         g = self.gains
-        cosine, sine = math.cos(now.yaw), math.sin(now.yaw)
+        cosine = math.cos(now.yaw)
+        sine = math.sin(now.yaw)
         c, d = (0.0, 0.0) if self._sways else now.current.tolist()
-        x, y = float(wanted[0]) - c, float(wanted[1]) - d  # through the water
+        # through the water
+        x = float(wanted[0]) - c
+        y = float(wanted[1]) - d
         speed = math.hypot(x, y)
-        vx, vy = float(setpoint.velocity[0]) - c, float(setpoint.velocity[1]) - d
+        vx = float(setpoint.velocity[0]) - c
+        vy = float(setpoint.velocity[1]) - d
         ax, ay, _ = setpoint.acceleration.tolist()
         turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, SLOW**2)
         forward = float(now.velocity[0]) - (cosine * c + sine * d)

@@ -51,12 +51,15 @@ class HullSolid:
         nothing."""
         points = np.asarray(corners, dtype=float)
         solid = mass_properties(points)
-        volume, inertia = float(solid.volume), np.diag(np.asarray(solid.inertia))
+        volume = float(solid.volume)
+        inertia = np.diag(np.asarray(solid.inertia))
         if not volume > 1e-9:
             raise FinlabError(f"the hull encloses {volume:.3g} m^3; expected a closed surface, outside out")
-        sizes, local = area(points), points - solid.center_mass
+        sizes = area(points)
+        local = points - solid.center_mass
         spread = ((local**2).sum(axis=1) + local.sum(axis=1) ** 2) / 12.0
-        moments, wetted = (0.5 * inertia.sum() - inertia) / volume, float(sizes.sum())
+        moments = (0.5 * inertia.sum() - inertia) / volume
+        wetted = float(sizes.sum())
         return HullSolid(volume, solid.center_mass, moments, wetted, sizes @ spread / wetted)
 
     def inertia(self, mass: float) -> Array:
@@ -91,7 +94,8 @@ def ellipsoid_added_mass(half: ArrayLike, density: float = WATER) -> Array:
     about = []
     for axis in range(3):
         second, third = np.delete(np.arange(3), axis)
-        gap, both = squares[second] - squares[third], squares[second] + squares[third]
+        gap = squares[second] - squares[third]
+        both = squares[second] + squares[third]
         twist = shares[third] - shares[second]
         # Round about the axis, nothing is pushed aside; the quotient would be zero over zero.
         below = 2.0 * gap - both * twist
@@ -164,14 +168,17 @@ def lift_of(body: Body) -> float:
 def contradicts(layout: Layout) -> bool:
     """Says whether the body's mass is known, and its buoyancy differs by more than a tenth from that of the
     hull. Raises FinlabError: the hull encloses nothing."""
-    body, water = layout.body or Body(), displaced(layout)
+    body = layout.body or Body()
+    water = displaced(layout)
     return body.mass_kg is not None and abs(lift_of(body) / GRAVITY - water) > DOUBTFUL * water
 
 
 def estimated(layout: Layout) -> Layout:
     """Returns the layout with what its hull says of the body, to four digits; a mass that is known stays.
     Raises FinlabError: the hull encloses nothing."""
-    solid, density, body = solid_of(hull_of(layout)), water_density(layout), layout.body or Body()
+    solid = solid_of(hull_of(layout))
+    density = water_density(layout)
+    body = layout.body or Body()
     mass = body.mass_kg if body.mass_kg is not None else _rounded(density * solid.volume)
     changed = replace(
         body,

@@ -104,7 +104,8 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
             f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle only; "
             "give it a thickness, or close it"
         )
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low = vertices.min(axis=0)
+    high = vertices.max(axis=0)
     length = float((high - low).max())
     if not SMALLEST <= length <= LARGEST:
         raise SizeError(
@@ -131,7 +132,8 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh()
-        faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, dtype=float)
+        faces = np.asarray(mesh.faces)
+        corners = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # trimesh's readers raise whatever went wrong inside them
         reason = str(error).split("\n")[0][:120]
         raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({reason})") from None
@@ -156,7 +158,8 @@ def _mended(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     kept = len(mesh.faces)
     if not mesh.is_watertight:
         trimesh.repair.fill_holes(mesh)
-    filled, normals = len(mesh.faces) - kept, np.array(mesh.face_normals)
+    filled = len(mesh.faces) - kept
+    normals = np.array(mesh.face_normals)
     trimesh.repair.fix_normals(mesh)
     turned = int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
     counts = {"without an area or twice there left out": before - kept, "added to close holes": filled}

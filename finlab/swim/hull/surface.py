@@ -39,7 +39,8 @@ def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sid
         sides: corners of the cross-section.
     """
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    cos, sin = np.cos(turn), np.sin(turn)
+    cos = np.cos(turn)
+    sin = np.sin(turn)
     unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
     unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
     x, y, z = np.broadcast_arrays(x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z)

@@ -83,7 +83,8 @@ class Fitted:
 
 def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
     """Windows of swims of so many steps each; measurements (M, 12) and smoothed ones (M, 12)."""
-    steps, begin = [], 0
+    steps = []
+    begin = 0
     for count in n_steps:
         n = max(1, round(count / WINDOW))
         steps += [begin + count // n * k + np.arange(count // n) for k in range(n)]
@@ -118,16 +119,19 @@ def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: 
     """
     more = Unknowns(model.blocks, (*BASE, name))
     vector = np.pad(fitted.vector, (0, more.size - len(fitted.vector)))
-    at, believed = _Problem(model, more, windows, deviation).at(vector, fitted.start), more.believed
+    at = _Problem(model, more, windows, deviation).at(vector, fitted.start)
+    believed = more.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
     known = np.ones(more.size, bool)
     known[more.place(name)] = False
 
     def gain(chosen: NDArray[np.bool_]) -> Array:
         """What windows gain by changes of the chosen unknowns that the others ask for (W,)."""
-        gains, here = np.empty(len(fold)), np.flatnonzero(chosen)
+        gains = np.empty(len(fold))
+        here = np.flatnonzero(chosen)
         for k in range(FOLDS):
-            seen, unseen = fold != k, np.flatnonzero(fold == k)
+            seen = fold != k
+            unseen = np.flatnonzero(fold == k)
             information = at.own_information[seen].sum(axis=0) + believed
             pull = at.scores[seen].sum(axis=0) - believed @ vector
             change = np.linalg.solve(information[np.ix_(here, here)], pull[here])
@@ -149,9 +153,12 @@ class _Problem:
 
     def at(self, vector: Array, start: Array) -> Fitted:
         """The problem at unknowns (size,) and beginnings (12, W), derivatives by differences."""
-        n, windows, unknowns = self.unknowns.size, self.windows, self.unknowns
+        n = self.unknowns.size
+        windows = self.windows
+        unknowns = self.unknowns
         vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(n)])
-        n_all, w = 1 + n + 12, start.shape[1]
+        n_all = 1 + n + 12
+        w = start.shape[1]
         wrench = self._wrenches(vectors)
         wrench = np.concatenate([wrench, np.repeat(wrench[:, :, :1], 12, axis=2)], axis=2)
         vectors = np.concatenate([vectors, np.repeat(vector[None], 12, axis=0)])
@@ -180,7 +187,8 @@ class _Problem:
         believed = unknowns.believed
         cost = 0.5 * float((left**2).sum() + (begun**2).sum() + vector @ believed @ vector)
         cost_of_all = np.array([cost if np.isfinite(sensed).all() else np.inf])
-        slopes_of_all, information = scores.sum(axis=0) - believed @ vector, own.sum(axis=0) + believed
+        slopes_of_all = scores.sum(axis=0) - believed @ vector
+        information = own.sum(axis=0) + believed
         solved = (cost_of_all, slopes_of_all, information, own, scores)
         return Fitted(unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull)
 

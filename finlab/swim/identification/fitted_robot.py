@@ -37,7 +37,9 @@ smaller one."""
 
 def summary(fit: RobotFit) -> tuple[str, ...]:
     """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
-    doubts, unknown, seconds = fit.doubts(), fit.untold(), 0.1 * len(fit.model.motion)
+    doubts = fit.doubts()
+    unknown = fit.untold()
+    seconds = 0.1 * len(fit.model.motion)
     thrusters = any(part.THRUST is not None for part in fit.model.layout.actuators)
     turned = "pushes the other way than the layout says; in the layout that is written it is turned"
     lines = {
@@ -58,7 +60,9 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
 
 def table(fit: RobotFit) -> str:
     """Every unknown with its standard error, and how much of what was doubtful before is left."""
-    unknowns, vector, error = fit.fitted.unknowns, fit.fitted.vector, fit.error
+    unknowns = fit.fitted.unknowns
+    vector = fit.fitted.vector
+    error = fit.error
     width = max(len(label) for label in unknowns.labels)
     lines = [f"{'':{width}}  {'found':>10}  {'+-':>9}  doubt left"]
     rows = zip(unknowns.labels, unknowns.units, vector, error, unknowns.scale, strict=True)
@@ -73,8 +77,11 @@ def table(fit: RobotFit) -> str:
 def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
     """Returns the actuators of a fit that lean by angles (n,) [rad], see `turned_frames`, by the laws that
     they had before."""
-    parts, center, unsure = [], fit.found("center"), uncertainties(fit)
-    layout, share = fit.model.layout, np.exp(fit.found("strength"))
+    parts = []
+    center = fit.found("center")
+    unsure = uncertainties(fit)
+    layout = fit.model.layout
+    share = np.exp(fit.found("strength"))
     frames = turned_frames(layout, fit.found("mounting"), lean)
     for i, part in enumerate(layout.actuators):
         moved = part.turned(frames[i], np.array(part.position) - center, uncertainty=unsure[i])
@@ -108,7 +115,8 @@ def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
     """Writes the layout that a fit gives, and tables beside it where its fins follow another law. Raises
     DataError or LayoutError: a table or the layout cannot be written."""
-    layout, place = fit.model.layout, Path(path)
+    layout = fit.model.layout
+    place = Path(path)
     lean = fit.found("lean")
     certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
     parts = list(learned(fit, np.where(certain, lean, 0.0)))
@@ -141,7 +149,9 @@ def _table(fit: RobotFit, i: int, fin: Fin) -> str:
 
 
 def _body(fit: RobotFit) -> Body:
-    model, unknowns, vector = fit.model, fit.fitted.unknowns, fit.fitted.vector
+    model = fit.model
+    unknowns = fit.fitted.unknowns
+    vector = fit.fitted.vector
     fitted = model.bodies(unknowns, vector[None])
     hull = None if model.layout.body is None else model.layout.body.hull
     if hull is not None:
@@ -203,7 +213,8 @@ class OnlineFit:
                 f"{fit.explained:.0%} of the motion, expected at least {SOUND:.0%}"
             )
             return None
-        strength, error = np.exp(fit.found("strength")), fit.found_error("strength")
+        strength = np.exp(fit.found("strength"))
+        error = fit.found_error("strength")
         rows = zip(self.layout.names, strength, error, strict=True)
         words = ", ".join(f"{name} {own:.2f} +- {own * unsure:.2f}" for name, own, unsure in rows)
         turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)

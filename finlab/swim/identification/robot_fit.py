@@ -83,7 +83,8 @@ class RobotFit:
 
     def untold(self) -> tuple[str, ...]:
         """What the data cannot tell of the robot: nearly as doubtful as before."""
-        unknowns, error = self.fitted.unknowns, self.error
+        unknowns = self.fitted.unknowns
+        error = self.error
         error[unknowns.place("delay")] = 0.0  # of the sensors, and no part of a layout
         return tuple(label for label, own in zip(unknowns.labels, error, strict=True) if own > UNTOLD)
 
@@ -94,7 +95,8 @@ class RobotFit:
             share = f"{self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
             clauses.append(f"simulated swims explain {share}")
         names = self.model.layout.names
-        place, n = self.fitted.unknowns.place("strength"), len(names)
+        place = self.fitted.unknowns.place("strength")
+        n = len(names)
         centered = self.fitted.unknowns.scale[place] * (np.eye(n) - (1.0 / n if n > 1 else 0.0))
         covariance = centered @ self.covariance[place, place] @ centered.T
         for name, error in zip(names, np.sqrt(np.diag(covariance)), strict=True):
@@ -147,14 +149,17 @@ def _fit(
     measured = np.concatenate([swim.measured for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
     model.meet(smooth[:, 6:])
-    unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
+    unknowns = Unknowns(model.blocks, BASE)
+    deviation = DEVIATION
 
     def fit(vector: Array, start: Array, what: str) -> Fitted:
         nonlocal deviation
         for _ in range(ROUNDS):
             tell(f"fitting {what}")
             fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
-            vector, start, deviation = fitted.vector, fitted.start, _deviation(fitted, deviation)
+            vector = fitted.vector
+            start = fitted.start
+            deviation = _deviation(fitted, deviation)
             _keep_delays(model, fitted)
         return fitted
 
@@ -181,7 +186,8 @@ def _fit(
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:
     """Deviations (12,) of the channels by what is left over, outliers aside."""
-    left, scale = np.abs(fitted.residual), DEVIATION.copy()
+    left = np.abs(fitted.residual)
+    scale = DEVIATION.copy()
     for k in range(12):
         said = left[:, k][np.isfinite(left[:, k])]
         if len(said):

@@ -40,7 +40,8 @@ class RobotModel:
 
     def __init__(self, layout: Layout, swims: Sequence[Swim], doubts: Mapping[str, float]) -> None:
         """Takes the robot as it is believed to be, and by what factors some blocks may be farther off."""
-        self.layout, self.body = layout, complete_body(layout)
+        self.layout = layout
+        self.body = complete_body(layout)
         self.dynamics = Dynamics(*map(np.array, dynamics_of(self.body)))
         """Of that body; arrays."""
         known = self.dynamics
@@ -90,12 +91,14 @@ class RobotModel:
         (low_a, high_a), (low_f, high_f) = self.seen
         a = np.clip(command[..., 0], low_a, high_a) / self.middle[0]
         f = np.clip(command[..., 1], low_f, high_f) / self.middle[1]
-        p, q = a - 1.0, f - 1.0
+        p = a - 1.0
+        q = f - 1.0
         return np.stack([p, q, p * p, p * q, q * q], axis=-1)
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""
-        layout, lean = self.layout, unknowns.of("lean", vector)
+        layout = self.layout
+        lean = unknowns.of("lean", vector)
         force = self.alone + lean[:, None] * self._by_lean if self.steers.any() else self.alone
         share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
         shape = unknowns.part(SHAPE, vector)
@@ -125,7 +128,9 @@ class RobotModel:
     def sensed(self, unknowns: Unknowns, vectors: Array, state: Array) -> Array:
         """What late sensors say of states (L, 12, B, W) of L steps under B vectors (B, size): where the robot
         was `late` steps before, and from there on along its slope."""
-        slope, said, step = np.gradient(state, STEP_S, axis=0), np.empty_like(state), np.arange(len(state))
+        slope = np.gradient(state, STEP_S, axis=0)
+        said = np.empty_like(state)
+        step = np.arange(len(state))
         delays = unknowns.of("delay", vectors).T
         for delay, late, channels in zip(delays, self.late, SENSORS.values(), strict=True):
             before = np.clip(step - late, 0, len(state) - 1)
@@ -177,7 +182,9 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
         kept = [savgol_filter(part, *SMOOTHED, deriv=order, delta=STEP_S, axis=0) for part in parts]
         return np.concatenate(kept)
 
-    n, flow, body = model.layout.n, smooth[:, 6:], model.dynamics
+    n = model.layout.n
+    flow = smooth[:, 6:]
+    body = model.dynamics
     model.meet(flow)
     drawn = filtered(np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout)))
     up = rotation_of_angles(smooth[:, 3:6].T)[2::3]
@@ -190,7 +197,8 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
     left = missing
     for _ in range(ROUNDS):
         noise = left.std(axis=0) + 1e-9
-        rows, wanted = (by / noise[:, None]).reshape(-1, n + 18), (missing / noise).ravel()
+        rows = (by / noise[:, None]).reshape(-1, n + 18)
+        wanted = (missing / noise).ravel()
         # The filter leaves one independent sample in as many as it is long.
         information = rows.T @ rows / SMOOTHED[0] + believed
         change = np.linalg.solve(information, rows.T @ wanted / SMOOTHED[0])

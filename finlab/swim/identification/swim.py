@@ -93,12 +93,14 @@ def smoothed(measured: Array) -> Array:
     say nothing are made of the others, or zero."""
     from scipy.signal import savgol_filter
 
-    grid, full = np.arange(len(measured)), np.zeros(measured.shape)
+    grid = np.arange(len(measured))
+    full = np.zeros(measured.shape)
     for k, fresh, values in _channels(measured):
         full[:, k] = np.interp(grid, grid[fresh], values)
     said = np.asarray(np.isfinite(measured).any(axis=0))
     full[:, said] = savgol_filter(full[:, said], *SMOOTHED, axis=0)
-    pace, angles = np.gradient(full, STEP_S, axis=0), full[:, ANGLES]
+    pace = np.gradient(full, STEP_S, axis=0)
+    angles = full[:, ANGLES]
     made = np.concatenate([body_velocity(angles, pace[:, :3]), body_rates(angles, pace[:, ANGLES])], axis=1)
     full[:, 6:] = np.where(said[6:], full[:, 6:], made)
     return full
@@ -156,7 +158,8 @@ def _csv(path: Path, layout: Layout) -> Swim:
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
     expected = f"t, what was measured, and what was commanded, {', '.join(commands)}"
     read = read_columns(path, names, ("t", *commands, *pairs), expected, UNITS, gaps=True)
-    n, places = len(read.places), read.places
+    n = len(read.places)
+    places = read.places
     time = read.values["t"]
     _check_time(time, places)
     _check_duration(float(time[-1] - time[0]), path)
@@ -170,7 +173,8 @@ def _csv(path: Path, layout: Layout) -> Swim:
     _check_commands(command, places, layout)
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
-    command, measured = command[held], _on_grid(time, only_new(measured), grid)
+    command = command[held]
+    measured = _on_grid(time, only_new(measured), grid)
     return Swim(path.name, replay(layout, command), measured)
 
 
@@ -194,9 +198,11 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
         for part, name in enumerate(dict(one.NUMBERS)):
             if name not in UNIT_OF:
                 continue
-            low, high = one.lower[part], one.upper[part]
+            low = one.lower[part]
+            high = one.upper[part]
             if isinstance(one, Fin):
-                low, high = 0.0, (MAX_AMPLITUDE, MAX_FREQUENCY)[part]
+                low = 0.0
+                high = (MAX_AMPLITUDE, MAX_FREQUENCY)[part]
             wrong = (command[:, i, part] < low - 1e-6) | (command[:, i, part] > high + 1e-6)
             if wrong.any():
                 k = int(np.argmax(wrong))

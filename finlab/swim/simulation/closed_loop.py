@@ -98,7 +98,10 @@ class ClosedLoop:
             )
         events = [Fault(*failure).checked() for failure in failures]
         layout.indices([event.name for event in events], "failures")
-        self.layout, self.allocator, self.task, self.seed = layout, allocator, task, seed
+        self.layout = layout
+        self.allocator = allocator
+        self.task = task
+        self.seed = seed
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         # Rudders that the flow leaves weak must not stop the propeller.
@@ -114,12 +117,15 @@ class ClosedLoop:
         """The motion of all actuators."""
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
-        self.announced, self.monitor, self.learner = announced, monitor, learner
+        self.announced = announced
+        self.monitor = monitor
+        self.learner = learner
         self._begin()
 
     def _begin(self) -> None:
         """The state at the start, and what is known then."""
-        layout, n = self.layout, self.layout.n
+        layout = self.layout
+        n = self.layout.n
         self.broken: dict[str, Fault] = {}
         """What is true: the actuators that are not whole now, by name."""
         self._told: dict[str, Fault] = {}
@@ -135,11 +141,13 @@ class ClosedLoop:
         """Length of a step [s]."""
         self._plant = plant_of(layout)
         self._flow: Array | None = None
-        self._believed, self._gave = ActuatorMotion(layout), NO_WRENCH
+        self._believed = ActuatorMotion(layout)
+        self._gave = NO_WRENCH
         start, heading = self.task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
-        self.state[:3], self.state[3:7] = start, quaternion_of(0.0, 0.0, heading)
+        self.state[:3] = start
+        self.state[3:7] = quaternion_of(0.0, 0.0, heading)
         self.controller.reset()
 
     @property
@@ -258,7 +266,8 @@ class ClosedLoop:
 
     def _believe(self, layout: Layout) -> None:
         """From now on allocator and monitor take the robot for this one."""
-        self.allocator, self._plant = self.allocator.on(layout), plant_of(layout)
+        self.allocator = self.allocator.on(layout)
+        self._plant = plant_of(layout)
         self._told = {name: fault for name, fault in self._told.items() if fault.kind != "torn"}
         if self.monitor is not None:
             self.monitor.adopt(layout)
@@ -291,7 +300,8 @@ class ClosedLoop:
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         force[list(self.layout.indices(self.damage.lost))] = 0.0
-        before, self._gave = self._gave, self._plant.wrench_of(force, flow=self._flow)
+        before = self._gave
+        self._gave = self._plant.wrench_of(force, flow=self._flow)
         return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
@@ -327,15 +337,19 @@ class ClosedLoop:
         self, now: Measurement, setpoint: Setpoint, wanted: Array, command: Array, solve_ms: float
     ) -> Tick:
         """Actuators and body over one period with a constant command."""
-        time, before, n = self.time, self.state, self.layout.n
+        time = self.time
+        before = self.state
+        n = self.layout.n
         n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
-        moved, share = self._moved(sent), np.ones(n)
+        moved = self._moved(sent)
+        share = np.ones(n)
         for fault in self.broken.values():
             if fault.kind == "torn":
                 share[self.layout.index(fault.name)] = fault.share
-        mean, power = np.zeros((n, 6)), np.zeros((2, n))
+        mean = np.zeros((n, 6))
+        power = np.zeros((2, n))
         for k in range(n_steps):
             water = self.vehicle.velocity_in_water(self.state)
             push = self._forces.step(moved, dt, water, share)
@@ -345,7 +359,8 @@ class ClosedLoop:
                 self._sensors.sample(time + (k + 1) * dt, self.state)
             mean += wrenches
             power += push.power
-        mean, power = mean / n_steps, power / n_steps
+        mean = mean / n_steps
+        power = power / n_steps
         beliefs = (np.full(n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
         return Tick(
             time=time,

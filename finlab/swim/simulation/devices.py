@@ -93,14 +93,18 @@ class Channel:
 
     def __init__(self, sensor: Sensor, rng: np.random.Generator) -> None:
         """Takes the sensor, and where its noise comes from."""
-        self._sensor, self._period = sensor, 1.0 / sensor.rate_hz
+        self._sensor = sensor
+        self._period = 1.0 / sensor.rate_hz
         # Another stream than the noise's, so that a run has the same noise with and without the rest.
-        self._rng, self._fate, self._noise = rng, rng.spawn(1)[0], np.array(sensor.noise)
+        self._rng = rng
+        self._fate = rng.spawn(1)[0]
+        self._noise = np.array(sensor.noise)
         self.bias: Array = np.array(sensor.bias) * self._fate.standard_normal(len(sensor.bias))
         """What each value is off for the whole run."""
         self._due = 0.0
         self._waiting: deque[tuple[float, float, Array]] = deque()  # when it arrives, when it was taken
-        self._first, self._newest = True, self.bias
+        self._first = True
+        self._newest = self.bias
         self.taken = 0.0
         """When the newest sample that has arrived was taken [s]."""
 
@@ -178,8 +182,11 @@ class ActuatorForce:
 
     def __init__(self, layout: Layout, fins: FinMotion) -> None:
         """Takes the true robot and how its fins move."""
-        self.motion, self._beat = ActuatorMotion(layout, fins), fins
-        of_fins, of_others, self._plant = self.motion.of_fins, self.motion.of_others, plant_of(layout)
+        self.motion = ActuatorMotion(layout, fins)
+        self._beat = fins
+        of_fins = self.motion.of_fins
+        of_others = self.motion.of_others
+        self._plant = plant_of(layout)
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
         if len(of_fins):
@@ -199,8 +206,10 @@ class ActuatorForce:
         """
         motion = self.motion
         motion.step(command, dt)
-        fins, fin_watts = np.zeros((0, 3)), np.zeros((2, 0))
-        others, watts = np.zeros((0, 3)), np.zeros((2, 0))
+        fins = np.zeros((0, 3))
+        fin_watts = np.zeros((2, 0))
+        others = np.zeros((0, 3))
+        watts = np.zeros((2, 0))
         if len(motion.of_fins):
             fins = self.of_fins(dt) * share[motion.of_fins, None]
             fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))

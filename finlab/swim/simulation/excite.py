@@ -89,7 +89,8 @@ class ExcitingController:
         pace = np.clip(np.sqrt(HOLDS * most / (inertia * REACHED)), SLOWEST, FASTEST)
         # Damping of about 0.8.
         least = np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
-        self._stiff, self._damp = inertia * pace**2, inertia * np.maximum(1.6 * pace, least)
+        self._stiff = inertia * pace**2
+        self._damp = inertia * np.maximum(1.6 * pace, least)
         swing = 2.0 * math.pi / np.array(PERIODS_S).T
         damp = 1j * swing * (self._damp + np.array(dynamics.linear))
         moved = 1.0 / np.abs(self._stiff - inertia * swing**2 + damp)
@@ -101,7 +102,8 @@ class ExcitingController:
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
         """Returns the wrench (6,) [N, N m]."""
         away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
-        c, s = math.cos(measurement.yaw), math.sin(measurement.yaw)
+        c = math.cos(measurement.yaw)
+        s = math.sin(measurement.yaw)
         error = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0])
         error[3:] = wrapped(-np.array([measurement.roll, measurement.pitch, measurement.yaw]))
         speed = np.concatenate([measurement.velocity, measurement.rates])
@@ -142,7 +144,8 @@ class Exciting(Method):
     ) -> None:
         super().__init__(layout, settings, scale, weights)
         self._rng = np.random.default_rng(self.settings.seed)
-        self._owner, self._most = _owners(layout), largest_forces(layout)
+        self._owner = _owners(layout)
+        self._most = largest_forces(layout)
         # Each gives its share of what it can.
         share = self._most / self._most.max()
         columns = layout_effectiveness(layout) * share
@@ -166,7 +169,8 @@ class Exciting(Method):
 
     def _command(self, target: Array) -> Array:
         """The next command (n, 3); each call is a tick of the controller."""
-        time, k = self._calls * PERIOD_S, np.arange(len(self._inner))
+        time = self._calls * PERIOD_S
+        k = np.arange(len(self._inner))
         swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
         swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
         force = self._to_force @ target + (INNER_SHARE * swing @ self._inner if len(k) else 0.0)
@@ -184,9 +188,11 @@ class Exciting(Method):
         """Commands (n, 3) of the fins for forces (n, 2) [N] along zero and shaft x zero."""
         if self._calls % round(REDRAW_S / PERIOD_S) == 0:
             share = self._rng.uniform(0.2, 1.0, self._plant.n_fins)
-            lower, upper = self._plant.lower[:, 0], self._plant.upper[:, 0]
+            lower = self._plant.lower[:, 0]
+            upper = self._plant.upper[:, 0]
             self._amplitude = lower + share * (upper - lower)
-        size, direction = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        size = np.hypot(*force.T)
+        direction = np.arctan2(force[:, 1], force[:, 0])
         if self._direction is not None:
             most = TURN_RAD_S * PERIOD_S
             turn = wrapped(direction - self._direction)

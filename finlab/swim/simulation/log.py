@@ -81,7 +81,8 @@ class Tick(NamedTuple):
     """Time of the allocation [ms]."""
 
 
-FINS, COMMANDS = (None,), (None, 3)
+FINS = (None,)
+COMMANDS = (None, 3)
 SHAPES: dict[str, tuple[int | None, ...]] = {
     "position": (3,), "quaternion": (4,), "motion": (6,), "flow": (3,), "measured": (12,), "reference": (3,),
     "asked": (6,), "allocated": (6,), "delivered": (6,), "command": COMMANDS, "fin_motion": COMMANDS,
@@ -180,7 +181,8 @@ def load_log(path: str | Path) -> RunLog:
         **{name: arrays[own] for name, own in zip(Tick._fields, in_file, strict=True)},
     }
     about = checked(json_of(columns.pop("meta"), f"{path}: meta"), _About, DataError, f"{path}: meta")
-    n, fins = columns["time"].size, len(about.names)
+    n = columns["time"].size
+    fins = len(about.names)
     shapes = {
         name: tuple(fins if size is None else size for size in SHAPES.get(name, ())) for name in columns
     }

@@ -37,7 +37,8 @@ class Trajectory:
         """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m]. Raises DataError:
         fewer than two samples, less than a second, times that do not rise from 0, or values that are not
         finite."""
-        time, position = np.asarray(time, np.float64), np.asarray(position, np.float64)
+        time = np.asarray(time, np.float64)
+        position = np.asarray(position, np.float64)
         if len(time) < 2 or position.shape != (len(time), 3):
             raise DataError(
                 f"trajectory {name}: expected at least two samples of t, x, y, z, got {len(time)} times and "
@@ -124,7 +125,8 @@ def square(duration_s: float = 90.0) -> Trajectory:
     rest = 0.08 * duration_s
     leg = (duration_s - 4 * rest) / 4
     corners = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]], dtype=np.float64)
-    time, points = [0.0], [corners[0]]
+    time = [0.0]
+    points = [corners[0]]
     for corner, following in zip(corners[:-1], corners[1:], strict=True):
         for share in np.linspace(0.0, 1.0, 41)[1:]:
             time.append(time[-1] + leg / 40)

@@ -73,7 +73,8 @@ def perturbed(
 def checked_truth(layout: Layout, truth: Layout) -> Layout:
     """The true robot; a `LayoutError` where it does not have the actuators of the layout that is believed."""
     if [(part.name, part.type) for part in truth.actuators] != [(p.name, p.type) for p in layout.actuators]:
-        known, names = ", ".join(layout.names), ", ".join(truth.names)
+        known = ", ".join(layout.names)
+        names = ", ".join(truth.names)
         raise LayoutError(f"truth: expected the actuators of {layout.name}, {known}, got {names}")
     return truth
 
@@ -110,7 +111,8 @@ class Fault(NamedTuple):
         """
         what, at, seconds = text.rpartition("@")
         if not at:
-            what, seconds = text, "0"
+            what = text
+            seconds = "0"
         name, equals, share = what.partition("=")
         example = "front_left=0.5@30" if kind == "torn" else "front_left@30"
         expected = "NAME=SHARE@SECONDS" if kind == "torn" else "NAME@SECONDS"

@@ -22,15 +22,18 @@ class FirstOrder:
         m = len(actuators)
         self._rate = np.minimum(np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED)
         self._time_constant = np.full((m, 3), AT_ONCE)
-        self._circles, self._angles = np.zeros((m, 3), bool), np.zeros((m, 3), bool)
+        self._circles = np.zeros((m, 3), bool)
+        self._angles = np.zeros((m, 3), bool)
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
             self._time_constant[i, each.LAGS] = getattr(each, "time_constant", AT_ONCE)
             if not each.TURNS:
                 continue
-            low, high = each.lower[0], each.upper[0]
-            self._angles[i, 0], self._circles[i, 0] = True, is_full_turn(high - low)
+            low = each.lower[0]
+            high = each.upper[0]
+            self._angles[i, 0] = True
+            self._circles[i, 0] = is_full_turn(high - low)
             self.value[i, 0] = min(max(0.0, low), high)
         self._corner = self._rate * self._time_constant
         self.before = self.value
@@ -80,7 +83,8 @@ class ActuatorMotion:
         if not len(self.of_others):
             return of_fins
         result = np.empty((len(self._places), *of_others.shape[1:]))
-        result[self.of_fins], result[self.of_others] = of_fins, of_others
+        result[self.of_fins] = of_fins
+        result[self.of_others] = of_others
         return result
 
     @property

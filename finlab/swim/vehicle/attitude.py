@@ -15,9 +15,12 @@ from finlab.arrays import Array
 
 def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
     """The attitude (w, x, y, z) after turns about z, then y, then x [rad]."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    cr = math.cos(0.5 * roll)
+    sr = math.sin(0.5 * roll)
+    cp = math.cos(0.5 * pitch)
+    sp = math.sin(0.5 * pitch)
+    cy = math.cos(0.5 * yaw)
+    sy = math.sin(0.5 * yaw)
     return (
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -52,7 +55,8 @@ def rotation_of_quaternion(w: Any, x: Any, y: Any, z: Any) -> tuple[Any, ...]:
 
 def rotation_of_angles(angles: Array) -> tuple[Array, ...]:
     """The rotations of roll, pitch and yaw (3, ...) [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
+    cr, cp, cy = np.cos(angles)
+    sr, sp, sy = np.sin(angles)
     first = cy * cp, sy * cp, -sp
     second = cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr
     third = cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr

@@ -73,7 +73,8 @@ class FinLag:
         """Takes the step; returns which fins (n,) hang still, or None where all follow."""
         if dt != self._dt:
             self._dt, self._lag = dt, LagStep.of(self._poles, dt)
-        before, aim = self.value, command.T.copy()
+        before = self.value
+        aim = command.T.copy()
         lost = np.isnan(aim[0])
         some_lost = bool(lost.any())
         if some_lost:
@@ -84,8 +85,11 @@ class FinLag:
         value, rate = self._lag.follow(before, self.rate, aim)
         np.minimum(value[0], self._fastest_swing / np.maximum(value[1], 1e-9), out=value[0])
         if some_lost:
-            value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
-        self.value, self.rate = value, rate
+            value[:2, lost] = 0.0
+            value[2, lost] = before[2, lost]
+            rate[:, lost] = 0.0
+        self.value = value
+        self.rate = rate
         return lost if some_lost else None
 
 
@@ -113,9 +117,11 @@ class FinMotion(FinLag):
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command as `FinLag`, within the beat."""
-        before, rate_before = self.value, self.rate
+        before = self.value
+        rate_before = self.rate
         lost = self._follow(command, dt)
-        value, rate = self.value, self.rate
+        value = self.value
+        rate = self.rate
         # What flapping leaves of the servo's speed is there to turn the fin.
         spare = np.maximum(self._speed_limit - value[0] * (TURN * value[1]), self._creep)
         turned = np.minimum(np.maximum(value[2] - before[2], -spare * dt), spare * dt)
@@ -141,9 +147,11 @@ class FinMotion(FinLag):
     def speed_and_acceleration(self) -> tuple[Array, Array]:
         """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim
         as means over the last step."""
-        sine, cosine = np.sin(self.phase), np.cos(self.phase)
+        sine = np.sin(self.phase)
+        cosine = np.cos(self.phase)
         swing = TURN * self.value[1]
-        fast, growth = self.value[0] * swing, self.rate[0]
+        fast = self.value[0] * swing
+        growth = self.rate[0]
         speed = self.rate[2] + growth * sine + fast * cosine
         acceleration = (
             self._change[2]

@@ -52,12 +52,21 @@ def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, wrench: Any) -> 
     """
     u, v, w, p, q, r = flow
     mx, my, mz, ix, iy, iz = body.inertia
-    px, py, pz, hx, hy, hz = mx * u, my * v, mz * w, ix * p, iy * q, iz * r
-    lin, quad, lift = body.linear, body.quadratic, body.lift
+    px = mx * u
+    py = my * v
+    pz = mz * w
+    hx = ix * p
+    hy = iy * q
+    hz = iz * r
+    lin = body.linear
+    quad = body.quadratic
+    lift = body.lift
     net = lift - body.weight
     bx, by, bz = body.center
     ax, ay, az = up
-    rx, ry, rz = lift * (by * az - bz * ay), lift * (bz * ax - bx * az), lift * (bx * ay - by * ax)
+    rx = lift * (by * az - bz * ay)
+    ry = lift * (bz * ax - bx * az)
+    rz = lift * (bx * ay - by * ax)
     return (
         (wrench[0] - (q * pz - r * py) - (lin[0] + quad[0] * abs(u)) * u + net * up[0]) / mx,
         (wrench[1] - (r * px - p * pz) - (lin[1] + quad[1] * abs(v)) * v + net * up[1]) / my,
@@ -72,8 +81,12 @@ def jacobian(body: Dynamics[Any, Any], flow: Any) -> list[list[Any]]:
     """Returns the derivatives (6, 6) of `accelerations` by `flow`."""
     u, v, w, p, q, r = flow
     mx, my, mz, ix, iy, iz = body.inertia
-    munk_x, munk_y, munk_z = (my - mz) / ix, (mz - mx) / iy, (mx - my) / iz
-    gyro_x, gyro_y, gyro_z = (iy - iz) / ix, (iz - ix) / iy, (ix - iy) / iz
+    munk_x = (my - mz) / ix
+    munk_y = (mz - mx) / iy
+    munk_z = (mx - my) / iz
+    gyro_x = (iy - iz) / ix
+    gyro_y = (iz - ix) / iy
+    gyro_z = (ix - iy) / iz
     dx, dy, dz, dp, dq, dr = (-slope for slope in damping_jacobian(body, flow))
     return [
         [dx, my * r / mx, -mz * q / mx, 0.0 * u, -mz * w / mx, my * v / mx],

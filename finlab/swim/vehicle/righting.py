@@ -22,7 +22,8 @@ SMALL = 1e-3
 def overturning_speed(layout: Layout) -> float | None:
     """The least speed ahead [m/s] at which a robot that nothing steers leaves the level in pitch; None where
     it stays up to `FASTEST`. What its layout leaves out of the body is U-CAT's."""
-    body, plant = dynamics_of(complete_body(layout)), plant_of(layout)
+    body = dynamics_of(complete_body(layout))
+    plant = plant_of(layout)
     rest = np.clip(np.zeros((layout.n, 3)), layout.lower, layout.upper)
     righting = body.lift * body.center[2] / body.inertia[4]
     for speed in np.arange(0.0, FASTEST, STEP).tolist():
@@ -34,7 +35,9 @@ def overturning_speed(layout: Layout) -> float | None:
                 gained = plant.wrench(rest, flow=flow + step) - plant.wrench(rest, flow=flow - step)
                 slopes[:, column] += gained[[2, 4]] / (2.0 * SMALL) / np.array(body.inertia)[[2, 4]]
         motion = np.zeros((3, 3))  # heave, pitch rate and pitch
-        motion[:2, :2], motion[1, 2], motion[2, 1] = slopes, -righting, 1.0
+        motion[:2, :2] = slopes
+        motion[1, 2] = -righting
+        motion[2, 1] = 1.0
         if np.linalg.eigvals(motion).real.max() > GROWTH:
             return float(speed)
     return None

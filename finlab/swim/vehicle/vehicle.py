@@ -144,7 +144,9 @@ def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Arr
     up = rotation[2::3]
     pace = np.empty_like(state)
     pace[:3] = to_world(rotation, u, v, w)
-    cr, sr, cp = np.cos(state[3]), np.sin(state[3]), np.cos(state[4])
+    cr = np.cos(state[3])
+    sr = np.sin(state[3])
+    cp = np.cos(state[4])
     turning = (q * sr + r * cr) / cp
     pace[3] = p - turning * up[0]  # up[0] is minus the sine of the pitch
     pace[4] = q * cr - r * sr
@@ -162,7 +164,8 @@ def integrate(state: Array, wrench: Array, body: Bodies, current: Array, dt: flo
     states = np.empty((len(wrench), *np.broadcast_shapes(state.shape, (12, *wrench.shape[2:]))))
     states[0] = state
     for k in range(len(wrench) - 1):
-        y, tau = states[k], wrench[k]
+        y = states[k]
+        tau = wrench[k]
         k1 = derivative(y, tau, body, current)
         k2 = derivative(y + 0.5 * dt * k1, tau, body, current)
         k3 = derivative(y + 0.5 * dt * k2, tau, body, current)
@@ -173,7 +176,8 @@ def integrate(state: Array, wrench: Array, body: Bodies, current: Array, dt: flo
 
 def body_rates(angles: Array, pace: Array) -> Array:
     """Angular rates (N, 3) of attitude angles (N, 3) that change by (N, 3) [rad/s]."""
-    (cr, cp, _), (sr, sp, _) = np.cos(angles.T), np.sin(angles.T)
+    cr, cp, _ = np.cos(angles.T)
+    sr, sp, _ = np.sin(angles.T)
     roll, pitch, yaw = pace.T
     return np.stack([roll - sp * yaw, cr * pitch + sr * cp * yaw, cr * cp * yaw - sr * pitch], axis=-1)
 

@@ -22,7 +22,8 @@ EXACT = METHODS[2:]
 FEW_STARTS: dict[str, dict[str, Any]] = {"ipopt": {"n_starts": 2, "time_limit_s": 1.5}}
 SOFT = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
 FORMULAS = {"drag": FinModelSpec("drag"), "lighthill": FinModelSpec("lighthill"), "soft": SOFT}
-AMPLITUDE, FREQUENCY = np.linspace(0.0, 0.62, 9), np.linspace(0.0, 2.2, 9)
+AMPLITUDE = np.linspace(0.0, 0.62, 9)
+FREQUENCY = np.linspace(0.0, 2.2, 9)
 CIRCLE = np.linspace(-np.pi, np.pi, 25)
 
 Change = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -129,7 +130,8 @@ def test_every_method_on_every_fin(
     method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
     layout = robot(model(name))
-    plant, allocator = plant_of(layout), make(method, objective)
+    plant = plant_of(layout)
+    allocator = make(method, objective)
     target = plant.wrench(plant.lower + np.array([0.7, 0.55, 0.4]) * plant.width)
     for asked in (target, 100.0 * target):
         answer = allocator.allocate(layout, asked)

@@ -51,7 +51,9 @@ def test_the_mix_is_normalised_as_px4_does() -> None:
     for column in np.abs(mix[:, 3:].T):
         assert column[column > 0.0].mean() == pytest.approx(1.0)
     # A quadrotor by hand: four rotors up, at arms of 1, with a torque of 0.05 N m per newton.
-    x, y, turn = np.array([1.0, -1, 1, -1]), np.array([1.0, -1, -1, 1]), np.array([1.0, 1, -1, -1])
+    x = np.array([1.0, -1, 1, -1])
+    y = np.array([1.0, -1, -1, 1])
+    turn = np.array([1.0, 1, -1, -1])
     quad = np.array([-y, x, 0.05 * turn, 0 * x, 0 * x, -np.ones(4)])
     mix, scale = normalised(np.linalg.pinv(quad))
     expected = np.array([-y * 0.5**0.5, x * 0.5**0.5, turn, 0 * x, 0 * x, -np.ones(4)]).T
@@ -83,7 +85,8 @@ def test_desaturation_makes_the_excess_of_both_sides_alike() -> None:
 def test_a_frame_of_ardusub_is_known_in_any_order_and_any_way_round(name: str) -> None:
     factors = FRAMES[name]
     rng = np.random.default_rng(len(factors))
-    order, sign = rng.permutation(len(factors)), rng.choice([-1.0, 1.0], len(factors))
+    order = rng.permutation(len(factors))
+    sign = rng.choice([-1.0, 1.0], len(factors))
     lever = rng.uniform(0.85, 1.0, factors.shape) * np.array([0.2, 0.12, 0.17, 1, 0.7, 0.7])
     own = sign[:, None] * factors[order] * lever
     found = frame_factors(own + rng.uniform(-0.01, 0.01, own.shape) * (own == 0.0))
@@ -103,7 +106,8 @@ def test_one_axis_of_ardusub_alone_gives_what_is_asked_up_to_its_limits(axis: in
     """Without arms that couple axes a demand gives its wrench; too much of it gives the same direction."""
     level = [replace(part, position=(*part.position[:2], 0.0)) for part in HEAVY.actuators]
     plant = plant_of(replace(HEAVY, actuators=tuple(level)))
-    allocator, target = Allocator(plant.layout, "ardusub"), np.zeros(6)
+    allocator = Allocator(plant.layout, "ardusub")
+    target = np.zeros(6)
     target[axis] = 5.0 if axis < 3 else 1.0
     near = plant.wrench(allocator.allocate(target).command)
     assert near[axis] == pytest.approx(target[axis])

@@ -91,7 +91,8 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     layout = random_layout(np.random.default_rng(9), n_fins=3)
     target = [0.5, 0.2, -0.5, 0.0, 0.0, 0.05]
     lost = make(method).allocate(layout, target, lost=["fin_2"]).command
-    choice, rest = make(method).choice, layout.without(["fin_2"])
+    choice = make(method).choice
+    rest = layout.without(["fin_2"])
     alone = choice.kind(rest, choice.settings, yardstick(layout))  # errors are those of the whole robot
     removed = alone.solve(np.array([target]), policy=Policy()).command[0]
     assert np.isnan(lost[1]).all()
@@ -135,7 +136,8 @@ def test_sqp_needs_hardly_more_than_the_default() -> None:
     )
     least = Allocator(layout).allocate_batch(targets)
     answer = make("sqp").allocate_batch(layout, targets)
-    cost, best = answer.power, least.power
+    cost = answer.power
+    best = least.power
     exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
     assert exact.sum() >= 15 and cost[exact].sum() < 1.06 * best[exact].sum()
 
@@ -185,7 +187,8 @@ def test_the_papers_sqp_goes_on_to_other_starts_until_one_delivers(monkeypatch: 
 def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
     layout = random_layout(rng, limits="varied")
-    method, plant = PaperSqp(layout, PaperSqpSettings(), yardstick(layout)), plant_of(layout)
+    method = PaperSqp(layout, PaperSqpSettings(), yardstick(layout))
+    plant = plant_of(layout)
     target = reach * targets_of(layout, 1, seed)[0]
     end, errors = method.descent(target, plant.sample(rng, (1,))[0])
     assert len(errors) > 2 and (np.diff(errors) <= 0.0).all()
@@ -198,11 +201,14 @@ def test_a_box_qp_meets_its_optimality_conditions() -> None:
     rng = np.random.default_rng(3)
     held = 0
     for _ in range(20):
-        matrix, wanted = rng.normal(size=(6, 9)), 4.0 * rng.normal(size=6)
-        low, high = -rng.uniform(0.0, 1.0, 9), rng.uniform(0.1, 1.0, 9)
+        matrix = rng.normal(size=(6, 9))
+        wanted = 4.0 * rng.normal(size=6)
+        low = -rng.uniform(0.0, 1.0, 9)
+        high = rng.uniform(0.1, 1.0, 9)
         x = box_qp(matrix, wanted, 0.1, low, high)
         pull = -(matrix.T @ (matrix @ x - wanted) + 0.1 * x)  # downhill
-        at_low, at_high = np.isclose(x, low, atol=1e-12), np.isclose(x, high, atol=1e-12)
+        at_low = np.isclose(x, low, atol=1e-12)
+        at_high = np.isclose(x, high, atol=1e-12)
         held += int(at_low.sum() + at_high.sum())
         np.testing.assert_allclose(pull[~at_low & ~at_high], 0.0, atol=1e-8)
         assert (pull[at_low] <= 1e-8).all() and (pull[at_high] >= -1e-8).all()

@@ -64,7 +64,8 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: 
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "wide arcs", "rudders", "mixed"])
 def test_it_agrees_with_the_search_on_any_actuators_and_in_any_flow(kind: str) -> None:
     for number in range(2):
-        plant, flow = random_plant(kind, number, 7), random_flow(kind, number, 7)
+        plant = random_plant(kind, number, 7)
+        flow = random_flow(kind, number, 7)
         layout = load(random_robot(kind, number, 7))
         targets = np.array([within(plant, np.random.default_rng([7, k])) for k in range(2)])
         best = Allocator(layout).allocate_batch(targets, flow=flow)

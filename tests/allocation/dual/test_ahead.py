@@ -51,7 +51,9 @@ def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
     allocator = Allocator(four_pods(), calm=10.0, period_s=PERIOD_S)
     wrench = waves(ticks, seed)
     command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in ARCS])
-    power, turned, missed = 0.0, 0.0, 0
+    power = 0.0
+    turned = 0.0
+    missed = 0
     for tick in range(ticks):
         reference = wrench[tick + 1 : tick + 1 + known] if known else None
         answer = allocator.allocate(wrench[tick], previous=command, reference=reference)
@@ -77,9 +79,11 @@ def test_known_waves_take_a_tenth_less_power_for_no_more_turning(seed: int) -> N
 def test_a_pod_turns_before_the_wrench_does() -> None:
     """A push ahead becomes one to port in eight ticks: the stern's pods have begun to turn."""
     allocator = Allocator(load_layout("catamaran"), calm=2.0, period_s=PERIOD_S)
-    now, later = np.zeros(6), np.zeros((AHEAD, 6))
+    now = np.zeros(6)
+    later = np.zeros((AHEAD, 6))
     now[0] = 40.0
-    later[:, 0], later[:, 1] = 10.0, 20.0
+    later[:, 0] = 10.0
+    later[:, 1] = 20.0
     before = allocator.allocate(now).command
     stays = allocator.allocate(now, previous=before).command
     turns = allocator.allocate(now, previous=before, reference=later)

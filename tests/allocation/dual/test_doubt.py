@@ -32,7 +32,8 @@ def total(answer: BatchAllocation, robust: float) -> Array:
 
 
 def test_a_table_with_a_square_answers_as_the_cost_says() -> None:
-    table, weight = RadialTable.of_forces(3.0, 2.0 + 5.0 * (price_grid(3.0) / 3.0) ** 2, 0.0), 0.4
+    table = RadialTable.of_forces(3.0, 2.0 + 5.0 * (price_grid(3.0) / 3.0) ** 2, 0.0)
+    weight = 0.4
     dearer = table.with_square(weight)
     force = np.linspace(2.0, 7.0, 20_001)
     cost = 2.0 * (force - 2.0) ** 1.5 / np.sqrt(5.0) + weight * force**2
@@ -45,7 +46,8 @@ def test_a_table_with_a_square_answers_as_the_cost_says() -> None:
 @pytest.mark.parametrize("robust", [1.0, 30.0])
 def test_thrusters_answer_as_scipy_does(robust: float) -> None:
     layout = doubtful(HEAVY, np.array([0.3, *7 * [0.03]]))
-    plant, allocator = plant_of(layout), Allocator(layout, robust=robust)
+    plant = plant_of(layout)
+    allocator = Allocator(layout, robust=robust)
     rows = plant.effectiveness[:, 0] / (0.01 * allocator.scale)
     weight = robust * np.array([0.3, *7 * [0.03]]) ** 2 * (rows**2).sum(axis=1)
     rng = np.random.default_rng(4)
@@ -69,7 +71,8 @@ def test_thrusters_answer_as_scipy_does(robust: float) -> None:
 
 @pytest.mark.parametrize("kind", ["azimuths", "fins any shaft", "fins uneven", "mixed", "rudders"])
 def test_no_price_of_doubt_is_better_by_its_own_measure_than_the_one_asked_for(kind: str) -> None:
-    layout, flow = load(random_robot(kind, 2, 6)), random_flow(kind, 2, 6)
+    layout = load(random_robot(kind, 2, 6))
+    flow = random_flow(kind, 2, 6)
     rng = np.random.default_rng(8)
     layout = doubtful(layout, 10.0 ** rng.uniform(-2.0, -0.5, layout.n))
     plant = plant_of(layout).at(flow)
@@ -91,12 +94,15 @@ def test_no_price_of_doubt_is_better_by_its_own_measure_than_the_one_asked_for(k
 def test_one_doubtful_thruster_costs_few_watts_to_avoid(worst: int) -> None:
     shares = np.full(8, 0.03)
     shares[worst] = 0.3
-    layout, rng = doubtful(HEAVY, shares), np.random.default_rng(worst)
-    least, trusted = Allocator(layout), Allocator(layout, robust=5.0)
+    layout = doubtful(HEAVY, shares)
+    rng = np.random.default_rng(worst)
+    least = Allocator(layout)
+    trusted = Allocator(layout, robust=5.0)
     ways = rng.standard_normal((60, 6)) * least.scale
     rim = least.allocate_batch(100.0 * ways, policy="direction").wrench
     targets = rng.uniform(0.2, 0.6, (60, 1)) * rim
-    cheap, sure = least.allocate_batch(targets), trusted.allocate_batch(targets)
+    cheap = least.allocate_batch(targets)
+    sure = trusted.allocate_batch(targets)
     assert sure.err_norm.max() < 1e-6 and sure.bound is None
     miss = [np.sqrt(np.mean(answer.expected_error**2)) for answer in (cheap, sure)]
     assert miss[1] < 0.8 * miss[0]

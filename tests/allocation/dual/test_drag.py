@@ -19,7 +19,8 @@ def test_answers_of_robots_with_rudders_are_exact_and_above_a_bound_that_is_met(
     gaps = []
     for number in (0, 2, 5):
         robot = load(random_robot("rudders", number, 7))
-        flow, own = random_flow("rudders", number, 7), random_plant("rudders", number, 7)
+        flow = random_flow("rudders", number, 7)
+        own = random_plant("rudders", number, 7)
         allocator = finlab.Allocator(robot)
         rng = np.random.default_rng(number)
         for _ in range(4):
@@ -52,7 +53,8 @@ def test_rudders_at_rest_turn_back_no_faster_than_their_drives() -> None:
 
 def test_many_wrenches_at_once_are_answered_as_one_by_one() -> None:
     robot = load(random_robot("rudders", 1, 7))
-    flow, own = random_flow("rudders", 1, 7), random_plant("rudders", 1, 7)
+    flow = random_flow("rudders", 1, 7)
+    own = random_plant("rudders", 1, 7)
     rng = np.random.default_rng(0)
     wrenches = np.array([within(own, rng) for _ in range(3)])
     allocator = finlab.Allocator(robot)
@@ -68,16 +70,20 @@ def frame_of_foils(rng: np.random.Generator) -> Layout:
     """Two to four foils whose shafts lie across the way ahead, and two or three thrusters."""
     parts: list[Actuator] = []
     for i in range(rng.integers(2, 5)):
-        turn, most = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.3, 0.7)
-        place, shaft = tuple(rng.uniform(-1.0, 1.0, 3)), (0.0, math.cos(turn), math.sin(turn))
-        stall, area = rng.uniform(0.35, 0.6), 10.0 ** rng.uniform(-2.3, -1.0)
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        most = rng.uniform(0.3, 0.7)
+        place = tuple(rng.uniform(-1.0, 1.0, 3))
+        shaft = (0.0, math.cos(turn), math.sin(turn))
+        stall = rng.uniform(0.35, 0.6)
+        area = 10.0 ** rng.uniform(-2.3, -1.0)
         foil = Rudder(
             f"f{i}", place, shaft, (1, 0, 0), area, (-most, most), rng.uniform(1.0, 6.0), stall=stall
         )
         parts.append(foil)
     for i in range(rng.integers(2, 4)):
         axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([1.0, 0.0, 0.0])
-        axis, place = axis / np.linalg.norm(axis), tuple(rng.uniform(-1.0, 1.0, 3))
+        axis = axis / np.linalg.norm(axis)
+        place = tuple(rng.uniform(-1.0, 1.0, 3))
         parts.append(Thruster(f"t{i}", place, tuple(axis), (-40.0, 50.0), PowerLaw(1.0)))
     return Layout("foils", tuple(parts))
 
@@ -95,7 +101,8 @@ def at_work(layout: Layout, plant: Plant, rng: np.random.Generator) -> np.ndarra
 def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
     rng = np.random.default_rng(seed)
     layout = frame_of_foils(rng)
-    allocator, plant = Allocator(layout), Plant(layout)
+    allocator = Allocator(layout)
+    plant = Plant(layout)
     for _ in range(5):
         command = at_work(layout, plant, rng)
         wrench = plant.wrench(command, flow=AHEAD)
@@ -108,8 +115,11 @@ def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
 
 @pytest.mark.parametrize("number", range(3))
 def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_known(number: int) -> None:
-    layout, flow = load(random_robot("rudders", number, 21)), random_flow("rudders", number, 21)
-    allocator, plant, rng = Allocator(layout), Plant(layout), np.random.default_rng(number)
+    layout = load(random_robot("rudders", number, 21))
+    flow = random_flow("rudders", number, 21)
+    allocator = Allocator(layout)
+    plant = Plant(layout)
+    rng = np.random.default_rng(number)
     for _ in range(4):
         wrench = plant.wrench(plant.sample(rng, ()), flow=flow)
         for times in (1.5, 4.0):
@@ -122,7 +132,8 @@ def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_kno
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(policy: str) -> None:
     layout = load_layout("torpedo")
-    allocator, rng = Allocator(layout), np.random.default_rng(3)
+    allocator = Allocator(layout)
+    rng = np.random.default_rng(3)
     names = [part.name for part in layout.actuators]
     for lost in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
         for flow in (None, AHEAD):
@@ -140,7 +151,8 @@ def test_a_foil_whose_drag_is_welcome_answers_with_the_dearest_lift() -> None:
     group = allocator._whole.method.at(AHEAD).compiled.groups[0][1]  # type: ignore[attr-defined]
     plant = Plant(Layout("rudder", (rudder,)))
     turned = np.linspace(-0.3, 0.3, 20_001)[:, None, None] * [1.0, 0.0, 0.0]
-    given, power = plant.wrench(turned, flow=AHEAD), plant.power(turned, flow=AHEAD).sum(axis=-1)
+    given = plant.wrench(turned, flow=AHEAD)
+    power = plant.power(turned, flow=AHEAD).sum(axis=-1)
     rest = plant.wrench(np.zeros((1, 3)), flow=AHEAD)
     for price in np.random.default_rng(0).normal(size=(40, 6)) * [6.0, 2.0, 2.0, 2.0, 2.0, 2.0]:
         worth = ((given - rest) @ price - power).max()

@@ -18,7 +18,8 @@ from finlab.physics.plant import Plant
 from tests.exhaustive import sampled
 
 HALF = math.radians(45.0)
-LEAST, MOST = -100.0, 250.0
+LEAST = -100.0
+MOST = 250.0
 
 
 def table(forward: float, reverse: float, least: float = LEAST, most: float = MOST) -> PowerTable:
@@ -31,7 +32,8 @@ def table(forward: float, reverse: float, least: float = LEAST, most: float = MO
 def pair(model: PowerLaw | PowerTable) -> Layout:
     """Two pods at the stern, within 45 degrees of ahead."""
     sides = (("left", 0.5), ("right", -0.5))
-    ends, arc = (LEAST, MOST), (-HALF, HALF)
+    ends = (LEAST, MOST)
+    arc = (-HALF, HALF)
     return Layout(
         "pair", tuple(Tilt(name, (-1.0, y, 0.0), (0, 0, 1), (1, 0, 0), ends, model, arc) for name, y in sides)
     )
@@ -44,7 +46,8 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
     left = np.linspace(-MOST, MOST, 400_001)
     total = np.zeros(len(left))
     for ahead, aside in ((0.5 * (surge + apart), left), (0.5 * (surge - apart), sway - left)):
-        size, least = np.hypot(ahead, aside), np.full(len(left), np.inf)
+        size = np.hypot(ahead, aside)
+        least = np.full(len(left), np.inf)
         for sign, most, factor in ((1.0, MOST, factors[0]), (-1.0, -LEAST, factors[1])):
             inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= HALF + 1e-9) & (size <= most)
             least = np.where(inside, np.minimum(least, factor * size**1.5), least)
@@ -58,11 +61,13 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
     ids=["alike", "dearer", "cheaper", "table"],
 )
 def test_two_pods_take_the_least_power_of_a_scan(model: PowerLaw | PowerTable) -> None:
-    allocator, plant = Allocator(pair(model)), Plant(pair(model))
+    allocator = Allocator(pair(model))
+    plant = Plant(pair(model))
     factors = (0.05, 0.11) if isinstance(model, PowerTable) else (0.05, model.reverse or 0.05)
     given = plant.wrench(plant.sample(np.random.default_rng(7), (6,)))
     for wrench in np.concatenate([[[-60.0, 0, 0, 0, 0, 0], [60.0, 0, 0, 0, 0, 0]], given]):
-        answer, least = allocator.allocate(wrench), scanned(wrench, factors)
+        answer = allocator.allocate(wrench)
+        least = scanned(wrench, factors)
         assert answer.reachable
         np.testing.assert_allclose(plant.wrench(answer.command), wrench, atol=1e-6)
         assert answer.power == pytest.approx(least, rel=2e-4)
@@ -80,18 +85,18 @@ def random_pods(rng: np.random.Generator) -> Layout:
     for i in range(rng.integers(1, 4)):
         most = rng.uniform(20.0, 200.0)
         ends = -rng.uniform(0.1, 1.4) * most, most
-        half, middle = (
-            rng.choice([rng.uniform(0.05, 1.5), rng.uniform(1.6, 3.0), math.pi]),
-            rng.uniform(-1, 1),
-        )
+        half = rng.choice([rng.uniform(0.05, 1.5), rng.uniform(1.6, 3.0), math.pi])
+        middle = rng.uniform(-1, 1)
         arc = (-math.pi, math.pi) if half == math.pi else (middle - half, middle + half)
-        forward, reverse = 10.0 ** rng.uniform(-2.0, 0.0), rng.uniform(0.6, 2.5)
+        forward = 10.0 ** rng.uniform(-2.0, 0.0)
+        reverse = rng.uniform(0.6, 2.5)
         law = PowerLaw(forward, forward * reverse, rng.choice([1.5, rng.uniform(1.2, 2.5)]))
         model = law if rng.random() < 0.6 else table(forward, forward * reverse, *ends)
         place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
         parts.append(Azimuth(f"p{i}", place, (0, 0, 1), (1, 0, 0), ends, model, arc))
     for i in range(rng.integers(0, 3)):
-        angle, place = rng.uniform(-3, 3), (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
+        angle = rng.uniform(-3, 3)
+        place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
         axis = (math.cos(angle), math.sin(angle), 0.0)
         parts.append(Thruster(f"t{i}", place, axis, (-40.0, 50.0), PowerLaw(0.3)))
     return Layout("pods", tuple(parts))
@@ -101,7 +106,8 @@ def random_pods(rng: np.random.Generator) -> Layout:
 def test_random_pods_give_what_they_can_and_nobody_finds_less_power(seed: int) -> None:
     rng = np.random.default_rng(seed)
     layout = random_pods(rng)
-    plant, allocator = Plant(layout), Allocator(layout)
+    plant = Plant(layout)
+    allocator = Allocator(layout)
     commands = plant.sample(rng, (4,))
     targets = plant.wrench(commands)
     together = allocator.allocate_batch(targets)
@@ -117,7 +123,8 @@ def test_random_pods_give_what_they_can_and_nobody_finds_less_power(seed: int) -
 
 def searched(plant: Plant, target: Array, scale: Array, power: float, rng: np.random.Generator) -> float:
     """Least power of SLSQP on commands from a few starts; infinite where none ends well."""
-    used, least = plant.width > 0.0, np.inf
+    used = plant.width > 0.0
+    least = np.inf
 
     def command(share: Array) -> Array:
         full = plant.lower.copy()
@@ -152,7 +159,8 @@ def test_from_tick_to_tick_a_pod_goes_through_rest_to_reverse() -> None:
     slow = replace(
         layout, actuators=tuple(replace(part, turn_rate=1.0, rate=400.0) for part in layout.actuators)
     )
-    allocator, before = Allocator(slow, period_s=0.1), np.array([[0.1, 60.0, 0.0]] * 2)
+    allocator = Allocator(slow, period_s=0.1)
+    before = np.array([[0.1, 60.0, 0.0]] * 2)
     for _ in range(12):
         answer = allocator.allocate([-60, 0, 0, 0, 0, 0], previous=before)
         assert (np.abs(answer.command - before) <= [0.1 + 1e-9, 40.0 + 1e-6, 0.0]).all()

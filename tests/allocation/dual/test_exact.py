@@ -23,7 +23,8 @@ GOOD = 1e-5
 
 def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
     """Wrenches (n, 6) of random commands, by the plant."""
-    lower, upper = layout.lower, layout.upper
+    lower = layout.lower
+    upper = layout.upper
     share = np.random.default_rng(seed).uniform(size=(n, layout.n, 3))
     return Plant(layout).wrench(lower + share * (upper - lower))
 
@@ -117,7 +118,8 @@ def test_a_force_table_that_was_measured_again_is_read_again(search: AnyRobot, t
 def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["C"])
     yaw = 0.8
-    c, s = math.cos(yaw), math.sin(yaw)
+    c = math.cos(yaw)
+    s = math.sin(yaw)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     fins = [
         Fin(fin.name, tuple((rotation @ fin.position).tolist()), fin.mounting_angle + yaw, fin.limits)

@@ -16,14 +16,16 @@ from finlab.physics.plant import Plant
 
 FLOW = np.array([1.5, 0.1, 0.05, 0.0, 0.0, 0.0])
 """A velocity through the water [m/s, rad/s]."""
-ROBOTS, EACH = 50, 4
+ROBOTS = 50
+EACH = 4
 
 
 def robot(rng: np.random.Generator, limit: float) -> Layout:
     """Two to four foils that turn by a limit [rad], shafts across the way ahead, and as many thrusters."""
     parts: list[Actuator] = []
     for i in range(rng.integers(2, 5)):
-        turn, place = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        place = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
         shaft = 0.0, math.cos(turn), math.sin(turn)
         parts.append(Rudder(f"f{i}", tuple(place), shaft, (1, 0, 0), 0.01, (-limit, limit), 2.0))
     for i in range(rng.integers(2, 5)):
@@ -39,7 +41,8 @@ def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocato
     rng = np.random.default_rng(seed)
     for _ in range(ROBOTS):
         layout = robot(rng, math.radians(limit))
-        allocator, plant = Allocator(layout), Plant(layout)
+        allocator = Allocator(layout)
+        plant = Plant(layout)
         for _ in range(EACH):
             command = plant.sample(rng, ())
             for i, part in enumerate(layout.actuators):
@@ -53,7 +56,9 @@ def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocato
     ("seed", "limit", "turned", "most"), [(411, 24.0, 24.0, 1), (412, 30.0, 24.0, 1), (413, 30.0, 30.0, 3)]
 )
 def test_what_foils_give_near_the_stall_is_given(seed: int, limit: float, turned: float, most: int) -> None:
-    missed, dearer, exact = 0, 0, []
+    missed = 0
+    dearer = 0
+    exact = []
     for allocator, wrench, power in questions(seed, limit, turned):
         answer = allocator.allocate(wrench, flow=FLOW)
         missed += not answer.reachable

@@ -27,7 +27,8 @@ def missing(plant: OwnPlant, commands: Array, wrench: Array) -> float:
 
 
 def test_a_heavy_takes_the_watts_of_clarabel() -> None:
-    plant, rng = OwnPlant(mixed_robots.bluerov2_heavy()), np.random.default_rng(4)
+    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    rng = np.random.default_rng(4)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for _ in range(10):
         wrench = mixed_robots.within(plant, rng)
@@ -38,7 +39,8 @@ def test_a_heavy_takes_the_watts_of_clarabel() -> None:
 
 
 def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
-    plant, rng = OwnPlant(mixed_robots.bluerov2_heavy()), np.random.default_rng(5)
+    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    rng = np.random.default_rng(5)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for times in (1.2, 2.0, 3.0):
         wrench = mixed_robots.beyond(plant, rng, times)
@@ -52,7 +54,8 @@ def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
 @pytest.mark.parametrize("number", sampled(range(3)))
 @pytest.mark.parametrize("kind", mixed_robots.KINDS)
 def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
-    plant, rng = mixed_robots.random_plant(kind, number, 7), np.random.default_rng(number)
+    plant = mixed_robots.random_plant(kind, number, 7)
+    rng = np.random.default_rng(number)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     most = plant.power(np.array([each.limits[1] for each in plant.actuators]))
     for _ in range(2):
@@ -71,7 +74,8 @@ def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
 
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins", "mixed"])
 def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
-    plant, rng = mixed_robots.random_plant(kind, 3, 7), np.random.default_rng(0)
+    plant = mixed_robots.random_plant(kind, 3, 7)
+    rng = np.random.default_rng(0)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout))
     for times in (1.2, 3.0):
         wrench = mixed_robots.beyond(plant, rng, times)
@@ -81,7 +85,8 @@ def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
 
 def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
     for number in range(4):
-        plant, rng = OwnPlant(mixed_robots.fins_with_a_tail(number, 3)), np.random.default_rng(number)
+        plant = OwnPlant(mixed_robots.fins_with_a_tail(number, 3))
+        rng = np.random.default_rng(number)
         wrench = mixed_robots.within(plant, rng)
         commands = plant.commands_of(finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench))
         assert missing(plant, commands, wrench) <= REACHED
@@ -93,12 +98,11 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
 def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
     """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in its
     direction, among those that may follow."""
-    plant, rng = (
-        OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7))),
-        np.random.default_rng(1),
-    )
+    plant = OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7)))
+    rng = np.random.default_rng(1)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout), period_s=period)
-    first, last = mixed_robots.within(plant, rng), mixed_robots.within(plant, rng)
+    first = mixed_robots.within(plant, rng)
+    last = mixed_robots.within(plant, rng)
     before: Array | None = None
     for share in np.linspace(0.0, 1.0, 6):
         wrench = (1.0 - share) * first + share * last
@@ -107,7 +111,8 @@ def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
         assert plant.excess(commands) == 0.0
         if before is not None:
             assert plant.rate_excess(before, commands, period) <= 1e-9
-            error, near = missing(plant, commands, wrench), plant.after(before, period)
+            error = missing(plant, commands, wrench)
+            near = plant.after(before, period)
             if error > REACHED and error > least_miss(near, wrench, 33) + 2e-3:
                 most = min(farthest(near, wrench, 33), 1.0)
                 assert missing(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(wrench / plant.scales)
@@ -122,11 +127,14 @@ LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
 def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
     """A robot of 2 to 12 thrusters, its effectiveness matrix (6, n), and the ends of its forces (n,)."""
     rng = np.random.default_rng([0xBE40, number])
-    parts, columns, ends = [], [], []
+    parts = []
+    columns = []
+    ends = []
     for k in range(rng.integers(2, 13)):
         axis = np.eye(3)[rng.integers(3)] if rng.random() < 0.4 else rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        place, turn = rng.uniform(-0.5, 0.5, 3), float(rng.choice([0.0, 0.02]))
+        place = rng.uniform(-0.5, 0.5, 3)
+        turn = float(rng.choice([0.0, 0.02]))
         ends.append([-float(rng.choice([0.0, 10.0, 40.0])), float(rng.uniform(1.0, 60.0))])
         columns.append([*axis, *(np.cross(place, axis) + turn * axis)])
         parts.append(
@@ -169,7 +177,8 @@ def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int
     for target in _targets(number, *robot):
         for policy, rows in ((None, slice(None)), (Policy("priority", order=(("Fz",), ("Fx",))), [2])):
             answer = allocator.allocate(target, policy=policy or "closest")
-            scaled, wanted = (by / allocator.scale[:, None])[rows], (target / allocator.scale)[rows]
+            scaled = (by / allocator.scale[:, None])[rows]
+            wanted = (target / allocator.scale)[rows]
             best = lsq_linear(scaled, wanted, (low, high), method="bvls", tol=1e-14)
             least = np.linalg.norm(scaled @ best.x - wanted)
             assert np.linalg.norm((answer.unallocated / allocator.scale)[rows]) <= least + 1e-5
@@ -213,7 +222,8 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
 
 @pytest.mark.parametrize("name", sorted(shipped_layouts()))
 def test_no_question_of_a_shipped_layout_ends_in_a_foreign_exception(name: str) -> None:
-    layout, rng = load_layout(name), np.random.default_rng(11)
+    layout = load_layout(name)
+    rng = np.random.default_rng(11)
     allocator = Allocator(layout)
     losses: list[tuple[str, ...]] = [(), layout.names[:1], layout.names[2:]]
     for lost, policy in itertools.product(losses, ("closest", "direction", "priority")):

@@ -25,7 +25,8 @@ def random_table(rng: np.random.Generator, limits: Array, noise: float) -> Table
     """A noisy law with any lean and unevenness on uneven knots, up to beyond or short of limits (3, 2)."""
     ends = limits[:2, 1] * rng.uniform(0.85, 1.2, 2)
     axes = [np.sort(rng.uniform(0.0, end, rng.integers(3, 7))) for end in ends]
-    first, width = limits[2, 0], np.ptp(limits[2])
+    first = limits[2, 0]
+    width = np.ptp(limits[2])
     periodic = bool(width > TURN - 1e-6)
     axes.append(first + width * np.sort(rng.permutation(40)[: rng.integers(9, 20)]) / 40)
     a, f, d = np.meshgrid(*axes, indexing="ij")
@@ -43,7 +44,8 @@ def random_table(rng: np.random.Generator, limits: Array, noise: float) -> Table
 
 def measured(kind: str, number: int, folder: Path) -> Any:
     """A robot of a kind whose first fin, and most others, are known by tables."""
-    robot, rng = random_robot(kind, number, 3), np.random.default_rng([17, number])
+    robot = random_robot(kind, number, 3)
+    rng = np.random.default_rng([17, number])
     fins = [part for part in robot["actuators"] if part["type"] == "fin"]
     for k, fin in enumerate(fins):
         if k and rng.random() < 0.3:
@@ -92,9 +94,12 @@ def test_no_command_is_worth_more_and_hardly_any_less(seed: int, monkeypatch: py
 @pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "holes", "all"])
 def test_no_command_takes_less(kind: str, number: int, tmp_path: Path) -> None:
     layout = measured(kind, number, tmp_path)
-    allocator, plant, rng = Allocator(layout), Plant(layout), np.random.default_rng(number)
+    allocator = Allocator(layout)
+    plant = Plant(layout)
+    rng = np.random.default_rng(number)
     command = plant.sample(rng, (5,))
-    wrench, power = plant.wrench(command), plant.power(command).sum(axis=-1)
+    wrench = plant.wrench(command)
+    power = plant.power(command).sum(axis=-1)
     batch = allocator.allocate_batch(wrench)
     assert (batch.bound <= batch.power).all() and (batch.bound > 0.0).mean() > 0.5
     exact = batch.err_norm < 1e-9

@@ -11,7 +11,8 @@ from finlab.research.evaluation.splits import make_case
 @pytest.mark.parametrize("previous", [False, True])
 def test_the_last_share_of_a_force_is_given(split: str, layout: int, target: int, previous: bool) -> None:
     case = make_case(split, 10, 11, layout)
-    allocator, wrench = Allocator(case.layout), case.targets[target]
+    allocator = Allocator(case.layout)
+    wrench = case.targets[target]
     free = allocator.allocate(wrench)
     result = allocator.allocate(wrench, previous=free.command) if previous else free
     missing = np.abs(result.wrench - wrench) / np.abs(wrench).max()

@@ -42,7 +42,8 @@ def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
 
 
 def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
-    lower, upper = (layout.lower, layout.upper)
+    lower = layout.lower
+    upper = layout.upper
     return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
 
 
@@ -60,7 +61,8 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
     shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
-    one, other = search.allocate(layout, target), search.allocate(shuffled, target)
+    one = search.allocate(layout, target)
+    other = search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert normalized_error(search.normalization, one.wrench, other.wrench) < GOOD
     assert same_power(one, other, 0.002)
@@ -70,7 +72,8 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
 def test_a_turned_robot_gets_the_turned_answer(search: AnyRobot, seed: int, limits: str, yaw: float) -> None:
     layout, target = drawn(seed, limits)
-    c, s = math.cos(yaw), math.sin(yaw)
+    c = math.cos(yaw)
+    s = math.sin(yaw)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     fins = [
         replace(
@@ -136,10 +139,8 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot
         )
         for fin in layout.fins
     ]
-    one, other = (
-        search.allocate(layout, target),
-        search.allocate(replace(layout, actuators=tuple(fins)), target),
-    )
+    one = search.allocate(layout, target)
+    other = search.allocate(replace(layout, actuators=tuple(fins)), target)
     # A robot of few fins may have been moved away from the target.
     moved = normalized_error(search.normalization, Plant(other.layout).wrench(one.command), target)
     assert other.err_norm <= max(GOOD, moved)

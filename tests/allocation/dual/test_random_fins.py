@@ -45,14 +45,16 @@ def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -
     for seed in range(4):
         layout = random_robot(np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7))
         batch = method.allocate_batch(layout, reachable(layout, 12, seed))
-        lower, upper = layout.lower, layout.upper
+        lower = layout.lower
+        upper = layout.upper
         assert (batch.command >= lower).all() and (batch.command <= upper).all()
         assert np.quantile(batch.err_norm, 0.95) < 1e-5
         assert "table" in kinds or batch.err_norm.max() < 2e-5
 
 
 def test_no_more_than_brute_force_finds() -> None:
-    method, ratio = AnyRobot(), []
+    method = AnyRobot()
+    ratio = []
     for seed in range(2):
         layout = random_robot(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
         for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
@@ -76,7 +78,8 @@ def test_robots_with_stops_are_as_cheap(target: Array) -> None:
 @pytest.mark.parametrize("axis", sampled(range(12), 5))
 def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
     """Which side of the gap each fin takes is no convex question."""
-    layout, target = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4))), AXES[axis]
+    layout = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4)))
+    target = AXES[axis]
     answer = Allocator(layout).allocate(target)
     least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
@@ -84,7 +87,8 @@ def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
 def test_pure_axes_of_symmetric_robots(name: str) -> None:
-    layout, method = load_layout(shipped_layouts()[name]), AnyRobot()
+    layout = load_layout(shipped_layouts()[name])
+    method = AnyRobot()
     for target in AXES[[0, 2, 5, 6]]:
         answer = method.allocate(layout, target)
         assert answer.err_norm < 1e-5
@@ -93,7 +97,8 @@ def test_pure_axes_of_symmetric_robots(name: str) -> None:
 def test_coincident_fins_share() -> None:
     """Two at one place: each gives half."""
     pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
-    plant, method = Plant(pair), AnyRobot()
+    plant = Plant(pair)
+    method = AnyRobot()
     for force in (0.5, 2.0, 6.0, 12.0):
         command = np.array([[0.6, 2.1, 0.4]] * 2)
         target = plant.wrench(command) * force / 13.32
@@ -135,10 +140,13 @@ def least_cost(
 
     Starts are random commands, of which every other one has fins at rest, and `also`, a command (n, 3).
     """
-    plant, rng = Plant(layout), np.random.default_rng(seed)
-    meter, n = cost_meter(objective, plant), layout.n_fins
+    plant = Plant(layout)
+    rng = np.random.default_rng(seed)
+    meter = cost_meter(objective, plant)
+    n = layout.n_fins
     full = plant.full_turn
-    low, width = plant.lower, np.maximum(plant.width, 1e-12)
+    low = plant.lower
+    width = np.maximum(plant.width, 1e-12)
 
     def command(share: Array) -> Array:
         return low + share.reshape(n, 3) * width

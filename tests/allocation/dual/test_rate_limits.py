@@ -45,7 +45,8 @@ class Drive(NamedTuple):
 
 
 def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
-    previous, results = None, []
+    previous = None
+    results = []
     for wrench in path:
         result = method.allocate(layout, wrench, previous=previous)
         previous = result.command if bound else None
@@ -162,7 +163,8 @@ def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
 def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: AnyRobot, penta: Layout) -> None:
     """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is missing."""
     target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
-    previous, missing = method.allocate(penta, target).command, []
+    previous = method.allocate(penta, target).command
+    missing = []
     for _ in range(12):
         result = method.allocate(penta, -target, previous=previous)
         previous = result.command
@@ -190,7 +192,9 @@ def with_pole(pole: float) -> Layout:
 def test_it_is_the_one_that_the_slowest_fin_is_in_time_for(pole: float) -> None:
     """A filter that follows a ramp lags by what is looked ahead: what it gives is then what is asked for."""
     asked = in_time(with_pole(pole), np.zeros(6), RISING)[0]
-    lag, value, rate = LagStep.of(np.array([pole]), PERIOD_S), np.zeros(1), np.zeros(1)
+    lag = LagStep.of(np.array([pole]), PERIOD_S)
+    value = np.zeros(1)
+    rate = np.zeros(1)
     for tick in range(200):
         value, rate = lag.follow(value, rate, np.array([tick + asked]))
     # Between the ends of the last period, in the middle of the steps that the command takes.
@@ -204,7 +208,9 @@ def test_after_the_last_wrench_comes_the_last() -> None:
 
 
 def test_the_default_method_answers_it_and_others_answer_the_present() -> None:
-    robot, now, later = load_layout("A"), np.array([1.0, 0, 0.5, 0, 0, 0]), [[3.0, 0, 0, 0, 0, 0]] * 9
+    robot = load_layout("A")
+    now = np.array([1.0, 0, 0.5, 0, 0, 0])
+    later = [[3.0, 0, 0, 0, 0, 0]] * 9
     for name, answered in (("dual", later[0]), ("analytic", now)):
         result = load_method_spec(name).on(robot).allocate(now, reference=later)
         np.testing.assert_array_equal(result.target, answered)

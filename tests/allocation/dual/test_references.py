@@ -65,7 +65,8 @@ def test_three_ways_to_the_least_watts_of_a_heavy() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_bound_and_best_known_meet(kind: str) -> None:
     """Where the bound by prices equals what is found, both are the optimum; wide arcs and holes included."""
-    plant, rng = random_plant(kind, 0, 1), np.random.default_rng(0)
+    plant = random_plant(kind, 0, 1)
+    rng = np.random.default_rng(0)
     wrench = within(plant, rng)
     best = least_known(plant, wrench, 1)
     assert best is not None

@@ -54,7 +54,8 @@ def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
     method = AnyRobot().method(load_layout("torpedo"))
-    slow, fast = np.array([1.0, 0, 0, 0, 0, 0]), np.array([2.0, 0, 0, 0, 0, 0])
+    slow = np.array([1.0, 0, 0, 0, 0, 0])
+    fast = np.array([2.0, 0, 0, 0, 0, 0])
     kept = method.at(slow)
     assert kept is not method and method.at(slow.copy()) is kept
     assert method.at(fast) is not kept and method.at(None) is method

@@ -27,7 +27,9 @@ def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
     for part, old, new in zip(robot.actuators, before, after, strict=True):
         if np.isnan(new).any():
             continue
-        lower, upper, rates = np.array(part.lower), np.array(part.upper), np.array(part.rates)
+        lower = np.array(part.lower)
+        upper = np.array(part.upper)
+        rates = np.array(part.rates)
         outside = np.maximum(np.maximum(lower - new, new - upper), 0.0)
         change = np.abs(new - old)
         around = np.abs((new - old + math.pi) % (2.0 * math.pi) - math.pi)
@@ -43,7 +45,8 @@ def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
 
 def jump(robot: Layout, allocator: Allocator, rng: np.random.Generator) -> Array:
     """A wrench (6,) anywhere: of a random command, up to many times as much."""
-    lower, upper = np.nan_to_num(robot.lower), np.nan_to_num(robot.upper)
+    lower = np.nan_to_num(robot.lower)
+    upper = np.nan_to_num(robot.upper)
     command = lower + rng.random(lower.shape) * (upper - lower)
     wrench = allocator._whole.plant.wrench(command)
     times = rng.choice([0.0, 0.3, 1.0, 3.0, 1e3])
@@ -105,7 +108,8 @@ def limited(robot: Layout, previous: Array) -> Layout:
 @pytest.mark.parametrize("policy", POLICIES)
 def test_a_policy_of_a_tick_is_that_of_a_robot_with_such_limits(policy: str) -> None:
     robot = parse_layout(with_rates(bluerov2_heavy()))
-    allocator, rng = Allocator(robot, period_s=PERIOD_S), np.random.default_rng(34)
+    allocator = Allocator(robot, period_s=PERIOD_S)
+    rng = np.random.default_rng(34)
     worst = 0.0
     for _ in range(20):
         # Layouts know limits that hold 0 alone, so the tick begins near it.
@@ -129,7 +133,8 @@ def turned(answers: list[Allocation]) -> float:
 
 def pods_in_waves(calm: float) -> list[Allocation]:
     allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S, calm=calm)
-    scale, answers = allocator.scale, list[Allocation]()
+    scale = allocator.scale
+    answers = list[Allocation]()
     previous = None
     for tick in range(120):
         phase = 2.0 * math.pi * tick / 30.0
@@ -177,7 +182,8 @@ def test_a_drive_passes_through_its_dead_band() -> None:
         "rate_n_s": 8.0,
     }
     allocator = Allocator(parse_layout(layout_of("one", [thruster])), period_s=PERIOD_S)
-    previous, forces = np.zeros((1, 3)), []
+    previous = np.zeros((1, 3))
+    forces = []
     for _ in range(6):
         answer = allocator.allocate([4.0, 0.0, 0.0, 0.0, 0.0, 0.0], previous=previous)
         forces.append(float(answer.wrench[0]))

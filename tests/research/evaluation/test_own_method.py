@@ -106,7 +106,8 @@ def test_names_that_are_none(names: str, message: str) -> None:
 def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A pair in a file of one's own."""
     layout = finlab.load_layout("pair")
-    path, file = tmp_path / "mine.yaml", tmp_path / "rows.json"
+    path = tmp_path / "mine.yaml"
+    file = tmp_path / "rows.json"
     save_layout(layout, path)
     sizes = ["--targets", "4", "--subsample", "1"]
     assert main(["eval", "wrench", str(path), *sizes, "--json", str(file)]) == 0
@@ -128,7 +129,8 @@ def test_targets_are_seeded_and_within_reach() -> None:
 
 
 def test_failed_fins_of_a_bundle_stay_out(tmp_path: Path) -> None:
-    file, bundle = tmp_path / "rows.json", tmp_path / "A"
+    file = tmp_path / "rows.json"
+    bundle = tmp_path / "A"
     assert main(["export", "A", "--lost", "front_left", "-o", str(bundle)]) == 0
     arguments = ["--targets", "3", "--methods", "dual", "--json", str(file)]
     assert main(["eval", "wrench", str(bundle), *arguments]) == 0

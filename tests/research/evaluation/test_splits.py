@@ -145,7 +145,8 @@ def test_tables_are_noisy_grids_of_random_fins() -> None:
         rows = np.loadtxt(path, delimiter=",", skiprows=1)
         around = rows[rows[:, :2].prod(axis=1) == rows[:, :2].prod(axis=1).max()]
         # All round the circle the noise is what differs from the neighbours of a smooth fin.
-        size, turn = np.hypot(around[:, 4], around[:, 5]), np.exp(2j * np.pi * np.arange(len(around)) / 12)
+        size = np.hypot(around[:, 4], around[:, 5])
+        turn = np.exp(2j * np.pi * np.arange(len(around)) / 12)
         smooth = size.mean() + 2 * np.real((size * turn.conj()).mean() * turn)
         assert 0.005 < ((size - smooth) / size.mean()).std() < 0.06
         assert len(rows) == 8 * 9 * 12 and not rows[:, 3].any()

@@ -35,7 +35,8 @@ def targets_of(robot: EffortRobot, count: int) -> tuple[Array, Array]:
 
 
 def random_forces(robot: EffortRobot, rows: int) -> Array:
-    rng, largest = np.random.default_rng(2), robot.forces.fins.maximum
+    rng = np.random.default_rng(2)
+    largest = robot.forces.fins.maximum
     shape = rows, len(largest)
     return np.asarray(rng.random(shape) ** 3 * largest * np.exp(1j * rng.uniform(-np.pi, np.pi, shape)))
 

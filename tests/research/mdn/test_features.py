@@ -41,7 +41,8 @@ def acted(view: RobotView, share: np.ndarray) -> np.ndarray:
 
 def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout: Layout) -> None:
     problem = problem_of(layout)
-    view, rng = robot_view(problem), np.random.default_rng(0)
+    view = robot_view(problem)
+    rng = np.random.default_rng(0)
     share = rng.normal(size=(4, layout.n_fins)) + 1j * rng.normal(size=(4, layout.n_fins))
     force = share * view.largest
     target = wrench(problem, force)
@@ -60,18 +61,23 @@ def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.n
 
 def test_a_fins_own_vectors_are_turned_to_its_force() -> None:
     """Two fins by hand: what is asked of them, and what they are, in the frame of that."""
-    rng, angle, size = np.random.default_rng(1), np.array([0.5, -2.0]), np.array([2.0, 0.3])
-    static, none = rng.normal(size=(1, 2, NODE_SIZE - 6)), np.zeros((1, 2, 2), complex)
+    rng = np.random.default_rng(1)
+    angle = np.array([0.5, -2.0])
+    size = np.array([2.0, 0.3])
+    static = rng.normal(size=(1, 2, NODE_SIZE - 6))
+    none = np.zeros((1, 2, 2), complex)
     found = features((size * np.exp(1j * angle))[None], static, none, none)
     np.testing.assert_allclose(found.frame[0], np.exp(1j * angle))
-    nodes, own = found.nodes[0].astype(np.float64), static[0]
+    nodes = found.nodes[0].astype(np.float64)
+    own = static[0]
     np.testing.assert_allclose(nodes[:, 0], np.sqrt(size), rtol=1e-6)
     np.testing.assert_allclose(nodes[:, 1], size / (1.0 + size), rtol=1e-6)
     np.testing.assert_allclose(nodes[:, 2], np.log(size + 1e-3) / 7.0, rtol=1e-6)
     plain = np.ones(NODE_SIZE - 6, bool)
     for place in VECTORS:
         plain[[place, place + 1]] = False
-        x, y = own[:, place], own[:, place + 1]
+        x = own[:, place]
+        y = own[:, place + 1]
         turned = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
         np.testing.assert_allclose(nodes[:, 6 + place], turned[0], atol=1e-6)
         np.testing.assert_allclose(nodes[:, 7 + place], turned[1], atol=1e-6)
@@ -82,7 +88,8 @@ def test_a_fin_with_stops_is_seen_within_them() -> None:
     """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches all."""
     arc = Limits(zero_direction=(-0.5, 1.7))
     layout = Layout("arc", (Fin("a", (0.2, 0.1, 0.0), 0.3, arc), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
-    static, half = robot_view(problem_of(layout)).static, 1.1
+    static = robot_view(problem_of(layout)).static
+    half = 1.1
     reach = 1 + len(SHARES)
     np.testing.assert_allclose(static[:, reach], 1.0, rtol=1e-6)
     ahead = static[:, reach + 1] + 1j * static[:, reach + 2]
@@ -92,8 +99,10 @@ def test_a_fin_with_stops_is_seen_within_them() -> None:
 
 
 def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
-    target, yaw = np.array([1.0, -0.4, 0.6, 0.02, -0.05, 0.1]), 0.8
-    c, s = np.cos(yaw), np.sin(yaw)
+    target = np.array([1.0, -0.4, 0.6, 0.02, -0.05, 0.1])
+    yaw = 0.8
+    c = np.cos(yaw)
+    s = np.sin(yaw)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     fins = tuple(
         replace(
@@ -105,7 +114,8 @@ def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
     )
     turned = np.concatenate([rotation @ target[:3], rotation @ target[3:]])
     even = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # a yardstick that turns along
-    before, after = seen(layout, target, even), seen(replace(layout, actuators=fins), turned, even)
+    before = seen(layout, target, even)
+    after = seen(replace(layout, actuators=fins), turned, even)
     for a, b in zip(before, after, strict=True):
         np.testing.assert_allclose(a, b, atol=2e-3)
 
@@ -216,7 +226,9 @@ def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem
 @pytest.mark.parametrize(("model", "limits"), KINDS)
 def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, limits: Limits) -> None:
     layout, problem = compiled(model, limits)
-    fins, plant, rng = problem.fins, plant_of(layout), np.random.default_rng(0)
+    fins = problem.fins
+    plant = plant_of(layout)
+    rng = np.random.default_rng(0)
     direction = fins.middle + fins.half * rng.uniform(-0.9, 0.9, (40, 1))
     wanted = rng.uniform(0.05, 0.9, (40, 1)) * fins.gauges(direction) * fins.largest
     found = fins.project(wanted * np.exp(1j * direction))

@@ -75,7 +75,8 @@ def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:
 
 
 def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a: Layout) -> None:
-    answer, count = shipped.allocate(layout_a, TARGET), MdnSettings().n_candidates
+    answer = shipped.allocate(layout_a, TARGET)
+    count = MdnSettings().n_candidates
     expected = [f"component {k + 1}" for k in np.argsort(-weights(shipped, layout_a))[:count]]
     assert answer.samples is not None and answer.candidates is not None
     assert list(answer.samples.source[: len(expected)]) == expected
@@ -117,7 +118,8 @@ def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: AnyRobot, 
 
 def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a: Layout) -> None:
     """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
-    weight, (method, target) = weights(shipped, layout_a), method_of(shipped, layout_a)
+    weight = weights(shipped, layout_a)
+    method, target = method_of(shipped, layout_a)
     m = len(weight)
     proposal = method.proposals(target, 3, m + 8000)
     drawn = proposal.component[0, m:]
@@ -175,9 +177,11 @@ def test_samples_tell_what_the_plant_says_of_them(shipped: AnyRobot, layout_a: L
 def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) -> None:
     """As near as the compiled fins come, where a fin can give what is proposed."""
     method, target = method_of(shipped, layout_a)
-    told, force = shipped.allocate(layout_a, TARGET).samples, method.proposals(target, 0).force[0]
+    told = shipped.allocate(layout_a, TARGET).samples
+    force = method.proposals(target, 0).force[0]
     assert told is not None
-    given, fins = Plant(layout_a).force(told.command), method.robot.forces.fins
+    given = Plant(layout_a).force(told.command)
+    fins = method.robot.forces.fins
     able = (np.abs(force) > 2.0 * fins.smallest) & (np.abs(force) < 0.99 * fins.maximum)
     assert able.mean() > 0.5
     np.testing.assert_allclose(
@@ -200,8 +204,10 @@ def test_out_of_reach_it_delivers_what_the_default_method_does(
 
 
 def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AnyRobot) -> None:
-    layout, before = load_layout("hexa"), None
-    plant, worst = Plant(layout), 0.0
+    layout = load_layout("hexa")
+    before = None
+    plant = Plant(layout)
+    worst = 0.0
     for k in range(30):
         wanted = np.array(TARGET) * np.cos(0.2 * k)
         answer = shipped.allocate(layout, wanted, previous=before)
@@ -210,5 +216,6 @@ def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AnyRobot)
             turn = change[:, 2]
             change[:, 2] = np.where(plant.full_turn, np.minimum(turn, 2.0 * np.pi - turn), turn)
             assert (change <= 0.1 * layout.rates + 1e-12).all()
-        before, worst = answer.command, max(worst, answer.err_norm)
+        before = answer.command
+        worst = max(worst, answer.err_norm)
     assert worst < 0.05

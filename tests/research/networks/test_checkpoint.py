@@ -279,7 +279,8 @@ def test_a_range_of_no_width_normalizes_to_zero() -> None:
 
 def test_arrays_are_answered_as_tensors() -> None:
     command = np.random.default_rng(0).normal(size=(50, 3, 3)) * 5
-    lower, upper = LOWER.numpy(), UPPER.numpy()
+    lower = LOWER.numpy()
+    upper = UPPER.numpy()
     for function in (to_normalized, to_command):
         expected = function(torch.from_numpy(command), LOWER, UPPER).numpy()
         np.testing.assert_allclose(function(command, lower, upper), expected, rtol=1e-12)

@@ -17,7 +17,9 @@ from finlab.research.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_
 from finlab.research.random_layouts import random_layout
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
-B, N, M = 4, 3, 5
+B = 4
+N = 3
+M = 5
 
 
 def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
@@ -74,7 +76,8 @@ def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
 
 def test_transformer_is_that_of_pytorch() -> None:
     """Without graph layers, of robots of 2 to 5 fins."""
-    config, (x, target) = replace(CONFIG, graph_layers=0), random_robots()
+    config = replace(CONFIG, graph_layers=0)
+    x, target = random_robots()
     weights = random_weights()
     mask = torch.arange(5) < torch.arange(12)[:, None] % 4 + 2
     sizes = config.width, config.heads, config.feedforward
@@ -82,7 +85,8 @@ def test_transformer_is_that_of_pytorch() -> None:
     reference = torch.nn.TransformerEncoder(layer, config.transformer_layers, enable_nested_tensor=False)
     named = {name: value for name, value in weights.items() if name.startswith("transformer.")}
     reference.load_state_dict({name.removeprefix("transformer."): value for name, value in named.items()})
-    linear, wrench = torch.nn.functional.linear, target[:, None].expand(-1, 5, -1)
+    linear = torch.nn.functional.linear
+    wrench = target[:, None].expand(-1, 5, -1)
     parts = ("enter", x), ("wrench", wrench)
     both = [linear(part, weights[f"{name}.weight"], weights[f"{name}.bias"]) for name, part in parts]
     joined = linear(torch.cat(both, -1), weights["join.weight"], weights["join.bias"])
@@ -94,7 +98,8 @@ def test_transformer_is_that_of_pytorch() -> None:
 
 
 def test_fins_may_come_in_any_order() -> None:
-    weights, (x, target) = random_weights(), random_robots()
+    weights = random_weights()
+    x, target = random_robots()
     order = torch.tensor([3, 0, 4, 1, 2])
     for got, expected in zip(CONFIG(weights, x[:, order], target), CONFIG(weights, x, target), strict=True):
         torch.testing.assert_close(got, expected[:, order], atol=1e-4, rtol=1e-4)
@@ -124,7 +129,8 @@ def random_mixture() -> Mixture:
 
 def drawn(mixture: Mixture, count: int, temperature: float = 1.0) -> np.ndarray:
     rng = np.random.default_rng(0)
-    uniform, normal = rng.random((B, N, count)), rng.standard_normal((B, N, count, 3))
+    uniform = rng.random((B, N, count))
+    normal = rng.standard_normal((B, N, count, 3))
     return np.asarray(mixture.sample(uniform, normal, temperature))
 
 
@@ -136,7 +142,8 @@ def distribution(mixture: Mixture, temperature: float = 1.0) -> MixtureSameFamil
 
 
 def test_likelihoods_are_those_of_torchs_distributions() -> None:
-    mixture, x = random_mixture(), np.random.default_rng(2).uniform(-1.2, 1.2, (B, 7, N, 3))
+    mixture = random_mixture()
+    x = np.random.default_rng(2).uniform(-1.2, 1.2, (B, 7, N, 3))
     expected = distribution(mixture).log_prob(torch.from_numpy(x).transpose(0, 1)).transpose(0, 1)
     np.testing.assert_allclose(mixture.log_prob(x), expected.numpy(), rtol=1e-9)
     tensors = Mixture(*map(torch.from_numpy, mixture))
@@ -148,7 +155,8 @@ def test_samples_have_the_moments_of_the_mixture_and_a_temperature_sharpens_weig
     temperature: float,
 ) -> None:
     mixture = random_mixture()
-    x, expected = drawn(mixture, 40_000, temperature), distribution(mixture, temperature)
+    x = drawn(mixture, 40_000, temperature)
+    expected = distribution(mixture, temperature)
     np.testing.assert_allclose(x.mean(1), expected.mean.numpy(), atol=0.03)
     np.testing.assert_allclose(x.std(1), expected.stddev.numpy(), atol=0.03)
     if temperature == 1.0:

@@ -53,7 +53,8 @@ def robot() -> Layout:
     """Layout A with a fin confined to an arc and one that cannot move at all."""
     layout = load_layout(shipped_layouts()["A"])
     first, second = layout.names[:2]
-    arc, stiff = Limits(zero_direction=(0.3, 1.7)), Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
+    arc = Limits(zero_direction=(0.3, 1.7))
+    stiff = Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
     return layout.replace_actuator(first, limits=arc).replace_actuator(second, limits=stiff)
 
 
@@ -106,7 +107,9 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, r
         return float(normalized_error(method.normalization, wrench, targets).mean())
 
     targets = np.random.default_rng(1).normal(size=(10, 6)) * checkpoint.normalization.std
-    mean, ranked, refined = believed(mean_only=True), believed(refinement="none"), believed()
+    mean = believed(mean_only=True)
+    ranked = believed(refinement="none")
+    refined = believed()
     assert refined < 0.9 * ranked < 0.9 * mean
 
 
@@ -172,13 +175,15 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
-    layout, std = place_of(robot), torch.tensor(method.normalization.std, dtype=torch.float32)
+    layout = place_of(robot)
+    std = torch.tensor(method.normalization.std, dtype=torch.float32)
     wanted = torch.tensor(target, dtype=torch.float32)
     lower, upper = layout[2:]
     x = to_normalized(torch.tensor(start.command, dtype=torch.float32), lower, upper).requires_grad_(True)
     optimizer = torch.optim.Adam([x], lr=ADAM_RATE)
     turns = torch.tensor(is_full_turn(robot.upper[:, 2] - robot.lower[:, 2]))
-    best, least = x.detach().clone(), torch.full((3,), torch.inf)
+    best = x.detach().clone()
+    least = torch.full((3,), torch.inf)
     for step in range(26):
         optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / 25)
         command = to_command(x, lower, upper)
@@ -187,7 +192,8 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
         effort = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
         score = error.square().sum(-1) + 0.05 * effort
         better = score < least
-        best[better], least[better] = x.detach()[better], score.detach()[better]
+        best[better] = x.detach()[better]
+        least[better] = score.detach()[better]
         optimizer.zero_grad()
         score.sum().backward()
         optimizer.step()
@@ -237,12 +243,14 @@ def test_refuses_settings_that_leave_nothing_to_answer_with(
 
 def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> None:
     """Unrefined, the answer is the likeliest sample, or the one with the least J = J_norm + gamma J_en."""
-    layout, target = load_layout(shipped_layouts()["A"]), np.array([TARGET])
+    layout = load_layout(shipped_layouts()["A"])
+    target = np.array([TARGET])
     chosen = {}
     for ranking in ("physics", "nll"):
         options = {"ranking": ranking, "refinement": "none", "n_candidates": 12, "gamma": 0.2}
         paper = AnyRobot("paper", checkpoint, **options)
-        method, std = paper.method(layout), paper.normalization.std
+        method = paper.method(layout)
+        std = paper.normalization.std
         mixture = method._predict((target - paper.normalization.mean) / std)
         sampled = method._commands.feasible(to_command(method._draw(mixture, 3), *method.limits))[0]
         if ranking == "nll":

@@ -17,7 +17,8 @@ from tests.research.paper.asked_in_torch import wrench_in_torch
 def robot() -> Layout:
     """A robot with a fin confined to an arc and one that cannot move at all."""
     layout = random_layout(np.random.default_rng(1), n_fins=4)
-    arc, stiff = Limits(zero_direction=(0.3, 1.7)), Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
+    arc = Limits(zero_direction=(0.3, 1.7))
+    stiff = Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
     return layout.replace_actuator(layout.names[0], limits=arc).replace_actuator(
         layout.names[1], limits=stiff
     )
@@ -25,7 +26,8 @@ def robot() -> Layout:
 
 def untrained(*hidden: int) -> TrainedWeights:
     """A surrogate with random weights, none of which is without effect."""
-    rng, config = np.random.default_rng(3), SurrogateConfig(hidden)
+    rng = np.random.default_rng(3)
+    config = SurrogateConfig(hidden)
     state = {name: rng.normal(0.0, 0.2, shape) for name, shape in config.shapes().items()}
     state = {name: values.astype(np.float32) for name, values in state.items()}
     normalization = Normalization(np.zeros(6), np.ones(6))
@@ -46,8 +48,10 @@ def commands(robot: Layout, rows: int) -> np.ndarray:
 @pytest.mark.parametrize("hidden", [(32,), (16, 8, 8)])
 @pytest.mark.parametrize("rows", [1, 2 * BLOCK + 3])
 def test_wrench_and_gradient_are_those_of_torch(hidden: tuple[int, ...], rows: int, robot: Layout) -> None:
-    weights, command = untrained(*hidden), commands(robot, rows)
-    surrogate, tensor = LayoutSurrogate(robot, weights), torch.tensor(command, requires_grad=True)
+    weights = untrained(*hidden)
+    command = commands(robot, rows)
+    surrogate = LayoutSurrogate(robot, weights)
+    tensor = torch.tensor(command, requires_grad=True)
     expected = wrench_in_torch(weights, robot, tensor)
     np.testing.assert_allclose(surrogate.wrench(command), expected.detach().numpy(), atol=2e-4)
     force, pull = surrogate.force_and_pullback(command)
@@ -61,7 +65,8 @@ def test_wrench_and_gradient_are_those_of_torch(hidden: tuple[int, ...], rows: i
 
 
 def test_order_does_not_matter(robot: Layout) -> None:
-    weights, command = untrained(16, 8), torch.tensor(commands(robot, 6))
+    weights = untrained(16, 8)
+    command = torch.tensor(commands(robot, 6))
     order = [2, 0, 3, 1]
     shuffled = Layout("shuffled", tuple(robot.fins[i] for i in order))
     whole = wrench_in_torch(weights, robot, command)

@@ -56,7 +56,8 @@ def wrench_at(controller: control.WaypointController, x: float, y: float, z: flo
 
 def test_the_printed_law_of_a_waypoint_at_rest() -> None:
     controller = control.WaypointController(load_layout("A"))
-    (k_d, k_z, k_psi), most = controller.gains, controller.most
+    k_d, k_z, k_psi = controller.gains
+    most = controller.most
     ahead = wrench_at(controller, 0.3, 0.1, -1.1)
     e = math.atan2(0.1, 0.3)
     expected = [k_d * math.hypot(0.3, 0.1) * math.cos(e), 0.0, -0.1 * k_z, 0.0, 0.0, k_psi * e]
@@ -85,7 +86,9 @@ def test_a_bounded_force_does_not_wind_up_the_integral() -> None:
 
 
 def test_an_integral_makes_up_for_a_force_that_stays() -> None:
-    pid, height, climb = Pid(2.0, 1.0, 3.0, most=5.0), 0.0, 0.0
+    pid = Pid(2.0, 1.0, 3.0, most=5.0)
+    height = 0.0
+    climb = 0.0
     for _ in range(600):
         climb += 0.1 * (pid.step(-height) - 1.5 - climb)
         height += 0.1 * climb

@@ -40,7 +40,8 @@ def test_any_one_fin_lost_leaves_them_controllable_and_the_target_reachable(name
 
 def test_open_axes_are_as_small_as_they_can_be() -> None:
     """Against a search over all forces that give the wanted axes exactly."""
-    robot, lost = layout("A"), ("front_left", "front_right")
+    robot = layout("A")
+    lost = ("front_left", "front_right")
     wrench = np.array([3.0, 0, 0.8, 0, 0, 0.2])
     full = Completion(robot, lost, AXES)(wrench)
     planar = layout_effectiveness(robot.without(lost))

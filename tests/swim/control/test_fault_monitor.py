@@ -114,8 +114,10 @@ def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> No
         announced=True,
         seed=1,
     )
-    monitor, fin = FaultMonitor(layout_a), layout_a.index("front_left")
-    watch, command = loop.controller.wrench, None
+    monitor = FaultMonitor(layout_a)
+    fin = layout_a.index("front_left")
+    watch = loop.controller.wrench
+    command = None
     seen: list[Measurement] = []
     loop.controller.wrench = lambda m, s, g: (seen.append(m), watch(m, s, g))[1]  # type: ignore[func-returns-value, method-assign]
     verdicts = []
@@ -142,12 +144,14 @@ def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:
 
 
 def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
-    monitor, nowhere = FaultMonitor(layout_a), np.full(4, np.nan)
+    monitor = FaultMonitor(layout_a)
+    nowhere = np.full(4, np.nan)
     beliefs = monitor._beliefs
     before = beliefs._probability.copy(), beliefs.doubt
     beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
     for sure in (True, False, True):
-        beliefs._probability, beliefs.doubt = before[0].copy(), before[1]
+        beliefs._probability = before[0].copy()
+        beliefs.doubt = before[1]
         if sure:
             beliefs.probability[2, 0] = beliefs.doubt = 0.99
         monitor._judge(nowhere)

@@ -16,7 +16,8 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
     model = MotionModel(layout_a, 0.1)
     body = np.array([0.0, 0.0, 0.0, 1.0, *np.zeros(9)])
     z = np.zeros(FIRST_FIN + 4)
-    z[FIRST_FIN:], z[8:10] = 1.0, (0.05, -0.03)
+    z[FIRST_FIN:] = 1.0
+    z[8:10] = (0.05, -0.03)
     command = np.array([[0.5, 1.0, 0.1], [0.5, 1.0, 3.0], [0.5, 1.05, 3.1], [0.5, 1.0, 0.0]])
     free = np.full(4, np.nan)
     for _ in range(50):
@@ -43,7 +44,8 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
 
 def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) -> None:
     """For a second its force may be the opposite of what is expected."""
-    model, free = MotionModel(layout_a, 0.1), np.full(4, np.nan)
+    model = MotionModel(layout_a, 0.1)
+    free = np.full(4, np.nan)
     z = np.zeros(FIRST_FIN + 4)
     z[FIRST_FIN:] = 1.0
     ahead = np.tile([0.5, 1.5, 0.0], (4, 1))

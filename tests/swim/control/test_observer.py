@@ -78,7 +78,8 @@ def test_a_force_that_nobody_told_of_becomes_drift(robot: Layout) -> None:
 
 def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
     """Sideways speed where added mass and damping balance, by hand: 100.7 v + 260 v |v| = -59 u r."""
-    observer, sway = MotionObserver(robot, 0.01), 0.0
+    observer = MotionObserver(robot, 0.01)
+    sway = 0.0
     for _ in range(1000):
         sway = observer.swayed(sway, 0.1, 0.5)
     assert sway < 0.0
@@ -87,14 +88,16 @@ def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
 
 def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
     """Straight ahead from rest, the wrenches move the whole body model by the path's length."""
-    robot, path = load_layout("A"), make_trajectory("dive")
+    robot = load_layout("A")
+    path = make_trajectory("dive")
     times = np.arange(0.0, 12.0, 0.1)
     flat = [path.setpoint(float(t)) for t in times]
     flat = [
         s._replace(velocity=s.velocity * [1, 1, 0], acceleration=s.acceleration * [1, 1, 0]) for s in flat
     ]
     along = MotionObserver(robot, 0.1).wrenches_along(flat, np.zeros(2), 0.08)
-    vehicle, state = Vehicle(complete_body(robot)), np.zeros(13)
+    vehicle = Vehicle(complete_body(robot))
+    state = np.zeros(13)
     state[3:7] = quaternion_of(0.0, 0.0, 0.0)
     for wrench in along:
         for _ in range(5):

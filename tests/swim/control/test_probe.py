@@ -54,10 +54,13 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
 def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None:
     """Commands within the rates of fins that hardly push or are lost: what is sent is within them, too."""
     settings = replace(MonitorSettings(), probe_every_s=3.0)
-    monitor, rng = FaultMonitor(layout_a, settings=settings), np.random.default_rng(0)
+    monitor = FaultMonitor(layout_a, settings=settings)
+    rng = np.random.default_rng(0)
     monitor._lost[2] = True
     command = np.tile([0.3, 0.2, 0.0], (4, 1))
-    most, before, pushed = 0.1 * layout_a.rates, None, 0
+    most = 0.1 * layout_a.rates
+    before = None
+    pushed = 0
     for _ in range(400):
         command = command + rng.uniform(-1.0, 1.0, (4, 3)) * most
         command[:, :2] = np.clip(command[:, :2], layout_a.lower[:, :2], [0.6, 2.0])

@@ -30,7 +30,8 @@ def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
     slow = replace(
         robot, actuators=(replace(robot.fins[0], servo=Servo(direction_pole=1.75)), *robot.fins[1:])
     )
-    fast, halved = gains_for(robot), gains_for(slow)
+    fast = gains_for(robot)
+    halved = gains_for(slow)
     for name in ("velocity", "heading", "path"):
         late = (2.0 / 1.75 + BEHIND_S) / (2.0 / 3.5 + BEHIND_S)
         assert getattr(halved, name) == pytest.approx(getattr(fast, name) / late)
@@ -54,7 +55,8 @@ def test_where_the_path_rests_it_turns_to_where_the_path_goes_on(robot: Layout) 
 
 def test_no_more_than_the_bounds_is_asked_for(robot: Layout) -> None:
     far = Setpoint(np.array([90.0, 90.0, 90.0]), 0.0)
-    wrench, most = first_wrench(robot, far), np.array(gains_for(robot).max_wrench)
+    wrench = first_wrench(robot, far)
+    most = np.array(gains_for(robot).max_wrench)
     assert (np.abs(wrench) <= most + 1e-12).all()
 
 
@@ -62,7 +64,8 @@ def error(
     robot: Layout, pilot: Controller, truth: Layout | None = None, current: float = 0.0, path: str = "circle"
 ) -> float:
     """Root mean square distance from a path [m]."""
-    path_, flow = make_trajectory(path), (current, 0.0, 0.0)
+    path_ = make_trajectory(path)
+    flow = (current, 0.0, 0.0)
     loop = ClosedLoop(robot, AnyRobot().on(robot), path_, pilot, truth=truth, current=flow)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
@@ -89,7 +92,8 @@ def test_it_stops_at_corners_and_sets_off_again(robot: Layout) -> None:
 
 
 def test_fins_that_turn_before_the_wrench_comes_keep_nearer_to_a_square() -> None:
-    robot, error = load_layout("A"), {}
+    robot = load_layout("A")
+    error = {}
     for name in ("analytic", "dual"):
         log = ClosedLoop(robot, load_method_spec(name).on(robot), make_trajectory("square"), seed=3).run()
         error[name] = np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean())

@@ -64,7 +64,9 @@ def test_prolate_spheroids_by_lambs_closed_forms(slenderness: float) -> None:
 
 
 def test_a_spheres_drag_is_the_measured_one_and_none_around() -> None:
-    radius, speed = 0.25, 0.2  # Re = 1e5, where a smooth sphere is measured to have C = 0.47
+    # Re = 1e5, where a smooth sphere is measured to have C = 0.47
+    radius = 0.25
+    speed = 0.2
     quadratic = pressure_damping(np.full(3, radius))
     linear = friction_damping(HullSolid.of(sphere((radius,) * 3)), speed)
     drag = quadratic[0] * speed**2 + linear[0] * speed

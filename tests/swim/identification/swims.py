@@ -19,11 +19,15 @@ NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
 def swim(truth: Layout, seconds: float, seed: int, noise: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Commands (N, n, 3) and measurements (N, 12) of a robot whose fins wander at random."""
     rng = np.random.default_rng(seed)
-    n, steps = truth.n_fins, round(seconds / STEP_S)
-    vehicle, fins, plant = Vehicle(complete_body(truth)), FinMotion(truth), plant_of(truth)
+    n = truth.n_fins
+    steps = round(seconds / STEP_S)
+    vehicle = Vehicle(complete_body(truth))
+    fins = FinMotion(truth)
+    plant = plant_of(truth)
     state = np.zeros(13)
     state[3:7] = quaternion_of(0.0, 0.0, 0.3)
-    commands, measured = np.empty((steps, n, 3)), np.empty((steps, 12))
+    commands = np.empty((steps, n, 3))
+    measured = np.empty((steps, 12))
     command = plant.sample(rng, ())
     for k in range(steps):
         if k % 15 == 0:

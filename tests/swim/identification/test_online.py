@@ -21,7 +21,8 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     """Actuators lean by 5 degrees, one this way and the next that way, and give 0.8 of their force."""
     layout = load_layout(name)
     truth = leaned(layout, np.radians(5.0 * (-1.0) ** np.arange(layout.n)))
-    plant, rng = plant_of(truth), np.random.default_rng(3)
+    plant = plant_of(truth)
+    rng = np.random.default_rng(3)
     command = layout.lower + (layout.upper - layout.lower) * rng.random((60, layout.n, 3))
     targets = 0.6 * 0.8 * plant.wrench(command)
 
@@ -29,7 +30,8 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
         away = 0.8 * plant.wrench(learner.factor * allocator.allocate_batch(targets).command) - targets
         return float(np.sqrt(np.mean((away / allocator.scale) ** 2)))
 
-    learner, monitor = OnlineFit(layout), FaultMonitor(layout)
+    learner = OnlineFit(layout)
+    monitor = FaultMonitor(layout)
     loop = ClosedLoop(
         layout, Allocator(layout), make_trajectory("lissajous", 61.0), truth=truth, learner=learner, seed=2,
         failures=[Fault(each, 0.0, "torn", 0.8) for each in layout.names], announced=False,

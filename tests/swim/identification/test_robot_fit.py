@@ -25,7 +25,8 @@ TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
 
 def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
     """Strength of each fin over what the layout said, and its standard error."""
-    found, error = fit.found("strength"), fit.found_error("strength")
+    found = fit.found("strength")
+    error = fit.found_error("strength")
     pairs = zip(np.exp(found).tolist(), (np.exp(found) * error).tolist(), strict=True)
     return dict(zip(fit.model.layout.names, pairs, strict=True))
 
@@ -55,9 +56,11 @@ def fit(drawn: Layout, truth: Layout) -> RobotFit:
 def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
     for name, (found, error) in strengths(fit).items():
         assert found == pytest.approx(STRENGTH[name], abs=max(4.0 * error, 0.02)) and error < 0.05
-    turned, error = fit.found("mounting"), fit.found_error("mounting")
+    turned = fit.found("mounting")
+    error = fit.found_error("mounting")
     np.testing.assert_array_less(np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01))
-    center, error = fit.found("center"), fit.found_error("center")
+    center = fit.found("center")
+    error = fit.found_error("center")
     np.testing.assert_allclose(center, CENTER, atol=0.004)
     assert (error < 0.004).all()
 
@@ -74,7 +77,8 @@ def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> 
 def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: Layout, tmp_path: Path) -> None:
     path = tmp_path / "fitted.yaml"
     write_robot(fit, path)
-    fitted, drawn = load_layout(path), fit.model.layout
+    fitted = load_layout(path)
+    drawn = fit.model.layout
     assert fitted.name == "fitted"
     assert fitted.description.startswith("fitted to 60 s of swimming")
     true = plant_of(truth)
@@ -94,7 +98,8 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     late[1:, [0, 1, 5]] = measured[:-1, [0, 1, 5]]
     made = Swim("late", replay(drawn, command)[2:], late[2:])
     found = fit_robot(drawn, [made], other_law=False)
-    delay, error = found.found("delay"), found.found_error("delay")
+    delay = found.found("delay")
+    error = found.found_error("delay")
     # The made-up swims themselves take forces from the ends of steps of 0.02 s.
     np.testing.assert_array_less(np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02))
     for name, (strength, own) in strengths(found).items():
@@ -135,7 +140,8 @@ def test_the_command_reads_a_csv_file(
 @pytest.mark.parametrize("name", sampled(["turtle_hybrid", "bluerov2_heavy", "catamaran"]))
 def test_strengths_of_any_actuators_are_found_in_a_minute_on_the_spot(name: str, tmp_path: Path) -> None:
     layout = load_layout(name)
-    loop, shares = excitation(layout, 60.0, seed=3), [(0.9, 0.7)[i % 2] for i in range(layout.n)]
+    loop = excitation(layout, 60.0, seed=3)
+    shares = [(0.9, 0.7)[i % 2] for i in range(layout.n)]
     for each, share in zip(layout.names, shares, strict=True):
         loop.fail(each, "torn", share, announced=False)
     loop.run().save(tmp_path / "log.npz")

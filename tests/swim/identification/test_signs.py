@@ -40,7 +40,8 @@ def test_a_reversed_motor_is_named_and_the_rest_is_fitted(tmp_path: Path, name: 
     right = load_layout(name)
     wrong = opposed_in(right, [right.names[motor]])
     path = swum(tmp_path / "swim.npz", right, right, seed=motor)
-    good, found = fitted(right, path), fitted(wrong, path)
+    good = fitted(right, path)
+    found = fitted(wrong, path)
     assert good.opposed == () and found.opposed == (right.names[motor],)
     assert found.explained > good.explained - 0.03
     np.testing.assert_allclose(np.exp(found.found("strength")), 1.0, atol=0.15)
@@ -51,7 +52,8 @@ def test_the_command_line_names_it_and_writes_the_corrected_layout(
 ) -> None:
     drawn = load_layout("bluerov2_heavy")
     truth = opposed_in(drawn, ["rear_left"])
-    path, output = swum(tmp_path / "swim.npz", drawn, truth, seed=3), tmp_path / "found.yaml"
+    path = swum(tmp_path / "swim.npz", drawn, truth, seed=3)
+    output = tmp_path / "found.yaml"
     assert main(["fit", "robot", "bluerov2_heavy", str(path), "-o", str(output)]) == 0
     assert "rear_left pushes the other way" in capsys.readouterr().out
     for part, true in zip(load_layout(output).actuators, truth.actuators, strict=True):

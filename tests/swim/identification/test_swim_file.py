@@ -59,7 +59,8 @@ def test_columns_in_any_order_with_units_and_strangers(
 
 
 def test_what_is_empty_or_held_is_not_new(rows: Rows, pair: Layout, tmp_path: Path) -> None:
-    u, v = rows[0].index("u"), rows[0].index("v")
+    u = rows[0].index("u")
+    v = rows[0].index("v")
     for k, row in enumerate(rows[1:]):
         if k % 2:
             row[u], row[v] = "", rows[k][v]

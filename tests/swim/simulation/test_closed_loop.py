@@ -134,7 +134,8 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
     swim.fail("front_left", "torn", 0.4)
     swim.fail("back_left", "stuck")
     assert swim.damage.torn == {"front_left": 0.4}
-    ((name, angle),), fin = swim.damage.stuck.items(), layout_a.index("back_left")
+    ((name, angle),) = swim.damage.stuck.items()
+    fin = layout_a.index("back_left")
     assert name == "back_left" and angle == swim.fin_motion.value[2][fin]
     assert swim.step().command[fin, 2] == pytest.approx(angle, abs=1e-9)
     swim.mend("front_left", announced=False)

@@ -21,7 +21,9 @@ def pair() -> Layout:
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
     """Fins that have followed a command for long."""
     motion = FinMotion(layout)
-    motion.value[0], motion.value[1], motion.value[2] = amplitude, frequency, direction
+    motion.value[0] = amplitude
+    motion.value[1] = frequency
+    motion.value[2] = direction
     return motion
 
 

@@ -48,7 +48,8 @@ def test_perfect_sensors_say_what_is_true_at_once() -> None:
 
 def test_what_is_late_is_of_a_while_ago() -> None:
     settings = replace(NO_NOISE, marker=replace(NO_NOISE.marker, rate_hz=50.0)).later(0.1)
-    sensors, state = Sensors(settings, np.random.default_rng(0)), STATE.copy()
+    sensors = Sensors(settings, np.random.default_rng(0))
+    state = STATE.copy()
     for k in range(100):
         state[:3] = 0.02 * k
         found = sensors.measure(0.02 * k, state)

@@ -35,7 +35,8 @@ def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
     path = make_trajectory("square")
     leg = 0.17 * path.duration_s
     for time in np.linspace(1.0, leg - 1.0, 50):
-        setpoint, done = path.setpoint(time), time / leg
+        setpoint = path.setpoint(time)
+        done = time / leg
         assert setpoint.velocity[0] == pytest.approx(12.0 / leg * done * (1.0 - done), abs=2e-3)
         assert setpoint.acceleration[0] == pytest.approx(12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3)
 

@@ -21,7 +21,8 @@ def robot() -> Layout:
 
 def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
     true = perturbed(robot, **BUILT_OFF)
-    drawn, built = own_effectiveness(robot), own_effectiveness(true)
+    drawn = own_effectiveness(robot)
+    built = own_effectiveness(true)
     turn = np.einsum("nw,nw->n", built[:, 1, :3], drawn[:, 1, :3])
     np.testing.assert_allclose(np.degrees(np.arccos(turn)), 5.0, rtol=1e-6)
     # One newton upwards pitches about the true centre: 1.6 cm further behind, 1.2 cm to the left of it.

@@ -41,7 +41,9 @@ def test_each_follows_to_first_order_within_its_rate(mixed: Layout, dt: float) -
     """Against the differential equations by SciPy."""
     motion = ActuatorMotion(mixed)
     command = np.full((5, 3), 0.1)
-    command[0, 0], command[2], command[3, 0] = -18.0, (2.0, 40.0, 0.0), 0.45
+    command[0, 0] = -18.0
+    command[2] = (2.0, 40.0, 0.0)
+    command[3, 0] = 0.45
     n_steps = round(1.4 / dt)
     for _ in range(n_steps):
         motion.step(command, dt)
@@ -62,7 +64,8 @@ def test_each_follows_to_first_order_within_its_rate(mixed: Layout, dt: float) -
 
 
 def test_fins_among_others_move_as_fins_alone(mixed: Layout) -> None:
-    motion, alone = ActuatorMotion(mixed), FinLag(replace(mixed, actuators=mixed.fins))
+    motion = ActuatorMotion(mixed)
+    alone = FinLag(replace(mixed, actuators=mixed.fins))
     command = np.tile([0.4, 1.0, 0.5], (5, 1))
     for _ in range(7):
         motion.step(command, 0.1)
@@ -71,7 +74,8 @@ def test_fins_among_others_move_as_fins_alone(mixed: Layout) -> None:
 
 
 def test_an_azimuth_turns_the_short_way_and_one_that_is_lost_stops(mixed: Layout) -> None:
-    motion, command = ActuatorMotion(mixed), np.zeros((5, 3))
+    motion = ActuatorMotion(mixed)
+    command = np.zeros((5, 3))
     for angle in (3.0, -3.0):
         command[2] = angle, 10.0, 0.0
         for _ in range(40):

@@ -28,7 +28,9 @@ def driven(layout: Layout, servo: Servo) -> Layout:
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
     """Fins that have followed a command for long."""
     motion = FinMotion(layout)
-    motion.value[0], motion.value[1], motion.value[2] = amplitude, frequency, direction
+    motion.value[0] = amplitude
+    motion.value[1] = frequency
+    motion.value[2] = direction
     return motion
 
 
@@ -36,7 +38,8 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
     """Against the differential equation x'' = k (k/4 (x* - x) - x') by SciPy."""
     slow = Servo(amplitude_pole=3.0, frequency_pole=5.0, direction_pole=2.0)
     layout = pair.replace_actuator(pair.names[1], servo=slow)
-    motion, command = FinMotion(layout), np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
+    motion = FinMotion(layout)
+    command = np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
     for _ in range(37):
         motion.step(command, DT)
     for value, aim, gains in (
@@ -73,7 +76,8 @@ def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
     for _ in range(30):  # the frequency falls, the amplitude may grow again
         motion.step(np.tile([0.6, 1.0, 3.1], (2, 1)), DT)
         assert np.abs(motion.value[0] * 2 * math.pi * motion.value[1]).max() <= 4.0 + 1e-9
-    free, slow = FinMotion(pair), FinMotion(driven(pair, Servo(speed_limit=0.5)))
+    free = FinMotion(pair)
+    slow = FinMotion(driven(pair, Servo(speed_limit=0.5)))
     for _ in range(50):
         for each in (free, slow):
             each.step(np.tile([0.05, 0.1, 3.0], (2, 1)), DT)
@@ -82,9 +86,12 @@ def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
 
 def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
     """Fins that beat, grow, gather speed and turn at once."""
-    motion, dt = flapping(pair, 0.2, 1.0, 0.3), 1e-4
+    motion = flapping(pair, 0.2, 1.0, 0.3)
+    dt = 1e-4
     command = np.array([[0.5, 1.7, 1.8], [0.1, 0.4, -0.9]])
-    angles, speeds, found = [], [], []
+    angles = []
+    speeds = []
+    found = []
     for _ in range(3000):
         motion.step(command, dt)
         speed, acceleration = motion.speed_and_acceleration()
@@ -96,10 +103,13 @@ def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
 
 def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi; the others have closed forms, too."""
-    amplitude, frequency = 0.4, 1.25
+    amplitude = 0.4
+    frequency = 1.25
     motion = flapping(pair, amplitude, frequency, 0.0)
     command = motion.command.copy()
-    inertial, torque, driving = [], [], []
+    inertial = []
+    torque = []
+    driving = []
     for _ in range(10 * round(1 / (frequency * DT))):
         motion.step(command, DT)
         power = fin_power(*motion.speed_and_acceleration(), Blade(), 0.7)
@@ -119,8 +129,10 @@ def test_one_step_per_period_follows_as_the_small_steps_do(layout_a: Layout) -> 
     rng = np.random.default_rng(5)
     slow = Servo(amplitude_pole=3.0, frequency_pole=2.0, direction_pole=1.5)
     layout = layout_a.replace_actuator("back_left", servo=slow)
-    lag, motion = FinLag(layout), FinMotion(layout)
-    low, high = layout.lower, layout.upper
+    lag = FinLag(layout)
+    motion = FinMotion(layout)
+    low = layout.lower
+    high = layout.upper
     for _ in range(40):
         command = low + rng.uniform(size=low.shape) * (high - low) * (0.9, 0.9, 0.5)
         for _ in range(10):

@@ -42,7 +42,8 @@ def euler_of(r: np.ndarray) -> np.ndarray:
 
 
 def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
-    c, s = np.cos, np.sin
+    c = np.cos
+    s = np.sin
     rx = np.array([[1, 0, 0], [0, c(phi), -s(phi)], [0, s(phi), c(phi)]])
     ry = np.array([[c(theta), 0, s(theta)], [0, 1, 0], [-s(theta), 0, c(theta)]])
     rz = np.array([[c(psi), -s(psi), 0], [s(psi), c(psi), 0], [0, 0, 1]])
@@ -67,8 +68,12 @@ def fossen(p: Body, eta: np.ndarray, nu: np.ndarray, current: np.ndarray, tau: n
     water_rate = np.concatenate([-skew(nu[3:]) @ water[:3], np.zeros(3)])
     damping = np.diag(np.array(p.linear_damping) + np.array(p.quadratic_damping) * abs(relative))
     xb, yb, zb = FLIP @ p.center_of_buoyancy_m
-    w, b = p.mass_kg * 9.81, p.mass_kg * 9.81 if p.buoyancy_n is None else p.buoyancy_n
-    sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    w = p.mass_kg * 9.81
+    b = p.mass_kg * 9.81 if p.buoyancy_n is None else p.buoyancy_n
+    sp = np.sin(phi)
+    cp = np.cos(phi)
+    st = np.sin(theta)
+    ct = np.cos(theta)
     restoring = np.array(
         [
             (w - b) * st,
@@ -123,7 +128,9 @@ def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
     rng = np.random.default_rng(2)
     body = dynamics_of(replace(complete_body(layout_a), center_of_buoyancy_m=(0.01, -0.02, 0.05)))
     flow = rng.uniform(-1, 1, (6, 20))
-    up, wrench, h = np.array([0.1, 0.2, 0.97]), rng.uniform(-5, 5, 6), 1e-6
+    up = np.array([0.1, 0.2, 0.97])
+    wrench = rng.uniform(-5, 5, 6)
+    h = 1e-6
     found = np.array(jacobian(body, flow))
     for k in range(6):
         step = h * np.eye(6)[k][:, None]

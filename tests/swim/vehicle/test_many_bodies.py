@@ -11,7 +11,8 @@ from finlab.swim.vehicle.vehicle import Bodies, Vehicle, body_rates, body_veloci
 CURRENT = (0.07, -0.04)
 
 
-CENTER, MORE_LIFT = (0.001, -0.002, 0.05), 1.5
+CENTER = (0.001, -0.002, 0.05)
+MORE_LIFT = 1.5
 BODY = ucat_body()
 assert BODY.mass_kg is not None
 BODY = replace(BODY, center_of_buoyancy_m=CENTER, buoyancy_n=BODY.mass_kg * GRAVITY + MORE_LIFT)
@@ -56,7 +57,8 @@ def test_integration_follows_the_vehicle() -> None:
     wrench = np.repeat(rng.uniform(-1.0, 1.0, (8, 6)) * [3.0, 3.0, 3.0, 0.2, 0.4, 0.4], 10, axis=0)
     start = np.concatenate([rng.uniform(-0.2, 0.2, 6), rng.uniform(-0.1, 0.1, 6)])
     found = integrate(start[:, None], wrench[..., None], *bodies(1), 0.1)[..., 0]
-    state, vehicle = np.concatenate([start[:3], quaternion(start[3:6]), start[6:]]), of_vehicle()
+    state = np.concatenate([start[:3], quaternion(start[3:6]), start[6:]])
+    vehicle = of_vehicle()
     for k in range(80):
         np.testing.assert_allclose(
             found[k, [0, 1, 2, *range(6, 12)]], state[[0, 1, 2, *range(7, 13)]], atol=2e-3

@@ -12,8 +12,11 @@ from scipy.spatial.transform import Rotation
 from finlab.layout import Body
 from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
 
-MASS, INERTIA = 19.0, (0.1574, 0.4646, 0.51151)
-DT, SECONDS, HOLD = 0.01, 60.0, 50
+MASS = 19.0
+INERTIA = (0.1574, 0.4646, 0.51151)
+DT = 0.01
+SECONDS = 60.0
+HOLD = 50
 AXES = [" ".join("1" if i == k else "0" for i in range(6)) for k in range(6)]
 MODEL = f"""
 <mujoco>

@@ -18,12 +18,16 @@ def test_a_body_overturns_above_that_speed_and_not_below(name: str) -> None:
     speed = overturning_speed(replace(layout, body=body))
     assert speed is not None
     for share, overturns in ((0.7, False), (1.4, True)):
-        vehicle, state = Vehicle(body), np.zeros(13)
-        state[3], state[5], state[7] = 1.0, 0.01, share * speed
+        vehicle = Vehicle(body)
+        state = np.zeros(13)
+        state[3] = 1.0
+        state[5] = 0.01
+        state[7] = share * speed
         pitched = []
         for _ in range(1500):
             state = vehicle.step(state, [0.0] * 6, 0.02)
-            state[7], state[8] = share * speed, 0.0
+            state[7] = share * speed
+            state[8] = 0.0
             state[[10, 12]] = 0.0
             pitched.append(abs(state[5]))
         assert (max(pitched[1000:]) > 0.02) == overturns

@@ -37,9 +37,11 @@ def swim(
 
 def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: Body) -> None:
     """m u' = F - q u |u|: u = sqrt(F / q) tanh(sqrt(F q) t / m)."""
-    force, time = 6.0, 8.0
+    force = 6.0
+    time = 8.0
     vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6))
-    mass, drag = vehicle.inertia[0], ucat.quadratic_damping[0]
+    mass = vehicle.inertia[0]
+    drag = ucat.quadratic_damping[0]
     state = swim(vehicle, at_rest(), (force, 0, 0, 0, 0, 0), time, 0.01)
     rate = math.sqrt(force * drag) / mass
     assert state[7] == pytest.approx(math.sqrt(force / drag) * math.tanh(rate * time), abs=1e-9)
@@ -115,7 +117,8 @@ def test_a_motion_beyond_all_bounds_is_a_sentence(ucat: Body) -> None:
             linear_damping=(0.0,) * 6,
             quadratic_damping=(0.0,) * 6,
         )
-        vehicle, wrench = Vehicle(light), tuple((10.0 ** rng.uniform(0, 6, 6)).tolist())
+        vehicle = Vehicle(light)
+        wrench = tuple((10.0 ** rng.uniform(0, 6, 6)).tolist())
         try:
             swim(vehicle, at_rest(), wrench, 0.5, 0.1)
         except LayoutError as error:

@@ -59,7 +59,8 @@ def run(
             method.on(case.layout).allocate(case.targets[0], lost=case.lost, seed=seed).solve_ms
             for case in islice(cycle(cases), TIMED_CALLS + 1)
         ]
-        parts, sigma = [], paper_sigma()
+        parts = []
+        sigma = paper_sigma()
         for k, case in enumerate(progress(cases, "layout", variant)):
             answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)
             part = score(case, case.targets, answer.command, answer.solve_ms, number=k)
@@ -69,7 +70,8 @@ def run(
         points = [candidate_points(method, case, seed) for case in cases[:shown]]
         scores = joined(parts)
         for scored_by, key in (("surrogate", "believed"), ("plant", "err_norm")):
-            error, square = scores[key], scores[key] ** 2
+            error = scores[key]
+            square = scores[key] ** 2
             rows.append(
                 {
                     "variant": variant,

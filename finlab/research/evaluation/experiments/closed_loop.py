@@ -60,7 +60,8 @@ def repeated(
 
 
 def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: Swim) -> Row:
-    allocator, law = methods[swim.method].on(swim.layout), make_controller(swim.controller, swim.layout)
+    allocator = methods[swim.method].on(swim.layout)
+    law = make_controller(swim.controller, swim.layout)
     lost = [(name, swim.lost_s) for name in swim.lost]
     return row_of(ClosedLoop(swim.layout, allocator, swim.path, law, failures=lost, seed=swim.seed).run())
 
@@ -94,7 +95,8 @@ def speed_error(log: RunLog) -> Array:
 def follow_row(log: RunLog) -> Row:
     """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the piece of
     the relative error counts as one piece."""
-    position, reference = log.position, log.reference
+    position = log.position
+    reference = log.reference
     piece = round(RTE_DELTA_S / float(log.time[1] - log.time[0]))
     return {
         "ate": absolute_error(position, reference),
@@ -119,7 +121,8 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     means: Row = {}
     for key in [key for key, value in rows[0].items() if isinstance(value, float)]:
         values = np.array([row[key] for row in rows])
-        means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
+        means[key] = float(values.mean())
+        means[f"{key}_std"] = float(values.std(ddof=min(1, len(rows) - 1)))
     return means
 
 

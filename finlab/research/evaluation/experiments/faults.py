@@ -73,8 +73,10 @@ def run(
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
-    robot, path = in_worker(load_layout, layout), in_worker(make_trajectory, trajectory)
-    faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
+    robot = in_worker(load_layout, layout)
+    path = in_worker(make_trajectory, trajectory)
+    faults = all_faults(robot, path.duration_s / 2)
+    specs = load_method_specs(methods, checkpoint)
     cases = [
         ((fault.label, name), Swim(robot, path, name, controller, fault.fins, fault.time_s))
         for fault, name in product(faults, specs)

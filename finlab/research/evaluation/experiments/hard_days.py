@@ -113,7 +113,8 @@ class HardDay:
 
     def swim(self, case: Case, method: MethodSpec, seed: int) -> ClosedLoop:
         """A swim of `cases()`, ready to start; the seed is of noise, biases and mixed fins."""
-        robot, path = self.robot(case.layout, seed), self.path()
+        robot = self.robot(case.layout, seed)
+        path = self.path()
         failures = [Fault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
         loop = ClosedLoop(
             robot,

@@ -142,14 +142,17 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
 
 def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
     """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton steps."""
-    plant, width = method.plant, np.maximum(method.plant.width, NEARLY)
-    best, least = command, np.inf
+    plant = method.plant
+    width = np.maximum(method.plant.width, NEARLY)
+    best = command
+    least = np.inf
     for _ in range(ROUNDS):
         steps = 1e-4 * np.eye(command.size).reshape(-1, *command.shape) * width
         given = judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
         error = float(np.linalg.norm(given[0] - wrench / method.scale))
         if error < least:
-            best, least = command, error
+            best = command
+            least = error
         if error <= NEARLY:
             break
         slope = ((given[1:] - given[0]) / 1e-4).T
@@ -170,7 +173,8 @@ class _ByDifferences(Interaction):
 
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         flat = force.reshape(-1, *force.shape[-2:])
-        count, step = flat[0].size, 1e-4
+        count = flat[0].size
+        step = 1e-4
         moved = flat[:, None] + step * np.eye(count).reshape(count, *flat.shape[1:])
         here = self._function(flat)
         slope = (
@@ -202,7 +206,8 @@ class Ridge(_ByDifferences):
 
         known = features(force)
         left_u, values, right = np.linalg.svd(known, full_matrices=False)
-        best, weights = np.inf, np.zeros((known.shape[1], 6))
+        best = np.inf
+        weights = np.zeros((known.shape[1], 6))
         for penalty in np.geomspace(1e-4, 10.0, 12) * values[0]:
             kept = values**2 / (values**2 + penalty**2)
             leverage = np.minimum(((left_u**2) * kept).sum(axis=1), 0.999)

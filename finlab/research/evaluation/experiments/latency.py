@@ -80,10 +80,12 @@ def run(
 def _robot(method: MethodSpec, kind: str, count: int, seed: int, k: int) -> Timed:
     """Robot k of a kind: fins of U-CAT's law with horizontal shafts, or any thrusters."""
     rng = np.random.default_rng([DOMAIN, seed, len(kind), count, k])
-    name, ends = f"{kind}-{count}", (count, count)
+    name = f"{kind}-{count}"
+    ends = (count, count)
     fins = kind == "fins"
     layout = random_layout(rng, name, ends) if fins else random_robot(rng, name, ends, (random_thruster,))
-    plant, allocator = plant_of(layout), method.on(layout)
+    plant = plant_of(layout)
+    allocator = method.on(layout)
     wrenches = plant.wrench(plant.sample(rng, (TARGETS,)))
     return Timed(layout, allocator.allocate_batch(FAR * wrenches, policy="direction").wrench)
 
@@ -98,7 +100,8 @@ def _rows(
 ) -> list[Row]:
     """A row for each method; without a share of reach, targets wander and the command before is known."""
     what = f"{share:g} of reach" if share is not None else "next tick"
-    rows, answers = list[Row](), dict[str, list[Allocation]]()
+    rows = list[Row]()
+    answers = dict[str, list[Allocation]]()
     for method, spec in progress(methods.items(), "method", f"{name}, {what}"):
         times, answers[method] = call_times(spec, timed, share, calls, budget)
         middle, high = (float(np.quantile(times, q)) for q in (0.5, 0.99))
@@ -122,9 +125,13 @@ def call_times(
     """The processor's time of each counted call [ms], at most so many, of robots visited in turn, and its
     answer. Without a share of reach targets wander, with the command of the tick before. After its part of
     the budget [s] a robot gets no further call."""
-    times, answers, ahead = list[float](), list[Allocation](), -(-calls // len(timed))
+    times = list[float]()
+    answers = list[Allocation]()
+    ahead = -(-calls // len(timed))
     for robot in timed:
-        allocator, spent, previous = method.on(robot.layout), 0.0, None
+        allocator = method.on(robot.layout)
+        spent = 0.0
+        previous = None
         for k in range(WARM_UP + min(ahead, calls - len(times))):
             target = _wandering(robot.rim, k) if share is None else share * robot.rim[k % TARGETS]
             start = time.process_time()

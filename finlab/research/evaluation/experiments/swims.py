@@ -63,7 +63,8 @@ def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
     out."""
     cases = [case for case in day.cases() if not day.is_hopeless(case)]
     parts = list(product(methods, cases, seeds))
-    done, rows = map_parts(partial(_swim, day, methods), parts, day.name, "swim"), list[Row]()
+    done = map_parts(partial(_swim, day, methods), parts, day.name, "swim")
+    rows = list[Row]()
     for method in methods:
         swims = list(islice(done, len(parts) // len(methods)))
         row: Row = {"scenario": day.name, "method": method, "about": day.about, "swims": len(swims)}

@@ -46,7 +46,9 @@ def run(
     for temperature in temperatures:
         options = {"n_candidates": candidates, "temperature": temperature, "refinement": "none"}
         method = MethodSpec("paper", choose_method("paper", checkpoint, **options))
-        best, spread, group = [], [], []
+        best = []
+        spread = []
+        group = []
         for k, case in enumerate(progress(cases, "layout", f"T = {temperature:g}")):
             for target in case.targets:
                 samples = method.on(case.healthy).allocate(target, seed=seed).samples

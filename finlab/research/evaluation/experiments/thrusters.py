@@ -102,7 +102,8 @@ def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
     """By method arrays (N,): what it misses and takes of targets (N, 6) on a robot, and what `dual` misses in
     its order."""
     layout, targets = part
-    dual, scored = Allocator(layout), dict[str, dict[str, Array]]()
+    dual = Allocator(layout)
+    scored = dict[str, dict[str, Array]]()
     bound = dual.allocate_batch(targets).bound
     ranked: dict[Order, Array] = {
         order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated / dual.scale
@@ -137,7 +138,8 @@ def _figures(scored: Sequence[dict[str, Array]]) -> Row:
     fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
     row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}
     if fine.any():
-        power, bound = by["power"][fine], by["bound"][fine]
+        power = by["power"][fine]
+        bound = by["bound"][fine]
         row |= {"watts": float(power.sum() / bound.sum()), "watts_max": float((power / bound).max())}
     means = ("missed", "first", "dual_first", "dual_more")
     return row | {f"{key}_mean": float(by[key].mean()) for key in means if key in by}

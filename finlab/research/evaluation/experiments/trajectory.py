@@ -58,7 +58,8 @@ def run(
         seed: of the first run's noise.
     """
     check_names("controllers", controllers, CONTROLLERS)
-    path, specs = in_worker(make_trajectory, trajectory), load_method_specs(methods, checkpoint)
+    path = in_worker(make_trajectory, trajectory)
+    specs = load_method_specs(methods, checkpoint)
     able, needed = with_losses(layouts, lost)
     cases = [
         ((robot.name, count, law, name), Swim(robot, path, name, law, fins))
@@ -66,7 +67,8 @@ def run(
     ]
     row_of = _with_path if paths else follow_row
     done = repeated(specs, cases, range(seed, seed + runs), "trajectory", row_of)
-    keys, every = ("layout", "lost", "controller", "method"), dict[Case, list[Row]]()
+    keys = ("layout", "lost", "controller", "method")
+    every = dict[Case, list[Row]]()
     rows = mean_rows(keys, done)
     for row, (case, errors) in zip(rows, done, strict=True):
         row |= {"path": errors[0]["path"]} if paths else {}
@@ -93,7 +95,8 @@ def _picture(rows: Sequence[Row]) -> "Figure":
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
-    figures, layouts = paper_figures(), {row["layout"] for row in rows}
+    figures = paper_figures()
+    layouts = {row["layout"] for row in rows}
     about = {"controller": "waypoint", "method": "paper's method, printed"}
     healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
     pool = [

@@ -72,14 +72,16 @@ def _scores(
     methods: Mapping[str, MethodSpec], subsample: int, numbered: tuple[int, Callable[[], Case]]
 ) -> dict[str, Columns]:
     """Scores of each method on a case; it is made where it is answered, tables of fins included."""
-    number, made = numbered[0], numbered[1]()
+    number = numbered[0]
+    made = numbered[1]()
     firsts = {method: subsample if method in SLOW else None for method in methods}
     return {each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods}
 
 
 def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
     """Means, quantiles and shares of a split, or of its robots of so many fins, with their intervals."""
-    error, group = scores["err_norm"], scores["layout"]
+    error = scores["err_norm"]
+    group = scores["layout"]
     about = {"split": split, "method": method, "fins": fins, "n": len(group), "scored_by": "plant"}
     row: Row = {
         "err_norm_mean": error.mean(),

@@ -61,7 +61,8 @@ class Ways(NamedTuple):
 def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
     """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES` ways
     each."""
-    rows, maximum = len(target), problem.fins.maximum
+    rows = len(target)
+    maximum = problem.fins.maximum
     n = len(maximum)
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
@@ -111,7 +112,8 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
         return path
     rng = np.random.default_rng([DATA_SEED, seed, number])
     kinds = random_kinds(rng, settings.fins)
-    counts, often = np.array(list(FIN_COUNTS)), np.array(list(FIN_COUNTS.values()), float)
+    counts = np.array(list(FIN_COUNTS))
+    often = np.array(list(FIN_COUNTS.values()), float)
     groups: dict[int, list[dict[str, Array]]] = {}
     for _ in range(settings.robots):
         n = int(rng.choice(counts, p=often / often.sum()))
@@ -131,7 +133,8 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
 
 def _answers(rng: np.random.Generator, robot: EffortRobot, settings: AnswerSettings) -> dict[str, Array]:
     """One robot, its targets and the ways to deliver them, as the network sees them."""
-    target, view = random_targets(rng, robot, settings.targets), robot.view
+    target = random_targets(rng, robot, settings.targets)
+    view = robot.view
     ways = ways_to_deliver(rng, robot.forces, target)
     return {
         "static": view.static.astype(np.float32),
@@ -191,7 +194,8 @@ class Answers:
         group = self._groups[n]
         row = rng.integers(len(group["asked"]), size=size)
         robot = group["robot"][row]
-        static, (a, b) = group["static"][robot], np.moveaxis(group["blocks"][robot], 1, 0)
+        static = group["static"][robot]
+        a, b = np.moveaxis(group["blocks"][robot], 1, 0)
         wanted, way, weight = (group[name][row] for name in ("asked", "way", "weight"))
         order = rng.random((size, n)).argsort(axis=1)
         static[..., IDS] = np.take_along_axis(static[..., IDS], order[..., None], axis=1)
@@ -214,7 +218,8 @@ def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:
 def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> Array:
     """Normalized targets (count, 6): half are wrenches of uniform commands, a quarter of commands where some
     fins rest, a quarter one to three axes together, as far as no fin gives more than its largest force."""
-    plant, quarter = robot.plant, count // 4
+    plant = robot.plant
+    quarter = count // 4
     command = plant.sample(rng, (count - quarter,))
     rests = rng.random((quarter, plant.n_fins)) > rng.uniform(0.3, 1.0, (quarter, 1))
     command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])

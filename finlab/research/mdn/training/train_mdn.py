@@ -128,7 +128,8 @@ def make_terms(
     net: Callable[..., ForceMixture], files: list[Path], training: MdnTraining, seed: int
 ) -> Terms:
     """The loss terms of a step, and of the held-out first file: functions of step and seed."""
-    held_out, learned = Answers(files[:1]), Answers(files[1:])
+    held_out = Answers(files[:1])
+    learned = Answers(files[1:])
     rows = [
         held_out.draw(np.random.default_rng([TRAIN_SEED, k]), training.batch_size) for k in range(HELD_OUT)
     ]

@@ -43,7 +43,8 @@ def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch
     """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate (Eq. 4):
     F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine correction from the pooled
     descriptor of the layout."""
-    x, mask = features(batch), batch.mask
+    x = features(batch)
+    mask = batch.mask
     inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
     first, *others = config.layers()
     hidden = layers.linear(w, first, inputs[mask])

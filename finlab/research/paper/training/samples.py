@@ -37,7 +37,8 @@ PART = 250_000
 LEAST_STD = 1e-6
 """Least standard deviation of an axis (paper: std floor)."""
 DATA_FILE = "data.json"
-FORMAT, VERSION = "finlab-data", 1
+FORMAT = "finlab-data"
+VERSION = 1
 ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
 """Arrays of a part that each layout has once."""
 FIELDS = (*ROBOT, "command", "wrench")
@@ -190,7 +191,8 @@ class DataSet:
         if joined["wrench"].shape != (self.layouts, self.commands, 6):
             raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
         self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
-        self._device, self._epoch = device, -1
+        self._device = device
+        self._epoch = -1
         self._order = torch.empty(0)
 
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
@@ -210,7 +212,8 @@ class DataSet:
             layout = self._order[place].expand(len(command))
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]
-            layout, command = chosen // self.commands, chosen % self.commands
+            layout = chosen // self.commands
+            command = chosen % self.commands
         *robots, commands, wrench = self._parts
         mixed = commands[layout, command], wrench[layout, command]
         return Batch._make([*(part[layout] for part in robots), *mixed])

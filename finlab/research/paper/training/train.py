@@ -50,7 +50,10 @@ class Bench:
     """A data set in the memory of this process's device, and its share of every batch."""
 
     def __init__(self, place: Workplace, samples: DataSet, settings: PaperLoop, seed: int) -> None:
-        self.place, self.samples, self.settings, self.seed = place, samples, settings, seed
+        self.place = place
+        self.samples = samples
+        self.settings = settings
+        self.seed = seed
         self.rows = place.share(settings.batch_size)
 
     def batch(self, step: int) -> Batch:
@@ -60,7 +63,8 @@ class Bench:
 
     def noise(self, step: int) -> tuple[Tensor, Tensor]:
         """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1, 3)."""
-        device, shape = self.place.device, (self.settings.batch_size, N_FINS, 1)
+        device = self.place.device
+        shape = (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
         return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[self.rows]
@@ -109,8 +113,10 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
     Without other data that in the surrogate's folder is learned from, if there is any. Raises
     CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in `train_surrogate`."""
-    made, base = recipe(options.preset), read_checkpoint(resolve_checkpoint(surrogate))
-    settings, network = made.allocator_training, made.network
+    made = recipe(options.preset)
+    base = read_checkpoint(resolve_checkpoint(surrogate))
+    settings = made.allocator_training
+    network = made.network
     surrogate_of(base)  # reports what is missing before data are made
     if options.data is None and (surrogate / "data").is_dir():
         options = replace(options, data=surrogate / "data")
@@ -154,7 +160,8 @@ def _train(
     surrogate: str = "",
 ) -> TrainedWeights:
     """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
-    settings, output = replace(settings, steps=options.steps or settings.steps), options.output
+    settings = replace(settings, steps=options.steps or settings.steps)
+    output = options.output
     with workplace(options.device, settings.batch_size) as place:
         if options.data is None and place.rank == 0:
             generate(output / "data", recipe(options.preset).data)

@@ -118,10 +118,12 @@ def test_ipopt_in_the_space_of_forces_misses_no_more_and_takes_no_more() -> None
     pytest.importorskip("casadi")
     for case in make_split("ood-fins", 2, 3, 8):
         ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", "ipopt"))
-        best, found = ours.allocate_batch(case.targets), theirs.allocate_batch(case.targets)
+        best = ours.allocate_batch(case.targets)
+        found = theirs.allocate_batch(case.targets)
         assert found.reachable.all()
         np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
-        best, found = ours.allocate_batch(5.0 * case.targets), theirs.allocate_batch(5.0 * case.targets)
+        best = ours.allocate_batch(5.0 * case.targets)
+        found = theirs.allocate_batch(5.0 * case.targets)
         np.testing.assert_allclose(found.err_norm, best.err_norm, rtol=1e-3, atol=1e-3)
 
 
@@ -154,7 +156,8 @@ def test_the_ablation_scores_twice(monkeypatch: pytest.MonkeyPatch) -> None:
         experiment.rows(variants=("theirs",))
 
 
-GROUPS, EACH = 100, 20
+GROUPS = 100
+EACH = 20
 SPREAD = 1.96 * np.sqrt(2.0)
 
 

@@ -40,14 +40,16 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
 
 def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
     high = DAYS["parameters-high"].swim(Case("B", ()), analytic, 0)
-    drawn, true = high.layout, high.vehicle
+    drawn = high.layout
+    true = high.vehicle
     assert drawn == DAYS["nominal"].robot("B", 0)
     moments = np.array(true.inertia[3:]) / np.array(Vehicle(complete_body(drawn)).inertia[3:])
     np.testing.assert_allclose(moments, 1.3)
 
 
 def test_fins_of_a_day_are_known_and_drawn_by_the_seed() -> None:
-    own, mixed = DAYS["nominal"].robot("A", 0), DAYS["fins-mixed"].robot("A", 0)
+    own = DAYS["nominal"].robot("A", 0)
+    mixed = DAYS["fins-mixed"].robot("A", 0)
     assert [fin.position for fin in mixed.fins] == [fin.position for fin in own.fins]
     assert len({fin.model for fin in mixed.fins}) == 4
     assert mixed == DAYS["fins-mixed"].robot("A", 0) != DAYS["fins-mixed"].robot("A", 1)
@@ -63,7 +65,8 @@ def test_each_fin_in_turn_but_no_hopeless_pair() -> None:
 
 def _log(command: list[list[list[float]]], missing: list[float]) -> RunLog:
     """A log of one fin or more that stands at its reference; `missing` is what each tick lacks along x."""
-    n, n_fins = len(command), len(command[0])
+    n = len(command)
+    n_fins = len(command[0])
     asked = np.zeros((n, 6))
     asked[:, 0] = missing
     power = np.full((n, n_fins), 2.0)

@@ -58,7 +58,8 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
     answers = Answers([shard])
     batch = answers.draw(np.random.default_rng(0), 32)
     network = partial(SMOKE.network, first_weights(SMOKE.network.shapes(), 0))
-    found, spread = losses(network, batch, 1.0, 0.0), losses(network, batch, 1.0, 0.5)
+    found = losses(network, batch, 1.0, 0.0)
+    spread = losses(network, batch, 1.0, 0.5)
     assert found["loss"] == found["imitation"]
     given = network(batch.nodes, batch.pairs)
     expected = -(given.log_prob(batch.way) * batch.weight).sum(-1).mean() / batch.nodes.shape[1]
@@ -100,7 +101,8 @@ def test_time_that_is_up_ends_the_run(trained: Path, tmp_path: Path) -> None:
 def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
     trained: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected, died = read_checkpoint(trained), with_answers(trained, tmp_path / "died")
+    expected = read_checkpoint(trained)
+    died = with_answers(trained, tmp_path / "died")
     saves = 0
 
     def dying(folder: Path, weights: TrainedWeights) -> TrainedWeights:

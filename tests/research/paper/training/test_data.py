@@ -47,7 +47,8 @@ def test_samples_are_what_the_paper_draws(folder: Path) -> None:
     assert own.any()
     for row in range(8):
         n = counts[row]
-        low, high = whole["lower"][row, :n], whole["upper"][row, :n]
+        low = whole["lower"][row, :n]
+        high = whole["upper"][row, :n]
         command = whole["command"][row, :, :n].astype(np.float64)
         assert (command >= low - 1e-6).all() and (command <= high + 1e-6).all()
         assert np.ptp(command, axis=0) == pytest.approx(high - low, rel=0.4)
@@ -61,13 +62,15 @@ def test_samples_are_what_the_paper_draws(folder: Path) -> None:
 
 def test_normalization_is_that_of_all_samples(folder: Path) -> None:
     (whole,) = (np.load(path) for path in folder.glob("*.npz"))
-    wrench, found = whole["wrench"].reshape(-1, 6).astype(float), DataSet(folder, CPU).normalization
+    wrench = whole["wrench"].reshape(-1, 6).astype(float)
+    found = DataSet(folder, CPU).normalization
     np.testing.assert_allclose(found.mean, wrench.mean(0), atol=1e-9)
     np.testing.assert_allclose(found.std, wrench.std(0), rtol=1e-9)
 
 
 def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> None:
-    samples, size = DataSet(folder, CPU), 100
+    samples = DataSet(folder, CPU)
+    size = 100
     epochs = [
         torch.cat([samples.batch(12 * epoch + k, size, 1, False, ALL).wrench for k in range(12)])
         for epoch in range(2)

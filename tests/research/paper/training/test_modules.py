@@ -47,13 +47,15 @@ def padded(robots: list[Layout], fill: float) -> Batch:
 
 def weights_of(sizes: NetworkConfig | SurrogateConfig) -> dict[str, torch.Tensor]:
     """Weights of which none is zero or one, which would hide one that is misplaced."""
-    draw, first = torch.Generator().manual_seed(2), first_weights(sizes.shapes(), 0)
+    draw = torch.Generator().manual_seed(2)
+    first = first_weights(sizes.shapes(), 0)
     return {name: value + 0.1 * torch.randn(value.shape, generator=draw) for name, value in first.items()}
 
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    weights, batch = weights_of(SIZES), padded(robots, fill)
+    weights = weights_of(SIZES)
+    batch = padded(robots, fill)
     together = SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
     for row, layout in enumerate(robots):
         x = raw_features(*(getattr(layout, name) for name in PLACE)).astype(np.float32)[None]
@@ -64,7 +66,8 @@ def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
-    tensors, batch = weights_of(HIDDEN), padded(robots, fill)
+    tensors = weights_of(HIDDEN)
+    batch = padded(robots, fill)
     weights = TrainedWeights(
         "one",
         Normalization(np.zeros(6), np.ones(6)),
@@ -80,7 +83,8 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 
 def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> None:
-    batch, weights = padded(robots, 7.0), weights_of(SIZES)
+    batch = padded(robots, 7.0)
+    weights = weights_of(SIZES)
     x = modules.features(batch).requires_grad_()
     mixture = SIZES(weights, x, batch.wrench, batch.mask)
     sum(
@@ -112,7 +116,8 @@ def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(batch: 
     for row in range(len(found)):
         expected = 0.0
         for i in range(int(batch.mask[row].sum())):
-            low, high = batch.lower[row, i].numpy(), batch.upper[row, i].numpy()
+            low = batch.lower[row, i].numpy()
+            high = batch.upper[row, i].numpy()
             x = (2.0 * batch.command[row, i].numpy() - low - high) / (high - low)
             # All components are alike, so their weights cancel.
             expected -= float(np.sum(-0.5 * (x / math.exp(-0.5)) ** 2 + 0.5 - 0.5 * math.log(2 * math.pi)))
@@ -128,7 +133,8 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batc
         seen.append(command)
         return (command * batch.mask[..., None]).sum(1).repeat(1, 2)
 
-    draw, std = torch.Generator().manual_seed(2), torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    draw = torch.Generator().manual_seed(2)
+    std = torch.tensor([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     noise = torch.rand((*batch.mask.shape, 1), generator=draw)
     normal = torch.randn((*noise.shape, 3), generator=draw)
     found = modules.guidance(mixture, surrogate, batch, std, (noise, normal))
@@ -163,7 +169,8 @@ def test_the_guidance_weight_rises_linearly_and_stays() -> None:
 def test_the_paper_recipe_has_the_printed_numbers() -> None:
     paper = RECIPES["paper"]
     assert (paper.data.layouts, paper.data.commands) == (1000, 5000)
-    training, network = paper.allocator_training, paper.network
+    training = paper.allocator_training
+    network = paper.network
     assert (training.batch_size, training.learning_rate, training.cosine) == (16_384, 1e-4, False)
     assert training.steps == 115 * (5_000_000 // 16_384) and paper.surrogate_training.one_layout
     assert (network.width, network.heads, network.graph_layers) == (128, 4, 2)

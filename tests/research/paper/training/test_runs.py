@@ -34,7 +34,8 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def trained(data: Path) -> Path:
     """Folder with a trained `surrogate` and `allocator`."""
     place = data.parent
-    surrogate, allocator = str(place / "surrogate"), str(place / "allocator")
+    surrogate = str(place / "surrogate")
+    allocator = str(place / "allocator")
     smoke = ["--data", str(data), "--preset", "smoke", "--steps", "30"]
     assert main(["train", "surrogate", "-o", surrogate, *smoke]) == 0
     assert main(["train", "allocator", "-o", allocator, "--surrogate", surrogate, *smoke]) == 0
