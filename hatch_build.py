@@ -1,7 +1,7 @@
 """The compiled core's build: a hook of hatchling, and a command that compiles it in the tree.
 
-The compiler is `$CC`, else one on PATH, else that of the package ziglang, which compiles for other systems,
-too, where FINLAB_TARGET names one.
+The compiler is `$CC`, else one on PATH, else that of the package ziglang, which compiles for other
+systems, too, where FINLAB_TARGET names one.
 """
 
 import os
@@ -18,8 +18,11 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from packaging.tags import platform_tags
 
 CORE = Path(__file__).with_name("finlab") / "core"
-# No fast math, no contraction, no instructions of this machine alone: results do not depend on the builder.
-FLAGS = shlex.split("-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall")
+# No fast math, no contraction, no instructions of this machine alone: results do not depend on the
+# builder.
+FLAGS = shlex.split(
+    "-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall"
+)
 ZIG = [sys.executable, "-m", "ziglang", "cc", "-s", "-mcpu=baseline", "-target"]
 # Target as zig names it: platform in the name of the wheel, ending of a library.
 TARGETS = {
@@ -41,14 +44,18 @@ def target() -> tuple[list[str], str, str]:
         return [*ZIG, name], platform, f"libfinlab.{ending}"
     ending = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
     # The library needs this system's C library or a newer one, so its platform is no manylinux.
-    platform = next(tag for tag in platform_tags() if not tag.startswith(("manylinux", "musllinux")))
+    platform = next(
+        tag for tag in platform_tags() if not tag.startswith(("manylinux", "musllinux"))
+    )
     return compiler() or [*ZIG, "native"], platform, f"libfinlab.{ending}"
 
 
 def compiler() -> list[str]:
     """Returns the words of the system's C compiler, none where there is none."""
     names = () if os.name == "nt" else ("cc", "gcc", "clang")
-    return shlex.split(os.environ.get("CC", "")) or [name for name in names if shutil.which(name)][:1]
+    return (
+        shlex.split(os.environ.get("CC", "")) or [name for name in names if shutil.which(name)][:1]
+    )
 
 
 def requirements() -> list[str]:
@@ -57,9 +64,12 @@ def requirements() -> list[str]:
 
 
 def compile_core(folder: Path) -> Path:
-    """Compiles the core; returns the library's path in a folder, where a file of that name is replaced."""
+    """Compiles the core; returns the library's path in a folder, where a file of that name is
+    replaced."""
     words, _, name = target()
-    with TemporaryDirectory() as work:  # a process that has loaded the library in the folder keeps its own
+    with (
+        TemporaryDirectory() as work
+    ):  # a process that has loaded the library in the folder keeps its own
         made = Path(work) / name
         sources = map(str, sorted((CORE / "src").glob("*.c")))
         command = [*words, *FLAGS, f"-I{CORE}", *sources, "-o", str(made), "-lm"]
@@ -72,8 +82,10 @@ def compile_core(folder: Path) -> Path:
             failed = True
         if failed:
             sys.exit(
-                f"{said}\nthe core of finlab did not compile by {shlex.join(command)}; install a C compiler "
-                "with its headers (on Debian and Ubuntu: apt-get install gcc libc6-dev), or set CC to one"
+                f"{said}\nthe core of finlab did not compile by {shlex.join(command)}; install a "
+                "C compiler "
+                "with its headers (on Debian and Ubuntu: apt-get install gcc libc6-dev), or set "
+                "CC to one"
             )
         print(said, end="", file=sys.stderr)  # warnings
         shutil.copy(made, folder / f"{name}.new")
@@ -103,6 +115,14 @@ class CoreHook(BuildHookInterface[Any]):
 
 if __name__ == "__main__":
     if requirements() and not find_spec("ziglang"):
-        pip = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "-c", "constraints.txt"]
+        pip = [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--disable-pip-version-check",
+            "-c",
+            "constraints.txt",
+        ]
         subprocess.run([*pip, *requirements()], check=True)
     print(compile_core(CORE))

@@ -1,7 +1,6 @@
-# %% [markdown]
-# # A bridge to ROS 2
-# Wrenches come in, fin commands go out, by a robot's bundle. Without ROS a stand-in plays the topics. You
-# will see what the bridge publishes for three wrenches, and the last answer.
+# %% [markdown] # A bridge to ROS 2 Wrenches come in, fin commands go out, by a robot's bundle.
+# Without ROS a stand-in plays the topics. You will see what the bridge publishes for three
+# wrenches, and the last answer.
 
 # %%
 from collections.abc import Callable
@@ -32,7 +31,12 @@ class Bridge:
 def flipper(name: str, beat: tuple[float, float, float]) -> dict[str, float]:
     """One message of U-CAT's simulator, whose amplitude is the whole stroke."""
     a, f, phi = beat
-    return {"motor_number": MOTORS.index(name) + 1, "frequency": f, "zero_direction": phi, "amplitude": 2 * a}
+    return {
+        "motor_number": MOTORS.index(name) + 1,
+        "frequency": f,
+        "zero_direction": phi,
+        "amplitude": 2 * a,
+    }
 
 
 # %% [markdown]
@@ -48,7 +52,9 @@ def wrench_stamped(fx: float, fz: float, tz: float) -> Message:
 
 def show(message: Message) -> None:
     for fin in message.flippers:
-        print("motor {motor_number}: {frequency:.2f} Hz, {amplitude:.3f} rad".format(**fin), end="; ")
+        print(
+            "motor {motor_number}: {frequency:.2f} Hz, {amplitude:.3f} rad".format(**fin), end="; "
+        )
     print()
 
 
@@ -56,6 +62,10 @@ def show(message: Message) -> None:
 with TemporaryDirectory() as folder:
     make_bundle(finlab.Allocator(finlab.load_layout("ucat"))).write(folder)
     bridge = Bridge(folder, show)
-for wrench in (wrench_stamped(0, 0, 0), wrench_stamped(1.0, 0.5, 0.0), wrench_stamped(0.5, 0.0, 0.1)):
+for wrench in (
+    wrench_stamped(0, 0, 0),
+    wrench_stamped(1.0, 0.5, 0.0),
+    wrench_stamped(0.5, 0.0, 0.1),
+):
     bridge.on_wrench(wrench)
 bridge.answer

@@ -1,8 +1,9 @@
 """From a rosbag to a CSV file that `finlab fit robot` reads; `pip install rosbags`, no ROS.
 
-You will see how it is called, or, given a bag (ROS 1 or 2) and a file to write, how many rows were written.
-Odometry is taken from nav_msgs/Odometry (pose in the world, z up; twist in the body frame), commands from a
-std_msgs/Float64MultiArray with A [rad], f [Hz], phi [rad] of each fin in order: change TOPICS to yours.
+You will see how it is called, or, given a bag (ROS 1 or 2) and a file to write, how many rows were
+written. Odometry is taken from nav_msgs/Odometry (pose in the world, z up; twist in the body
+frame), commands from a std_msgs/Float64MultiArray with A [rad], f [Hz], phi [rad] of each fin in
+order: change TOPICS to yours.
 """
 
 import csv
@@ -39,7 +40,9 @@ def convert(bag: Path, output: Path) -> int:
     # Bags of ROS 2 before Iron do not say what their messages look like.
     with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         for topic in set(TOPICS.values()) - reader.topics.keys():
-            raise SystemExit(f"{bag}: has no topic {topic}, only {', '.join(sorted(reader.topics))}")
+            raise SystemExit(
+                f"{bag}: has no topic {topic}, only {', '.join(sorted(reader.topics))}"
+            )
         chosen = [c for c in reader.connections if c.topic in TOPICS.values()]
         for connection, nanoseconds, raw in reader.messages(connections=chosen):
             message: Any = reader.deserialize(raw, connection.msgtype)

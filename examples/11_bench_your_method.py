@@ -1,7 +1,6 @@
-# %% [markdown]
-# # Your own method on the benchmark
-# SciPy's least squares on the commands, in fifteen lines. You will see how much it delivers of what is asked
-# of robots that it has never seen, at what power and in what time, beside method `dual`.
+# %% [markdown] # Your own method on the benchmark SciPy's least squares on the commands, in fifteen
+# lines. You will see how much it delivers of what is asked of robots that it has never seen, at
+# what power and in what time, beside method `dual`.
 
 # %%
 from typing import Any
@@ -29,7 +28,9 @@ def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> n
 
     start = (low + high) / 2
     limits = (low, high)
-    found = [least_squares(missing, start, slopes, limits, args=(t,), max_nfev=30).x for t in targets]
+    found = [
+        least_squares(missing, start, slopes, limits, args=(t,), max_nfev=30).x for t in targets
+    ]
     return np.reshape(found, (len(targets), -1, 3))
 
 

@@ -1,12 +1,14 @@
-"""Control allocation for underwater robots with fins, thrusters, azimuths and rudders, in any layout.
+"""Control allocation for underwater robots with fins, thrusters, azimuths and rudders, in any
+layout.
 
-A layout says where the actuators of a robot sit. A wrench says what the body should feel. An allocator turns
-both into one command per actuator:
+A layout says where the actuators of a robot sit. A wrench says what the body should feel. An
+allocator turns both into one command per actuator:
 
     layout = finlab.load_layout("A")
     result = finlab.Allocator(layout).allocate([1, 0, 0.5, 0, 0, 0.1])
 
-Names are imported on first use, so that `import finlab` needs neither torch nor the time to load it.
+Names are imported on first use, so that `import finlab` needs neither torch nor the time to load
+it.
 """
 
 from pkgutil import resolve_name
@@ -67,7 +69,9 @@ _HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
 
 def __getattr__(name: str) -> object:
     if name not in _HOME:
-        raise AttributeError(f"module 'finlab' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
+        raise AttributeError(
+            f"module 'finlab' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}"
+        )
     return resolve_name(f"{_HOME[name]}:{name}")
 
 

@@ -29,7 +29,8 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def shipped(folder: str) -> Path:
-    """A folder of the source tree (`layouts`, `checkpoints`, `webapp`), or its copy in an installed wheel."""
+    """A folder of the source tree (`layouts`, `checkpoints`, `webapp`), or its copy in an installed
+    wheel."""
     in_wheel = _PACKAGE / "shipped" / folder
     return in_wheel if in_wheel.is_dir() else _PACKAGE.parent / folder
 
@@ -45,11 +46,15 @@ def shipped_layouts() -> dict[str, Path]:
 
 def shipped_checkpoints() -> dict[str, Path]:
     """Shipped checkpoints: name to folder; sorted by name."""
-    return {path.parent.name: path.parent for path in sorted(shipped("checkpoints").glob("*/config.json"))}
+    return {
+        path.parent.name: path.parent
+        for path in sorted(shipped("checkpoints").glob("*/config.json"))
+    }
 
 
 def checkpoint_path(name: str = "default") -> Path:
-    """The folder of a shipped checkpoint; a `CheckpointError` where none of that name is shipped."""
+    """The folder of a shipped checkpoint; a `CheckpointError` where none of that name is
+    shipped."""
     known = shipped_checkpoints()
     if name not in known:
         raise CheckpointError(

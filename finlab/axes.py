@@ -16,7 +16,8 @@ TURN = 2.0 * math.pi
 FULL_TURN_TOLERANCE = 1e-6
 """By how much [rad] an arc may fall short of a full turn and still be one."""
 FILE_TURN_TOLERANCE = 1e-3
-"""By how much [rad] zero directions in a file, which are rounded, may miss a full turn or exceed it."""
+"""By how much [rad] zero directions in a file, which are rounded, may miss a full turn or exceed
+it."""
 
 
 def is_full_turn(arc: Any) -> Any:
@@ -30,8 +31,8 @@ def wrapped(angle: ArrayLike) -> Array:
 
 
 def feasible(command: AnyArray, lower: Array, upper: Array, angle: NDArray[np.bool_]) -> AnyArray:
-    """Returns commands (..., n, 3) brought within limits (n, 3) exactly: those that are angles (n, 3) wrap
-    towards the middle of theirs, then all clip."""
+    """Returns commands (..., n, 3) brought within limits (n, 3) exactly: those that are angles (n,
+    3) wrap towards the middle of theirs, then all clip."""
     seam = 0.5 * (lower + upper) - math.pi
     turned = np.where(angle, np.mod(command - seam, TURN) + seam, command)
     return np.asarray(np.clip(turned, lower, upper))
@@ -40,7 +41,8 @@ def feasible(command: AnyArray, lower: Array, upper: Array, angle: NDArray[np.bo
 def command_change(command: ArrayLike) -> Array:
     """Changes from each command to the next, without their sign: (T, n, 3) to (T - 1, n, 3).
 
-    Amplitude [rad], frequency [Hz], and the zero direction the short way round [rad]; NaN stays NaN.
+    Amplitude [rad], frequency [Hz], and the zero direction the short way round [rad]; NaN stays
+    NaN.
     """
     change = np.abs(np.diff(np.asarray(command), axis=0))
     change[..., 2] = np.abs(wrapped(change[..., 2]))
@@ -52,35 +54,42 @@ Component = Annotated[float, Meta(ge=-1.001, le=1.001)]
 Direction3 = tuple[Component, Component, Component]
 """A unit vector in a file."""
 ROUNDED = 1e-3
-"""By how much a unit vector in a file may be longer or shorter than 1, and two that stand across each other
-may miss the right angle [rad]: three decimals or more."""
+"""By how much a unit vector in a file may be longer or shorter than 1, and two that stand across
+each other may miss the right angle [rad]: three decimals or more."""
 EXACT = 1e-14
 """Deviations up to this one are rounding; such vectors stay as they are."""
 
 
 def unit_vector(key: str, vector: Vector | None) -> Vector:
-    """Returns a direction with length 1 exactly. Raises LayoutError: it is missing, or its length is not 1
-    within `ROUNDED`; the message names the key."""
+    """Returns a direction with length 1 exactly. Raises LayoutError: it is missing, or its length
+    is not 1 within `ROUNDED`; the message names the key."""
     if vector is None:
         raise LayoutError("is missing, expected a unit vector", key)
     length = math.hypot(*vector)
     if abs(length - 1.0) > ROUNDED:
-        raise LayoutError(f"expected a unit vector, got one of length {length:.6g}; divide it by that", key)
+        raise LayoutError(
+            f"expected a unit vector, got one of length {length:.6g}; divide it by that", key
+        )
     if abs(length - 1.0) < EXACT:
         return vector
     x, y, z = (value / length for value in vector)
     return x, y, z
 
 
-def axes_across(first: tuple[str, Vector | None], second: tuple[str, Vector | None]) -> tuple[Vector, Vector]:
-    """Returns two directions, each with its key, as unit vectors at a right angle; the first stays as it is.
-    Raises LayoutError: one is missing or no unit vector, or they do not stand across each other."""
+def axes_across(
+    first: tuple[str, Vector | None], second: tuple[str, Vector | None]
+) -> tuple[Vector, Vector]:
+    """Returns two directions, each with its key, as unit vectors at a right angle; the first stays
+    as it is. Raises LayoutError: one is missing or no unit vector, or they do not stand across each
+    other."""
     a = unit_vector(*first)
     b = unit_vector(*second)
     along = sum(x * y for x, y in zip(a, b, strict=True))
     if abs(along) > ROUNDED:
         degrees = math.degrees(math.acos(max(-1.0, min(1.0, along))))
-        raise LayoutError(f"must stand across {first[0]}, got {degrees:.4g} degrees between them", second[0])
+        raise LayoutError(
+            f"must stand across {first[0]}, got {degrees:.4g} degrees between them", second[0]
+        )
     if abs(along) < EXACT:
         return a, b
     across = (b[0] - along * a[0], b[1] - along * a[1], b[2] - along * a[2])
@@ -102,7 +111,8 @@ DIGITS = 12
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:
-    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad], by Rodrigues' formula."""
+    """The matrix (3, 3) of a turn about a unit vector (3,) by an angle [rad], by Rodrigues'
+    formula."""
     x, y, z = np.asarray(axis, dtype=np.float64)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
@@ -115,7 +125,8 @@ def across(axis: Array, wanted: Array) -> Array:
 
 
 def least_turn(old: Array, new: Array, spare: Array) -> Array:
-    """Returns the least turn (3, 3) of one unit vector to another; about `spare` where they are opposite."""
+    """Returns the least turn (3, 3) of one unit vector to another; about `spare` where they are
+    opposite."""
     axis = np.cross(old, new)
     size = float(np.linalg.norm(axis))
     if size < SHORT:

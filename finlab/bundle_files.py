@@ -1,8 +1,8 @@
 """The files of a deployment bundle, from a folder or a zip archive that may come from a stranger.
 
-Nothing is unpacked, nothing is read beyond its largest size, and no content is believed before its checksum
-fits. What the files mean is known to the rooms that read them: robot and force
-tables to `finlab.layout` and `finlab.physics`, settings to `finlab.allocation`.
+Nothing is unpacked, nothing is read beyond its largest size, and no content is believed before its
+checksum fits. What the files mean is known to the rooms that read them: robot and force tables to
+`finlab.layout` and `finlab.physics`, settings to `finlab.allocation`.
 """
 
 import hashlib
@@ -60,14 +60,15 @@ def table_name(content: bytes, suffix: str = ".csv") -> str:
 
 
 def is_bundle(path: str | os.PathLike[str]) -> bool:
-    """Whether a path looks like a bundle, of whatever version: a zip archive, or a folder with its files."""
+    """Whether a path looks like a bundle, of whatever version: a zip archive, or a folder with its
+    files."""
     place = Path(path)
     return (place.suffix == ".zip" and is_regular(place)) or is_regular(place / ABOUT)
 
 
 def archive_around(path: str | os.PathLike[str]) -> str | None:
-    """The zip archive of a bundle that a force table lies in, as in `robot.zip/tables/x.csv`; None for a
-    file that lies in none."""
+    """The zip archive of a bundle that a force table lies in, as in `robot.zip/tables/x.csv`; None
+    for a file that lies in none."""
     if ".zip" not in os.fspath(path):  # asked for each table at each answer
         return None
     tables = os.path.dirname(path)
@@ -77,7 +78,8 @@ def archive_around(path: str | os.PathLike[str]) -> str | None:
 
 
 def file_stamp(path: str | None) -> tuple[int, int] | None:
-    """Returns time and size of a file, by which one that is kept is known to be old; None for no file."""
+    """Returns time and size of a file, by which one that is kept is known to be old; None for no
+    file."""
     if path is None:
         return None
     try:
@@ -90,8 +92,9 @@ def file_stamp(path: str | None) -> tuple[int, int] | None:
 def named_content(
     path: str | os.PathLike[str], most: int, what: str, error: type[FinlabError] = DataError
 ) -> bytes:
-    """The content of a file that a layout names, which may lie in the zip archive of a bundle. Raises
-    FinlabError of the kind `error`: there is no such file, or it is too large; it says `what` is expected."""
+    """The content of a file that a layout names, which may lie in the zip archive of a bundle.
+    Raises FinlabError of the kind `error`: there is no such file, or it is too large; it says
+    `what` is expected."""
     archive = archive_around(path)
     if archive is None:
         return read_file(path, most, what, error)
@@ -102,11 +105,13 @@ def named_content(
 
 
 def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
-    """The files of a bundle by name, with checksums that fit. Raises DataError: it cannot be read, is of
-    another version, was changed, or holds what no bundle holds."""
+    """The files of a bundle by name, with checksums that fit. Raises DataError: it cannot be read,
+    is of another version, was changed, or holds what no bundle holds."""
     source = str(path)
     if not os.path.isdir(path):
-        content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
+        content = read_file(
+            source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive"
+        )
         return bundle_files_of(content, source)
     folder = Path(path)
     names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.*")))]
@@ -128,15 +133,20 @@ def check_bundle_files(files: Files, source: str) -> None:
     _check_version(files.get(ABOUT), source)
     for name in REQUIRED:
         if name not in files:
-            raise DataError(f"{source}: {name} is missing; a bundle is made by `finlab export LAYOUT -o DIR`")
+            raise DataError(
+                f"{source}: {name} is missing; a bundle is made by `finlab export LAYOUT -o DIR`"
+            )
     rest = {name: content for name, content in files.items() if name != CHECKSUMS}
     if checksums(rest) == files[CHECKSUMS]:
         return
     listed = files[CHECKSUMS].decode("utf-8", "replace").splitlines()
     wrong = next(
-        (line[66:] for line in checksums(rest).decode().splitlines() if line not in listed), CHECKSUMS
+        (line[66:] for line in checksums(rest).decode().splitlines() if line not in listed),
+        CHECKSUMS,
     )
-    raise DataError(f"{source}: {wrong} does not fit {CHECKSUMS}; it was changed; copy the bundle again")
+    raise DataError(
+        f"{source}: {wrong} does not fit {CHECKSUMS}; it was changed; copy the bundle again"
+    )
 
 
 def checksums(files: Files) -> bytes:
@@ -162,6 +172,7 @@ def _check_version(about: bytes | None, source: str) -> None:
     version = document.get("version") if isinstance(document, dict) else VERSION
     if type(version) is not int or version != VERSION:
         raise DataError(
-            f"{source}: is a bundle of version {version!r:.40}, this finlab reads version {VERSION}; "
+            f"{source}: is a bundle of version {version!r:.40}, this finlab reads version "
+            f"{VERSION}; "
             "export it again with `finlab export LAYOUT -o DIR`"
         )

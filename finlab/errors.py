@@ -1,7 +1,8 @@
 """Errors that a user can cause, under one base class, and how a command ends with one.
 
-A message is one plain sentence that says what was got, what was expected, where, and what to do. The command
-line prints it behind `finlab: error: ` and exits with status 2; the app shows it as a notification.
+A message is one plain sentence that says what was got, what was expected, where, and what to do.
+The command line prints it behind `finlab: error: ` and exits with status 2; the app shows it as a
+notification.
 """
 
 import errno
@@ -13,8 +14,8 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 
 
 def printable(text: str) -> str:
-    """Returns a text with whatever a terminal would obey, or not show, as Python's escapes: names in it may
-    come from a stranger."""
+    """Returns a text with whatever a terminal would obey, or not show, as Python's escapes: names
+    in it may come from a stranger."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\u00a0" else ascii(c)[1:-1] for c in text)
@@ -36,9 +37,9 @@ class FinlabError(Exception):
 class LayoutError(FinlabError):
     """A layout, or the file that describes it, is not acceptable.
 
-    The parts are kept apart so that a check deep inside (which knows the problem and the argument), the
-    actuator (which knows its name) and the reader of a file (which knows the key of that argument and where
-    it lies) can each add what they know.
+    The parts are kept apart so that a check deep inside (which knows the problem and the argument),
+    the actuator (which knows its name) and the reader of a file (which knows the key of that
+    argument and where it lies) can each add what they know.
     """
 
     def __init__(self, problem: str, key: str = "", source: str = "", actuator: str = "") -> None:
@@ -69,7 +70,8 @@ class LayoutError(FinlabError):
         return LayoutError(self.problem, prefix + self.key, source or self.source, self.actuator)
 
     def about(self, actuator: str) -> "LayoutError":
-        """Returns the same error with the actuator that it is about, unless that is known already."""
+        """Returns the same error with the actuator that it is about, unless that is known
+        already."""
         return LayoutError(self.problem, self.key, self.source, self.actuator or actuator)
 
 
@@ -91,7 +93,8 @@ class DataError(FinlabError):
 
 @contextmanager
 def under(key: str = "", source: str = "") -> Iterator[None]:
-    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before that."""
+    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before
+    that."""
     try:
         yield
     except LayoutError as error:
@@ -107,8 +110,8 @@ BROKEN_PIPE = 141
 
 
 class ClosedOutput(io.TextIOBase):
-    """Standard output of a command that was started without it, as by `>&-`: Python has None in its place,
-    and `print` then says nothing and succeeds, as if somebody had read it."""
+    """Standard output of a command that was started without it, as by `>&-`: Python has None in its
+    place, and `print` then says nothing and succeeds, as if somebody had read it."""
 
     def writable(self) -> bool:
         return False
@@ -118,10 +121,11 @@ class ClosedOutput(io.TextIOBase):
 
 
 def exit_code(program: str, work: Callable[[], int]) -> int:
-    """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
+    """The exit code of a command: that of its work, or one of the above after one sentence on
+    stderr.
 
-    Standard output that is full or closed is an error like any other; a reader that ended early, such as
-    `head`, has what it wanted, and gets no words.
+    Standard output that is full or closed is an error like any other; a reader that ended early,
+    such as `head`, has what it wanted, and gets no words.
     """
     output = nullcontext() if sys.stdout is not None else redirect_stdout(ClosedOutput())
     with output:
@@ -143,7 +147,9 @@ def _code_of(program: str, work: Callable[[], int]) -> int:
         _drop_output()
         if isinstance(error, BrokenPipeError):
             return BROKEN_PIPE
-        return _fail(program, f"cannot print: {error.strerror or error}; write the output to another place")
+        return _fail(
+            program, f"cannot print: {error.strerror or error}; write the output to another place"
+        )
 
 
 def _fail(program: str, sentence: str) -> int:

@@ -1,7 +1,8 @@
 """Levenberg-Marquardt for one least-squares problem, or for many side by side.
 
-The caller knows the problem: how to evaluate it, and its Gauss-Newton step at a given damping. Here is what
-all share: a step that makes a row worse is undone and that row's damping is raised; else it is lowered.
+The caller knows the problem: how to evaluate it, and its Gauss-Newton step at a given damping. Here
+is what all share: a step that makes a row worse is undone and that row's damping is raised; else it
+is lowered.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,8 @@ from finlab.arrays import AnyArray
 
 
 class Point(Protocol):
-    """R problems at one point of each: a named tuple of arrays with R rows; of one problem, any object."""
+    """R problems at one point of each: a named tuple of arrays with R rows; of one problem, any
+    object."""
 
     @property
     def cost(self) -> AnyArray:
@@ -56,11 +58,12 @@ def levenberg_marquardt(
 
     Args:
         at: where they begin.
-        moved: the problems after one step, from where they are, the damping (R,) of each, and whether it is
-            the last step, after which no derivatives are needed.
+        moved: the problems after one step, from where they are, the damping (R,) of each, and
+            whether it is the last step, after which no derivatives are needed.
         steps: most steps, those included that are undone.
         rule: of the damping.
-        settled: relative gain at or below which a step that helps is the last one; 0 to take all steps.
+        settled: relative gain at or below which a step that helps is the last one; 0 to take all
+        steps.
         enough: cost at or below which a row takes no further step.
     """
     damping = np.full(len(at.cost), rule.first)
@@ -70,12 +73,18 @@ def levenberg_marquardt(
             break
         new = moved(at, damping, step == steps - 1)
         worse = finished | ~(new.cost <= at.cost)  # a cost that is not a number is no improvement
-        done = settled > 0.0 and not worse.any() and bool((at.cost - new.cost <= settled * at.cost).all())
+        done = (
+            settled > 0.0
+            and not worse.any()
+            and bool((at.cost - new.cost <= settled * at.cost).all())
+        )
         at = _better(at, new, worse)
         if done:
             break
         factor, added = rule.worse
-        damping = np.where(worse, damping * factor + added, np.maximum(damping * rule.better, rule.least))
+        damping = np.where(
+            worse, damping * factor + added, np.maximum(damping * rule.better, rule.least)
+        )
         if (damping > rule.most).all():
             break
     return at
@@ -89,6 +98,8 @@ def _better(old: At, new: At, worse: AnyArray) -> At:
         return old
     fields = [
         np.where(worse.reshape(-1, *(1,) * (kept.ndim - 1)), kept, tried)
-        for kept, tried in zip(cast(tuple[AnyArray, ...], old), cast(tuple[AnyArray, ...], new), strict=True)
+        for kept, tried in zip(
+            cast(tuple[AnyArray, ...], old), cast(tuple[AnyArray, ...], new), strict=True
+        )
     ]
     return type(old)(*fields)

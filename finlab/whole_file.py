@@ -31,7 +31,8 @@ def write_whole(
 
 def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: str) -> None:
     """Write files beside their places, and put them there in order once all are on the disk. Raises
-    FinlabError: of the kind `error`; one cannot be written, and none is there. It calls them `name`."""
+    FinlabError: of the kind `error`; one cannot be written, and none is there. It calls them
+    `name`."""
     parts = {file.with_name(f".{file.name}.{os.getpid()}{PART}"): file for file in files}
     try:
         for part, file in parts.items():
@@ -52,12 +53,15 @@ def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: 
 def write_folder(
     folder: str | os.PathLike[str], files: Mapping[str, bytes], strangers: Iterable[Path], what: str
 ) -> None:
-    """Write files by name into a folder, which is made, as `write_together` does. Raises DataError: one
-    cannot be written; or there are `strangers`, files that are no part of `what`, and nothing is written."""
+    """Write files by name into a folder, which is made, as `write_together` does. Raises DataError:
+    one cannot be written; or there are `strangers`, files that are no part of `what`, and nothing
+    is written."""
     path = Path(folder)
     if odd := sorted(strangers):
         name = odd[0].relative_to(path).as_posix()
-        raise DataError(f"{path}: holds {name!r:.60}, which is no part of {what}; name an empty folder")
+        raise DataError(
+            f"{path}: holds {name!r:.60}, which is no part of {what}; name an empty folder"
+        )
     for name in files:
         make_folder((path / name).parent)
     write_together({path / name: content for name, content in files.items()}, DataError, str(path))

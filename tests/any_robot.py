@@ -8,7 +8,13 @@ import numpy as np
 
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
-from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
+from finlab.allocation.methods import (
+    LEARNED,
+    Checkpoint,
+    MethodChoice,
+    checked_settings,
+    choose_method,
+)
 from finlab.allocation.settings import Settings
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout

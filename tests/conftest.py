@@ -1,4 +1,5 @@
-"""What tests share: settings, an untrained checkpoint, and a robot and a method that are quick to make."""
+"""What tests share: settings, an untrained checkpoint, and a robot and a method that are quick to
+make."""
 
 from pathlib import Path
 
@@ -16,8 +17,8 @@ settings.load_profile("finlab")
 
 @pytest.fixture(scope="session")
 def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a checkpoint of the paper's kind, preset `smoke`, with random weights, for all that is the
-    same whatever the network has learned."""
+    """Folder of a checkpoint of the paper's kind, preset `smoke`, with random weights, for all that
+    is the same whatever the network has learned."""
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
 
@@ -51,7 +52,11 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
     from finlab.research.mdn.training.train_mdn import RECIPES
-    from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint, write_checkpoint
+    from finlab.research.networks.checkpoint import (
+        read_normalization,
+        resolve_checkpoint,
+        write_checkpoint,
+    )
     from finlab.research.networks.trained import TrainedWeights, sizes_for_file
     from finlab.research.training.loop import first_weights
     from tests.torch_weights import arrays_of
@@ -61,7 +66,9 @@ def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     state = arrays_of(first_weights(network.shapes(), 0))
     normalization = read_normalization(resolve_checkpoint("paper"))
     sizes = sizes_for_file(network)
-    write_checkpoint(folder, TrainedWeights(folder.name, normalization, sizes, state, preset="smoke"))
+    write_checkpoint(
+        folder, TrainedWeights(folder.name, normalization, sizes, state, preset="smoke")
+    )
     return folder
 
 

@@ -2,9 +2,9 @@
 
 `python -m tests.golden_robots` writes finlab/core/tests/golden_*.h.
 
-Each has a robot's block with few knots, and questions with what an oracle says that has no part of the core:
-least power by Clarabel on power cones or by BFGS on the dual, how far a wrench goes by a linear program, the
-least miss by nonnegative least squares.
+Each has a robot's block with few knots, and questions with what an oracle says that has no part of
+the core: least power by Clarabel on power cones or by BFGS on the dual, how far a wrench goes by a
+linear program, the least miss by nonnegative least squares.
 """
 
 from pathlib import Path
@@ -85,7 +85,8 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
     questions = [_question(plant, rng) for _ in range(N_QUESTIONS)]
     columns = plant.effectiveness.T
     lines = [
-        "/* Written by tests/golden_robots.py: a block, and questions with the answers of oracles. */",
+        "/* Written by tests/golden_robots.py: a block, and questions with the answers of "
+        "oracles. */",
         '#include "golden.h"',
         "",
         f"static const fl_real {name}_block[] = {{\n  {_numbers(block)}\n}};",

@@ -5,7 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from finlab.actuators.fin.fin_model import FIN_MODELS, LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.actuators.fin.fin_model import (
+    FIN_MODELS,
+    LEAST,
+    LEAST_WIDTH,
+    MAX_AMPLITUDE,
+    MAX_FREQUENCY,
+)
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 
@@ -47,7 +53,9 @@ def hostile_robot(number: int, seed: int) -> Layout:
             (float(position[i, 0]), float(position[i, 1]), float(position[i, 2])),
             float(angle[i]),
             Limits(
-                _range(rng, str(rng.choice(ranges)), (0.05, 0.6), LEAST["amplitude"], MAX_AMPLITUDE),
+                _range(
+                    rng, str(rng.choice(ranges)), (0.05, 0.6), LEAST["amplitude"], MAX_AMPLITUDE
+                ),
                 _range(rng, str(rng.choice(ranges)), (0.1, 2.1), LEAST["frequency"], MAX_FREQUENCY),
                 _arc(rng, str(rng.choice(arcs))),
             ),

@@ -1,8 +1,8 @@
 """Reference optima in the space of forces, by solvers that the library has no part in.
 
-`lower_bound` is a proof: no answer takes fewer watts. `least_known` is what SLSQP finds from many starts.
-Where both agree, the optimum is known. `farthest` is a linear program on the hulls of the actuators' sets,
-`least_miss` a quadratic one, `conic_optimum` Clarabel on thrusters' power cones.
+`lower_bound` is a proof: no answer takes fewer watts. `least_known` is what SLSQP finds from many
+starts. Where both agree, the optimum is known. `farthest` is a linear program on the hulls of the
+actuators' sets, `least_miss` a quadratic one, `conic_optimum` Clarabel on thrusters' power cones.
 """
 
 import itertools
@@ -25,7 +25,8 @@ SHARES = np.linspace(0.0, 1.0, LEVELS) ** 2
 
 
 class OwnSet:
-    """What an actuator can push and at what cost, in polar form: size times unevenness along an angle.
+    """What an actuator can push and at what cost, in polar form: size times unevenness along an
+    angle.
 
     A thruster is two rays. `sizes` (LEVELS,) [N] and `costs` (LEVELS,) [W], by ray.
     """
@@ -67,16 +68,24 @@ class OwnSet:
     @property
     def wide(self) -> bool:
         """Whether its arc is no convex set."""
-        return self.actuator.kind in ("fin", "azimuth") and not self.full and self.half > 0.5 * math.pi + 1e-9
+        return (
+            self.actuator.kind in ("fin", "azimuth")
+            and not self.full
+            and self.half > 0.5 * math.pi + 1e-9
+        )
 
     def answer(self, price: Array) -> tuple[Array, float]:
-        """The force (1 or 2,) [N] that earns most at a price (1 or 2,) [W/N], and what it earns [W]."""
+        """The force (1 or 2,) [N] that earns most at a price (1 or 2,) [W/N], and what it earns
+        [W]."""
         if self.actuator.kind == "thruster":
             ahead, back = (
-                ray.answer(sign * price[0]) for ray, sign in zip(self.rays, (1.0, -1.0), strict=True)
+                ray.answer(sign * price[0])
+                for ray, sign in zip(self.rays, (1.0, -1.0), strict=True)
             )
             return (
-                (np.array([ahead[0]]), ahead[1]) if ahead[1] >= back[1] else (np.array([-back[0]]), back[1])
+                (np.array([ahead[0]]), ahead[1])
+                if ahead[1] >= back[1]
+                else (np.array([-back[0]]), back[1])
             )
         if self.actuator.kind == "rudder":
             best = int((self.curve @ price - self.taken).argmax())
@@ -90,7 +99,8 @@ class OwnSet:
         return force * uneven * np.array([math.cos(phi + lean), math.sin(phi + lean)]), earned
 
     def _direction(self, towards: float) -> float:
-        """The zero direction [rad] at which a force is worth most, the price pointing at `towards`."""
+        """The zero direction [rad] at which a force is worth most, the price pointing at
+        `towards`."""
         span = math.pi if self.full else self.half
         off = (towards - self.middle + math.pi) % (2.0 * math.pi) - math.pi
         nearest = min(max(off, -span), span)
@@ -149,7 +159,8 @@ class _Ray:
 
 
 def fin_costs(actuator: OwnActuator) -> tuple[Array, Array]:
-    """Thrusts (LEVELS,) [N] of a fin and the least watts of each, over all amplitudes and frequencies."""
+    """Thrusts (LEVELS,) [N] of a fin and the least watts of each, over all amplitudes and
+    frequencies."""
     low, high = actuator.limits
     amplitudes = np.linspace(low[0], high[0], 161)
     soft = actuator.model["type"] == "soft"
@@ -187,7 +198,8 @@ def _sets(plant: OwnPlant) -> tuple[OwnSet, ...]:
 
 
 def _halves(plant: OwnPlant, most: int) -> list[tuple[OwnSet, ...]]:
-    """The robot with each arc that is no convex set cut into two, in all ways; at most `most` such arcs."""
+    """The robot with each arc that is no convex set cut into two, in all ways; at most `most` such
+    arcs."""
     choices: list[list[OwnSet]] = []
     cut = 0
     for each in _sets(plant):
@@ -201,8 +213,9 @@ def _halves(plant: OwnPlant, most: int) -> list[tuple[OwnSet, ...]]:
 
 
 def lower_bound(plant: OwnPlant, wrench: Array, cut: int = 4) -> float:
-    """Watts that no commands undercut which give a wrench (6,): the largest dual value that BFGS finds, the
-    least over all ways to halve up to `cut` wide arcs; infinite where it shows the wrench out of reach."""
+    """Watts that no commands undercut which give a wrench (6,): the largest dual value that BFGS
+    finds, the least over all ways to halve up to `cut` wide arcs; infinite where it shows the
+    wrench out of reach."""
     return min(_dual(plant, sets, wrench)[0] for sets in _halves(plant, cut))
 
 
@@ -224,7 +237,8 @@ def _polar(sets: tuple[OwnSet, ...], forces: list[Array]) -> Array:
 
 
 def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[float, list[Array]]:
-    """The largest value of the dual of one robot of convex sets, and the forces that answer its prices."""
+    """The largest value of the dual of one robot of convex sets, and the forces that answer its
+    prices."""
     effectiveness = plant.effectiveness / plant.scales[:, None]
     target = wrench / plant.scales
     widths = [each.actuator.effectiveness.shape[1] for each in sets]
@@ -259,12 +273,15 @@ def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[flo
         if gain < 1e-9 or best == np.inf:
             break
     price = top * start @ effectiveness
-    forces = [each.answer(price[a:b])[0] for each, a, b in zip(sets, starts[:-1], starts[1:], strict=True)]
+    forces = [
+        each.answer(price[a:b])[0] for each, a, b in zip(sets, starts[:-1], starts[1:], strict=True)
+    ]
     return best * top, forces
 
 
 def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) -> float | None:
-    """The fewest watts (or None) that SLSQP finds for a wrench (6,) over sizes and directions of forces."""
+    """The fewest watts (or None) that SLSQP finds for a wrench (6,) over sizes and directions of
+    forces."""
     rng = np.random.default_rng(seed)
     sets = _sets(plant)
     scale = plant.scales
@@ -339,8 +356,9 @@ def _ends(sets: tuple[OwnSet, ...]) -> tuple[list[Array], list[Array]]:
 
 
 def farthest(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
-    """How many times a wrench (6,) can be given at most: a linear program over the corners of the hulls of
-    the actuators' forces, at least 0.9999 of the truth; wide arcs are halved in all ways."""
+    """How many times a wrench (6,) can be given at most: a linear program over the corners of the
+    hulls of the actuators' forces, at least 0.9999 of the truth; wide arcs are halved in all
+    ways."""
     best = 0.0
     for corners in itertools.product(*(_corners(each, count) for each in _sets(plant))):
         best = max(best, _farthest(plant, corners, wrench))
@@ -360,8 +378,9 @@ def _corners(each: OwnSet, count: int) -> list[Array]:
 
 
 def least_miss(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
-    """The least length of the missing wrench over `OwnPlant.scales` for a wrench (6,): least squares over the
-    corners of the hulls of the actuators' forces (nonnegative, each hull's shares add up to 1)."""
+    """The least length of the missing wrench over `OwnPlant.scales` for a wrench (6,): least
+    squares over the corners of the hulls of the actuators' forces (nonnegative, each hull's shares
+    add up to 1)."""
     best = np.inf
     for corners in itertools.product(*(_corners(each, count) for each in _sets(plant))):
         columns, ones = _hulls(plant, corners)
@@ -374,7 +393,9 @@ def least_miss(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
 
 def _hulls(plant: OwnPlant, corners: tuple[Array, ...]) -> tuple[Array, Array]:
     """Scaled wrenches (6, K) of the corners of all hulls, and which hull (n, K) each belongs to."""
-    blocks = [points @ each.effectiveness.T for each, points in zip(plant.actuators, corners, strict=True)]
+    blocks = [
+        points @ each.effectiveness.T for each, points in zip(plant.actuators, corners, strict=True)
+    ]
     hull = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
     columns: Array = np.concatenate(blocks).T / plant.scales[:, None]
     return columns, (hull == np.arange(len(blocks))[:, None]).astype(float)
@@ -392,10 +413,11 @@ def _farthest(plant: OwnPlant, corners: tuple[Array, ...], wrench: Array) -> flo
 
 
 def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
-    """Least watts and forces (n,) [N] of thrusters that give a wrench (6,), by Clarabel on power cones.
+    """Least watts and forces (n,) [N] of thrusters that give a wrench (6,), by Clarabel on power
+    cones.
 
-    Each force is a part ahead less a part back; a part y within [0, most] costs k t with t >= y^p, the cone
-    t^(1/p) 1^(1 - 1/p) >= |y|. Needs Clarabel, an extra of the tests.
+    Each force is a part ahead less a part back; a part y within [0, most] costs k t with t >= y^p,
+    the cone t^(1/p) 1^(1 - 1/p) >= |y|. Needs Clarabel, an extra of the tests.
 
     Raises:
         ValueError: the wrench is out of reach, or Clarabel does not solve it.
@@ -409,7 +431,9 @@ def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
     if (ends[:, 0] > 0.0).any() or (ends[:, 1] < 0.0).any():
         raise ValueError("expected thrusters whose limits hold 0")
     scale = plant.scales
-    columns = np.stack([sign * plant.effectiveness[:, i] for i, sign in parts], axis=1) / scale[:, None]
+    columns = (
+        np.stack([sign * plant.effectiveness[:, i] for i, sign in parts], axis=1) / scale[:, None]
+    )
     m = len(parts)
     most = np.array([ends[i, 1] if sign > 0.0 else -ends[i, 0] for i, sign in parts])
     ways = np.array([sign for _, sign in parts])
@@ -434,7 +458,9 @@ def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
     nothing = sparse.csc_matrix((2 * m, 2 * m))
     scaled = cost / cost.max()
     matrix = sparse.csc_matrix(sparse.vstack(rows))
-    answer = clarabel.DefaultSolver(nothing, scaled, matrix, np.concatenate(right), cones, settings).solve()
+    answer = clarabel.DefaultSolver(
+        nothing, scaled, matrix, np.concatenate(right), cones, settings
+    ).solve()
     if "Solved" not in str(answer.status):
         raise ValueError(f"Clarabel: {answer.status}")
     share = np.array(answer.x[:m])

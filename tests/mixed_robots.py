@@ -1,4 +1,5 @@
-"""Seeded random robots of all kinds of actuator as layout files, and wrenches within reach and beyond."""
+"""Seeded random robots of all kinds of actuator as layout files, and wrenches within reach and
+beyond."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -56,8 +57,8 @@ def random_robot(kind: str, number: int, seed: int) -> dict[str, Any]:
 
 
 def fins_with_a_tail(number: int, seed: int) -> dict[str, Any]:
-    """Robot `number` of a seed, with 2 to 5 fins of mixed laws within nominal limits: the old default method
-    was at times a fifth dearer than needed on such robots."""
+    """Robot `number` of a seed, with 2 to 5 fins of mixed laws within nominal limits: the old
+    default method was at times a fifth dearer than needed on such robots."""
     rng = np.random.default_rng([DOMAIN, 99, seed, number])
     fins = []
     for i in range(2 + number % 4):
@@ -86,7 +87,8 @@ def random_plant(kind: str, number: int, seed: int) -> OwnPlant:
 
 
 def within(plant: OwnPlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0) -> Array:
-    """A wrench (6,) within reach: that of a random command whose sizes are up to 0.2 to 1 of their range."""
+    """A wrench (6,) within reach: that of a random command whose sizes are up to 0.2 to 1 of their
+    range."""
     wrench: Array = plant.wrench(plant.draw(rng, float(rng.uniform(low, high))))
     return wrench
 
@@ -98,7 +100,8 @@ def beyond(plant: OwnPlant, rng: np.random.Generator, times: float) -> Array:
 
 
 def bluerov2_heavy() -> dict[str, Any]:
-    """BlueROV2 Heavy: positions about its centre of gravity, T200 at 16 V, directions of ArduSub."""
+    """BlueROV2 Heavy: positions about its centre of gravity, T200 at 16 V, directions of
+    ArduSub."""
     s = math.sqrt(0.5)
     places = [(0.14, -0.092), (0.14, 0.092), (-0.15, -0.092), (-0.15, 0.092)]
     axes = [(-s, -s), (-s, s), (s, -s), (s, s)]
@@ -135,7 +138,11 @@ def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
         return [_rudder] * int(rng.integers(2, 5)) + [_thruster] * int(rng.integers(4, 8))
     if kind == "wide arcs":
         wide = int(rng.integers(1, 3))
-        return [_wide_fin] * wide + [_azimuth] * int(rng.integers(0, 2)) + [_fin] * int(rng.integers(2, 5))
+        return (
+            [_wide_fin] * wide
+            + [_azimuth] * int(rng.integers(0, 2))
+            + [_fin] * int(rng.integers(2, 5))
+        )
     fins = {"fins any shaft": _shaft_fin, "fins uneven": _uneven_fin, "holes": _restless_fin}
     if kind in ("fins", *fins):
         return [fins.get(kind, _fin)] * int(rng.integers(3, 9))
@@ -166,9 +173,11 @@ def _plane(rng: np.random.Generator) -> tuple[list[float], list[float]]:
 def _law(rng: np.random.Generator) -> dict[str, Any]:
     exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
     forward = float(10.0 ** rng.uniform(-0.5, 0.5)) * 20.0 ** (1.5 - exponent)
-    return {"type": "power_law", "forward": forward, "reverse": forward * float(rng.uniform(0.8, 3.0))} | {
-        "exponent": exponent
-    }
+    return {
+        "type": "power_law",
+        "forward": forward,
+        "reverse": forward * float(rng.uniform(0.8, 3.0)),
+    } | {"exponent": exponent}
 
 
 def _thruster(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
@@ -191,7 +200,8 @@ def with_dead_bands(layout: Mapping[str, Any], rng: np.random.Generator) -> dict
 
 
 def with_rates(layout: Mapping[str, Any]) -> dict[str, Any]:
-    """A layout whose thrusters and azimuths change no faster than through their range in a second."""
+    """A layout whose thrusters and azimuths change no faster than through their range in a
+    second."""
     rated = []
     for each in layout["actuators"]:
         more: dict[str, Any] = {}
@@ -205,8 +215,17 @@ def with_rates(layout: Mapping[str, Any]) -> dict[str, Any]:
 
 def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
     axis, zero = _plane(rng)
-    spec: dict[str, Any] = {"name": name, "type": "azimuth", "position_m": _position(rng), "turn_axis": axis}
-    spec |= {"zero": zero, "force_n": [0.0, float(scale * rng.uniform(4.0, 30.0))], "model": _law(rng)}
+    spec: dict[str, Any] = {
+        "name": name,
+        "type": "azimuth",
+        "position_m": _position(rng),
+        "turn_axis": axis,
+    }
+    spec |= {
+        "zero": zero,
+        "force_n": [0.0, float(scale * rng.uniform(4.0, 30.0))],
+        "model": _law(rng),
+    }
     if rng.random() < 0.5:
         spec["arc_deg"] = _arc(rng, 20.0, 170.0)
     return spec
@@ -217,7 +236,12 @@ def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]
     zero = [1.0, 0.0, 0.0]
     shaft = [0.0, math.cos(around), math.sin(around)]
     most = float(rng.uniform(10.0, 20.0))
-    spec: dict[str, Any] = {"name": name, "type": "rudder", "position_m": _position(rng), "shaft": shaft}
+    spec: dict[str, Any] = {
+        "name": name,
+        "type": "rudder",
+        "position_m": _position(rng),
+        "shaft": shaft,
+    }
     spec |= {"zero": zero, "area_m2": float(0.005 * scale * rng.uniform(0.5, 2.0))}
     return spec | {"aspect_ratio": float(rng.uniform(1.0, 4.0)), "deflection_deg": [-most, most]}
 
@@ -239,13 +263,19 @@ def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
     if kind == "lighthill":
         return {"type": kind, "length": log(0.1, 0.3), "width": log(0.05, 0.15)}
     lean = float(rng.uniform(-0.15, 0.15))
-    shape = {"k": log(1.0, 8.0), "p": float(rng.uniform(1.0, 2.0)), "x0": float(rng.uniform(0.6, 1.5))}
+    shape = {
+        "k": log(1.0, 8.0),
+        "p": float(rng.uniform(1.0, 2.0)),
+        "x0": float(rng.uniform(0.6, 1.5)),
+    }
     shape |= {"q": float(rng.uniform(3.0, 6.0)), "d": lean}
     return {"type": kind, **shape, "e": uneven, "phi_e": float(rng.uniform(-math.pi, math.pi))}
 
 
 def _fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
-    return _any_fin(rng, name, _fin_model(rng), _arc(rng, 30.0, 170.0) if rng.random() < 0.4 else None)
+    return _any_fin(
+        rng, name, _fin_model(rng), _arc(rng, 30.0, 170.0) if rng.random() < 0.4 else None
+    )
 
 
 def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
@@ -264,7 +294,8 @@ def _wide_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, An
 
 
 def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
-    """A fin whose least force is up to 5 % of its largest: it beats no slower than some frequency."""
+    """A fin whose least force is up to 5 % of its largest: it beats no slower than some
+    frequency."""
     spec = _fin(rng, name, scale)
     share = float(rng.uniform(0.005, 0.05))
     limits = spec["limits"]
@@ -282,7 +313,15 @@ def _any_fin(
     rng: np.random.Generator, name: str, model: dict[str, Any], arc: list[float] | None
 ) -> dict[str, Any]:
     directions = [-math.pi, math.pi] if arc is None else np.radians(arc).tolist()
-    limits = {"amplitude_rad": [0.05, float(rng.uniform(0.4, 0.8))], "zero_direction_rad": directions}
+    limits = {
+        "amplitude_rad": [0.05, float(rng.uniform(0.4, 0.8))],
+        "zero_direction_rad": directions,
+    }
     limits["frequency_hz"] = [0.1, float(rng.uniform(1.0, 3.0))]
-    spec: dict[str, Any] = {"name": name, "type": "fin", "position_m": _position(rng), "model": model}
+    spec: dict[str, Any] = {
+        "name": name,
+        "type": "fin",
+        "position_m": _position(rng),
+        "model": model,
+    }
     return spec | {"mounting_angle_deg": float(rng.uniform(-180.0, 180.0)), "limits": limits}

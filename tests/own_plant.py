@@ -1,8 +1,9 @@
-"""A plant of all kinds of actuator, written apart from the library: it judges what the library answers.
+"""A plant of all kinds of actuator, written apart from the library: it judges what the library
+answers.
 
-It reads a layout file's mapping as a stranger would and follows the formulas in the documentation. Commands
-are arrays (n, 3): fin (half amplitude [rad], frequency [Hz], zero direction [rad]), thruster (force [N],
-0, 0), azimuth (angle [rad], force [N], 0), rudder (deflection [rad], 0, 0).
+It reads a layout file's mapping as a stranger would and follows the formulas in the documentation.
+Commands are arrays (n, 3): fin (half amplitude [rad], frequency [Hz], zero direction [rad]),
+thruster (force [N], 0, 0), azimuth (angle [rad], force [N], 0), rudder (deflection [rad], 0, 0).
 """
 
 import math
@@ -32,12 +33,15 @@ FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
 class OwnActuator:
     """One actuator of a layout file: its set of forces, its watts, and its effectiveness.
 
-    A force is a size along a direction of the actuator's own plane (angle [rad]); a thruster or a rudder has
-    the two angles 0 and pi.
+    A force is a size along a direction of the actuator's own plane (angle [rad]); a thruster or a
+    rudder has the two angles 0 and pi.
     """
 
     def __init__(
-        self, spec: Mapping[str, Any], flow: ArrayLike | None = None, box: tuple[Array, Array] | None = None
+        self,
+        spec: Mapping[str, Any],
+        flow: ArrayLike | None = None,
+        box: tuple[Array, Array] | None = None,
     ) -> None:
         self.spec = spec
         self.name = str(spec["name"])
@@ -65,7 +69,9 @@ class OwnActuator:
 
     def _column(self, direction: Array) -> Array:
         reaction = float(self.spec.get("torque_per_newton_m", 0.0))
-        return np.concatenate([direction, np.cross(self.position, direction) + reaction * direction])
+        return np.concatenate(
+            [direction, np.cross(self.position, direction) + reaction * direction]
+        )
 
     @property
     def limits(self) -> tuple[Array, Array]:
@@ -76,7 +82,8 @@ class OwnActuator:
         if self.kind == "fin":
             keys = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
             ends = [
-                spec.get("limits", {}).get(key, default) for key, default in zip(keys, NOMINAL, strict=True)
+                spec.get("limits", {}).get(key, default)
+                for key, default in zip(keys, NOMINAL, strict=True)
             ]
         elif self.kind == "azimuth":
             ends = [np.radians(spec.get("arc_deg", [-180.0, 180.0])), spec["force_n"], (0.0, 0.0)]
@@ -99,7 +106,8 @@ class OwnActuator:
         """Force [N] below which a thruster gives none."""
         return float(self.spec.get("dead_band_n", 0.0))
 
-    # ---- fins -----------------------------------------------------------------------------------------
+    # ---- fins
+    # -----------------------------------------------------------------------------------------
     def _of(self, key: str) -> float:
         return float(self.model.get(key, FIN_DEFAULTS[self.model["type"]][key]))
 
@@ -108,13 +116,21 @@ class OwnActuator:
         a = np.asarray(amplitude, np.float64)
         f = np.asarray(frequency, np.float64)
         if self.model["type"] == "drag":
-            scale = 2.0 * DENSITY * self._of("drag_coefficient") * self._of("area") * self._of("lever") ** 2
+            scale = (
+                2.0
+                * DENSITY
+                * self._of("drag_coefficient")
+                * self._of("area")
+                * self._of("lever") ** 2
+            )
             return scale * (2.0 * math.pi * f) ** 2 * (1.0 - np.cos(2.0 * a))
         if self.model["type"] == "lighthill":
             mass = math.pi / 4.0 * DENSITY * self._of("width") ** 2
             return 0.5 * mass * (self._of("length") * 2.0 * math.pi * f) ** 2 * a * j1(a)
         x = a * f
-        return np.asarray(self._of("k") * x ** self._of("p") / (1.0 + (x / self._of("x0")) ** self._of("q")))
+        return np.asarray(
+            self._of("k") * x ** self._of("p") / (1.0 + (x / self._of("x0")) ** self._of("q"))
+        )
 
     def unevenness(self, direction: ArrayLike) -> Array:
         """By what the thrust of a fin is larger at a zero direction [rad]."""
@@ -143,13 +159,15 @@ class OwnActuator:
         own = 0.0097 * (length / 0.2) ** 3 * (width / 0.1)
         inertia = own + math.pi / 4.0 * DENSITY * width**2 * length**3 / 3.0
         drag = DENSITY * 2.0 * width * length**4 / 8.0
-        # Half a beat does work from one end up to where the drag no longer outweighs the inertia: sin = end.
+        # Half a beat does work from one end up to where the drag no longer outweighs the inertia:
+        # sin = end.
         ratio = drag * a / inertia
         end = np.where(ratio > 0.0, 2.0 * ratio / (1.0 + np.sqrt(1.0 + 4.0 * ratio**2)), 0.0)
         half = 0.5 * inertia * (1.0 - end**2) + drag * a * (end - end**3 / 3.0 + 2.0 / 3.0)
         return np.asarray(2.0 * f * (2.0 * math.pi * f * a) ** 2 * half)
 
-    # ---- rudders --------------------------------------------------------------------------------------
+    # ---- rudders
+    # --------------------------------------------------------------------------------------
     def foil(self, deflection: Array) -> tuple[Array, Array]:
         """Force (..., 2) [N] in the own plane and watts (...,) of deflections [rad] in the flow."""
         spec = self.spec
@@ -170,9 +188,9 @@ class OwnActuator:
             np.exp(np.clip(50.0 * (angle + stall), -600, 600)),
         )
         parted = (1.0 + ends[0] + ends[1]) / ((1.0 + ends[0]) * (1.0 + ends[1]))
-        lift = (1.0 - parted) * slope * angle + parted * 2.0 * np.sign(angle) * np.sin(angle) ** 2 * np.cos(
+        lift = (1.0 - parted) * slope * angle + parted * 2.0 * np.sign(angle) * np.sin(
             angle
-        )
+        ) ** 2 * np.cos(angle)
         drag = spec.get("drag_coefficient", 0.0065) + parted * 2.0 * np.sin(angle) ** 2
         drag = drag + (1.0 - parted) * (slope * angle) ** 2 / (0.9 * math.pi * ratio)
         pressure = 0.5 * spec.get("density_kg_m3", DENSITY) * speed**2 * spec["area_m2"]
@@ -180,11 +198,14 @@ class OwnActuator:
         force = pressure * (lift[..., None] * across - drag[..., None] * course)
         return force, pressure * drag * speed
 
-    # ---- any kind -------------------------------------------------------------------------------------
+    # ---- any kind
+    # -------------------------------------------------------------------------------------
     def propeller_watts(self, force: ArrayLike) -> Array:
         """Watts of a propeller for a force [N]."""
         size = np.asarray(force, np.float64)
-        scale = np.where(size > 0.0, self.model["forward"], self.model.get("reverse", self.model["forward"]))
+        scale = np.where(
+            size > 0.0, self.model["forward"], self.model.get("reverse", self.model["forward"])
+        )
         return np.asarray(scale * np.abs(size) ** self.model.get("exponent", 1.5))
 
     def own_force(self, command: Array) -> Array:
@@ -214,7 +235,9 @@ class OwnActuator:
         if self.kind == "rudder":
             return self.foil(command[..., 0])[1]
         thruster = self.kind == "thruster"
-        return self.propeller_watts(self.own_force(command)[..., 0] if thruster else command[..., 1])
+        return self.propeller_watts(
+            self.own_force(command)[..., 0] if thruster else command[..., 1]
+        )
 
     def excess(self, command: Array) -> float:
         """By how much a command (3,) is outside the limits; a full circle has none."""
@@ -234,10 +257,13 @@ class OwnActuator:
         turn = math.radians(spec.get("turn_rate_deg_s", np.inf))
         if self.kind == "rudder":
             return np.array([math.radians(spec.get("rate_deg_s", np.inf)), np.inf, np.inf])
-        return np.array([turn, force, np.inf] if self.kind == "azimuth" else [force, np.inf, np.inf])
+        return np.array(
+            [turn, force, np.inf] if self.kind == "azimuth" else [force, np.inf, np.inf]
+        )
 
     def rate_excess(self, previous: Array, command: Array, period_s: float) -> float:
-        """By what share of its largest step a command (3,) goes beyond what may follow a previous one."""
+        """By what share of its largest step a command (3,) goes beyond what may follow a previous
+        one."""
         change = command - previous
         turn = {"fin": 2, "azimuth": 0}.get(self.kind)
         if turn is not None and self.turns_fully:
@@ -245,7 +271,8 @@ class OwnActuator:
         return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
 
     def after(self, previous: Array, period_s: float) -> "OwnActuator":
-        """The actuator with only the commands that may follow a previous one (3,) after a time [s]."""
+        """The actuator with only the commands that may follow a previous one (3,) after a time
+        [s]."""
         low, high = self.limits
         step = self.rates * period_s
         turn = {"fin": 2, "azimuth": 0}.get(self.kind)
@@ -261,7 +288,8 @@ class OwnActuator:
         return OwnActuator(self.spec, self.flow, (near, far))
 
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
-        """Commands (count, 3), uniform in the limits, the size of the force up to a share of its range."""
+        """Commands (count, 3), uniform in the limits, the size of the force up to a share of its
+        range."""
         low, high = self.limits
         top = high.copy()
         if self.kind == "fin":
@@ -277,7 +305,8 @@ class OwnActuator:
 
 
 class OwnPlant:
-    """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by default."""
+    """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by
+    default."""
 
     def __init__(self, layout: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
         self.layout = layout
@@ -310,12 +339,14 @@ class OwnPlant:
         return max((each.excess(row) for each, row in pairs if np.isfinite(row).all()), default=0.0)
 
     def rate_excess(self, previous: Array, commands: Array, period_s: float) -> float:
-        """By what share of its largest step a command goes beyond what may follow a previous one, at most."""
+        """By what share of its largest step a command goes beyond what may follow a previous one,
+        at most."""
         rows = zip(self.actuators, previous, commands, strict=True)
         return max(each.rate_excess(before, now, period_s) for each, before, now in rows)
 
     def after(self, previous: Array, period_s: float) -> "OwnPlant":
-        """The plant with only the commands that may follow previous ones (n, 3) after a time [s]."""
+        """The plant with only the commands that may follow previous ones (n, 3) after a time
+        [s]."""
         other = OwnPlant(self.layout, self.flow)
         rows = zip(self.actuators, previous, strict=True)
         other.actuators = tuple(each.after(row, period_s) for each, row in rows)
@@ -328,8 +359,8 @@ class OwnPlant:
 
     @cached_property
     def scales(self) -> Array:
-        """Two scales of the robot, one for forces [N] and one for torques [N m], as six numbers: roots of the
-        sums of squares of what each actuator alone can push and turn at most."""
+        """Two scales of the robot, one for forces [N] and one for torques [N m], as six numbers:
+        roots of the sums of squares of what each actuator alone can push and turn at most."""
         forces = []
         torques = []
         for each in self.actuators:
@@ -364,7 +395,8 @@ COMMAND_KEYS = {
 
 
 def edge_forces(actuator: OwnActuator, count: int) -> Array:
-    """The outermost forces (K, 1 or 2) [N] in the own plane of an actuator: the corners of its hull."""
+    """The outermost forces (K, 1 or 2) [N] in the own plane of an actuator: the corners of its
+    hull."""
     low, high = actuator.limits
     if actuator.kind == "thruster":
         return np.array([[low[0]], [high[0]], [min(max(0.0, low[0]), high[0])]])

@@ -1,4 +1,5 @@
-"""Fins that nobody has seen before: random laws as in the contract's splits, and noisy tables of them."""
+"""Fins that nobody has seen before: random laws as in the contract's splits, and noisy tables of
+them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,13 @@ def random_model(rng: np.random.Generator, kind: str) -> FinModelSpec:
     elif kind == "lighthill":
         numbers = {"length": log_uniform(rng, 0.1, 0.3), "width": log_uniform(rng, 0.05, 0.15)}
     else:
-        spread = {"p": (1.0, 2.0), "x0": (0.6, 1.5), "q": (3.0, 6.0), "e": (0.0, 0.2), "phi_e": (-3.0, 3.0)}
+        spread = {
+            "p": (1.0, 2.0),
+            "x0": (0.6, 1.5),
+            "q": (3.0, 6.0),
+            "e": (0.0, 0.2),
+            "phi_e": (-3.0, 3.0),
+        }
         numbers = {name: float(rng.uniform(*ends)) for name, ends in spread.items()}
         numbers |= {"k": log_uniform(rng, 1.0, 8.0), "d": float(rng.uniform(-0.15, 0.15))}
     return FinModelSpec(kind, tuple(sorted(numbers.items())))
@@ -44,8 +51,8 @@ def write_fin_table(
     power: bool = False,
     points: tuple[int, int, int] = (7, 8, 13),
 ) -> FinModelSpec:
-    """A table of a law on a grid that covers the limits: with noise (a share of the largest force), a force
-    along the shaft (a share of the planar one) and a column of power."""
+    """A table of a law on a grid that covers the limits: with noise (a share of the largest force),
+    a force along the shaft (a share of the planar one) and a column of power."""
     ends = zip(limits.lower, limits.upper, points, strict=True)
     axes = [np.linspace(low, high, n) for low, high, n in ends]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -74,7 +81,8 @@ def random_robot(
     n_fins: int | tuple[int, int] = (2, 5),
     limits: Any = "nominal",
 ) -> Layout:
-    """A robot whose fins are each of one of the kinds, with numbers of its own; tables go to a folder."""
+    """A robot whose fins are each of one of the kinds, with numbers of its own; tables go to a
+    folder."""
     layout = random_layout(rng, n_fins=n_fins, limits=limits)
     fins = []
     for fin in layout.fins:
@@ -84,6 +92,8 @@ def random_robot(
             assert folder is not None
             path = folder / f"{rng.integers(2**62)}.csv"
             law = make_law(model)
-            model = write_fin_table(path, law, fin.limits, rng=rng, noise=0.03, sideways=0.1, power=True)
+            model = write_fin_table(
+                path, law, fin.limits, rng=rng, noise=0.03, sideways=0.1, power=True
+            )
         fins.append(replace(fin, model=model))
     return replace(layout, actuators=tuple(fins))

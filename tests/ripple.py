@@ -1,4 +1,5 @@
-"""What real fins do within a beat, which no method here is given: a swim whose fins' forces swing."""
+"""What real fins do within a beat, which no method here is given: a swim whose fins' forces
+swing."""
 
 import math
 
@@ -15,9 +16,10 @@ from finlab.swim.vehicle.fin_motion import FinMotion
 class RippleForce(ActuatorForce):
     """The mean force in two pulses per cycle, and a ripple of mean zero on top.
 
-    The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water that it
-    carries, m L^2/2 theta', and the drag of its strips, 1/6 rho Cd W L^3 theta' |theta'|. Over a cycle both
-    have mean zero, so the mean force stays the fin law's. The fin points away from its thrust.
+    The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water
+    that it carries, m L^2/2 theta', and the drag of its strips, 1/6 rho Cd W L^3 theta' |theta'|.
+    Over a cycle both have mean zero, so the mean force stays the fin law's. The fin points away
+    from its thrust.
     """
 
     step_s = 0.01

@@ -1,4 +1,5 @@
-"""The maker's table of the T200 thruster (Blue Robotics, September 2019), every tenth row, in newtons."""
+"""The maker's table of the T200 thruster (Blue Robotics, September 2019), every tenth row, in
+newtons."""
 
 COMMAND = tuple(range(1100, 1901, 40))
 """Width of the pulse [us]."""

@@ -15,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def first_shown(*words: str) -> tuple[str, float]:
-    """What `finlab WORDS` shows first on a terminal, and the processor's time until then [s]; it is ended
-    there."""
+    """What `finlab WORDS` shows first on a terminal, and the processor's time until then [s]; it is
+    ended there."""
     leader, follower = pty.openpty()
     termios.tcsetwinsize(follower, (24, 80))
     program = [sys.executable, "-m", "finlab", *words]
@@ -24,7 +24,9 @@ def first_shown(*words: str) -> tuple[str, float]:
     os.close(follower)
     try:
         shown = os.read(leader, 1000).decode()
-        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+        user, system = (
+            Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+        )
     finally:
         process.kill()
         process.wait()

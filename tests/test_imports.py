@@ -1,4 +1,5 @@
-"""Imports go one way, and heavy packages stay in their rooms: read from the source, not from a run."""
+"""Imports go one way, and heavy packages stay in their rooms: read from the source, not from a
+run."""
 
 import ast
 import subprocess
@@ -14,7 +15,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 Levels = tuple[tuple[str, ...], ...]
-"""Rooms that may import those of earlier levels and themselves, never their neighbours or later ones."""
+"""Rooms that may import those of earlier levels and themselves, never their neighbours or later
+ones."""
 
 CORE: Levels = (
     ("arrays", "errors"),
@@ -46,11 +48,12 @@ WINGS: dict[str, Levels] = {
     ),
     "logs": (("log",),),
 }
-"""What few of those who allocate need: the rooms of each wing. A wing may import the whole core. The fourth
-wing is `webapp`."""
+"""What few of those who allocate need: the rooms of each wing. A wing may import the whole core.
+The fourth wing is `webapp`."""
 
 USES = {"research": {"swim"}, "logs": {"research"}}
-"""Which other wings a wing imports: experiments swim, and what is told of a log is a document of rows."""
+"""Which other wings a wing imports: experiments swim, and what is told of a log is a document of
+rows."""
 
 VERBS = {
     "cli/app_verb": {"app"},
@@ -68,8 +71,8 @@ REGISTRIES = {
     "finlab.cli.layout_verbs": {"swim"},
     "finlab.cli.shared_options": {"research"},
 }
-"""Modules outside of the wings that name what stands in these, in a string that is resolved when it is asked
-for."""
+"""Modules outside of the wings that name what stands in these, in a string that is resolved when it
+is asked for."""
 
 LEVEL = {
     room: (wing, level)
@@ -90,7 +93,8 @@ def _tree(path: Path) -> ast.Module:
 
 
 def _imports(path: Path) -> Iterator[tuple[str, int]]:
-    """Every module that a file imports, wherever in it, with the line; those for type checkers, too."""
+    """Every module that a file imports, wherever in it, with the line; those for type checkers,
+    too."""
     for node in ast.walk(_tree(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -105,11 +109,14 @@ def _imports(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def _room(module: str) -> str | None:
-    """The room of a module: the longest path in the plan that it lies in; None of what is not ours."""
+    """The room of a module: the longest path in the plan that it lies in; None of what is not
+    ours."""
     parts = module.split(".")
     if parts[0] == "webapp":
         return "webapp"
-    paths = ["/".join(parts[1:end]) for end in range(len(parts), 1, -1)] if parts[0] == "finlab" else []
+    paths = (
+        ["/".join(parts[1:end]) for end in range(len(parts), 1, -1)] if parts[0] == "finlab" else []
+    )
     return next((path for path in paths if path in LEVEL), None)
 
 
@@ -129,7 +136,9 @@ def _allowed(module: str, here: str, there: str) -> bool:
     own = _wing(here)
     other = _wing(there)
     if own == "cli":
-        return other == "core" or other in VERBS.get(module.replace(".", "/").removeprefix("finlab/"), set())
+        return other == "core" or other in VERBS.get(
+            module.replace(".", "/").removeprefix("finlab/"), set()
+        )
     if own == other:
         return LEVEL[there][1] < LEVEL[here][1]
     return own != "core" and (other == "core" or other in USES.get(own, set()))
@@ -164,7 +173,8 @@ def test_the_core_imports_no_wing_and_all_imports_go_one_way() -> None:
 
 
 def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
-    """Names of modules of another wing that stand as strings in a file which resolves such, with the wing."""
+    """Names of modules of another wing that stand as strings in a file which resolves such, with
+    the wing."""
     here = _room(module)
     own = "door" if here is None else _wing(here)
     if "resolve_name" not in path.read_text(encoding="utf-8"):
@@ -180,7 +190,9 @@ def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
 def test_wings_are_named_by_strings_in_registries_alone() -> None:
     named: dict[str, set[str]] = {}
     for module, path in _modules(ROOT).items():
-        if module.startswith("finlab") and (wings := {wing for _, wing in _names_of_wings(module, path)}):
+        if module.startswith("finlab") and (
+            wings := {wing for _, wing in _names_of_wings(module, path)}
+        ):
             named[module] = wings
     assert named == {module: wings for module, wings in REGISTRIES.items() if wings}
 
@@ -203,13 +215,16 @@ def test_what_registries_name_is_there() -> None:
 
 def _modules(root: Path) -> dict[str, Path]:
     """Every module of finlab and webapp by its full name."""
-    paths = [path for package in ("finlab", "webapp") for path in sorted((root / package).rglob("*.py"))]
+    paths = [
+        path for package in ("finlab", "webapp") for path in sorted((root / package).rglob("*.py"))
+    ]
     return {_module_of(path, root): path for path in paths}
 
 
 def _import_graph(root: Path) -> "nx.DiGraph[str]":
-    """Which module needs which, at once, later (in functions, or by a name given to `import_module` or
-    `resolve_name`), or for types; a package's own file only where something is asked of it by name."""
+    """Which module needs which, at once, later (in functions, or by a name given to `import_module`
+    or `resolve_name`), or for types; a package's own file only where something is asked of it by
+    name."""
     modules = _modules(root)
     graph: nx.DiGraph[str] = nx.DiGraph()
     for name, path in modules.items():
@@ -229,7 +244,8 @@ def _import_graph(root: Path) -> "nx.DiGraph[str]":
 
 
 def _shortest_circles(graph: "nx.DiGraph[str]") -> list[list[str]]:
-    """One smallest circle for each group of modules that need each other, its first module also last."""
+    """One smallest circle for each group of modules that need each other, its first module also
+    last."""
     circles = []
     for group in nx.strongly_connected_components(graph):
         found = [
@@ -312,7 +328,8 @@ def test_allocating_needs_only_numpy_and_msgspec() -> None:
         "import sys\n"
         "for name in ('torch', 'scipy', 'yaml', 'safetensors', 'threadpoolctl', 'tqdm', 'tyro'):\n"
         "    sys.modules[name] = None\n"
-        "import finlab.allocation.dual.method, finlab.research.mdn.method, finlab.deploy.deployed_robot"
+        "import finlab.allocation.dual.method, finlab.research.mdn.method, "
+        "finlab.deploy.deployed_robot"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
 
@@ -326,7 +343,8 @@ def test_allocating_loads_few_files_and_no_wing() -> None:
         "import sys\n"
         "from finlab.cli import main\n"
         "assert main(['allocate', 'A', '--wrench', '1', '0', '0', '0', '0', '0']) == 0\n"
-        "print(*(name for name, module in sys.modules.items() if getattr(module, '__file__', None)))"
+        "print(*(name for name, module in sys.modules.items() if getattr(module, '__file__', "
+        "None)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True

@@ -43,8 +43,12 @@ def test_nearer_tests_come_first_among_those_that_take_as_long(graph: ImportGrap
 
 
 def test_a_name_that_a_package_passes_on_leads_to_its_file(graph: ImportGraph) -> None:
-    imports = graph.imports("tests/allocation/test_question.py")  # from finlab.allocation import Allocator
-    assert "finlab/allocation/allocator.py" in imports and "finlab/allocation/modes.py" not in imports
+    imports = graph.imports(
+        "tests/allocation/test_question.py"
+    )  # from finlab.allocation import Allocator
+    assert (
+        "finlab/allocation/allocator.py" in imports and "finlab/allocation/modes.py" not in imports
+    )
 
 
 def test_a_changed_test_file_runs_whole(graph: ImportGraph) -> None:
@@ -54,8 +58,13 @@ def test_a_changed_test_file_runs_whole(graph: ImportGraph) -> None:
 
 
 def test_faults_of_python_are_where_numbers_are_computed() -> None:
-    source = 'def f(a: tuple[int, 3]) -> float:\n    return min(a[0] - 1, -a[-1]) if a[0] < 2 else "-"\n'
-    made = {fault.applied(source).splitlines()[1].strip() for fault in PythonFile("f.py", source).faults()}
+    source = (
+        'def f(a: tuple[int, 3]) -> float:\n    return min(a[0] - 1, -a[-1]) if a[0] < 2 else "-"\n'
+    )
+    made = {
+        fault.applied(source).splitlines()[1].strip()
+        for fault in PythonFile("f.py", source).faults()
+    }
     assert 'return min(a[0] + 1, -a[-1]) if a[0] < 2 else "-"' in made
     assert 'return max(a[0] - 1, -a[-1]) if a[0] < 2 else "-"' in made
     assert 'return min(a[0] - 1, -a[-1]) if a[0] >= 2 else "-"' in made
@@ -74,6 +83,13 @@ static double last(const double *a, int n) {
 }
 """
     made = {fault.applied(source) for fault in c_faults("f.c", source)}
-    for line in ("sum[0] -= a[i]", "i < n - 1;", "n <= 2", "? sum[0]", "MIN(a[0], a[1])", "MAX(a[1], a[1])"):
+    for line in (
+        "sum[0] -= a[i]",
+        "i < n - 1;",
+        "n <= 2",
+        "? sum[0]",
+        "MIN(a[0], a[1])",
+        "MAX(a[1], a[1])",
+    ):
         assert any(line in text for text in made), line
     assert not any("a + b" in text or "(x) + 1" in text or "sum[2]" in text for text in made)

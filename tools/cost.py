@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What methods cost under exact tracking, over the best of many random starts: power in watts, or effort.
+"""What methods cost under exact tracking, over the best of many random starts: power in watts, or
+effort.
 
     python tools/cost.py --split id,limits --methods dual,mdn,sqp --layouts 3 --targets 1 --starts 8
 
@@ -56,8 +57,8 @@ def run(
     Args:
         split: names as in eval wrench, or all.
         methods: names as in eval wrench; those that can choose are given the objective,
-            others are compared in what they keep least. Of several splits each method answers those whose
-            robots it takes; where actuators are no fins power alone is compared.
+            others are compared in what they keep least. Of several splits each method answers those
+            whose robots it takes; where actuators are no fins power alone is compared.
         objectives: power, effort or both.
         layouts: of each split.
         targets: on each layout.
@@ -69,7 +70,9 @@ def run(
     check_names("split", names, SPLITS)
     check_names("objectives", objectives, UNITS)
     rows: list[Row] = []
-    kinds = {each: spec.choice.kind for each, spec in load_method_specs(methods, checkpoint).items()}
+    kinds = {
+        each: spec.choice.kind for each, spec in load_method_specs(methods, checkpoint).items()
+    }
     for name in names:
         cases = make_split(name, layouts, targets, seed)
         robot = cases[0].layout
@@ -96,7 +99,9 @@ def _rows(
     found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in specs}
     for case in progress(cases, "layout", f"{split}, {objective}"):
         sigma = sigma_of(case)
-        cost, error = _answers(yardstick(case.healthy, objective, starts), case, objective, sigma, seed)
+        cost, error = _answers(
+            yardstick(case.healthy, objective, starts), case, objective, sigma, seed
+        )
         best.append(np.where(error <= EXACT, cost, np.nan))
         for name, method in specs.items():
             found[name].append(_answers(method, case, objective, sigma))
@@ -104,18 +109,24 @@ def _rows(
     rows: list[Row] = []
     for name, parts in found.items():
         cost, error = (np.concatenate(part) for part in zip(*parts, strict=True))
-        about: Row = {"split": split, "objective": f"{objective} [{UNITS[objective]}]", "method": name}
+        about: Row = {
+            "split": split,
+            "objective": f"{objective} [{UNITS[objective]}]",
+            "method": name,
+        }
         rows.append(about | _figures(cost, error, np.concatenate(best), group))
     return rows
 
 
 def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
-    """Who finds the least cost of a robot's answers: IPOPT in the space of forces; of effort and of tables
-    SLSQP, from the pseudo-inverse's answer and twice as many random commands."""
+    """Who finds the least cost of a robot's answers: IPOPT in the space of forces; of effort and of
+    tables SLSQP, from the pseudo-inverse's answer and twice as many random commands."""
     tables = layout.is_of_fins and any(fin.model.type == "table" for fin in layout.fins)
     by_commands = tables or objective == "effort"
     method = load_method_spec("sqp" if by_commands else "ipopt", objective=objective)
-    return method.with_settings(n_starts=2 * starts if by_commands else starts, time_limit_s=PATIENCE_S)
+    return method.with_settings(
+        n_starts=2 * starts if by_commands else starts, time_limit_s=PATIENCE_S
+    )
 
 
 def _answers(
@@ -136,7 +147,11 @@ def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -
     tracked = error <= TRACKED
     known = np.isfinite(best)
     both = known & tracked
-    row: Row = {"n": len(cost), "solved_by_starts": int(known.sum()), "tracked": float(tracked.mean())}
+    row: Row = {
+        "n": len(cost),
+        "solved_by_starts": int(known.sum()),
+        "tracked": float(tracked.mean()),
+    }
     if not both.any():
         return row
     ratio = cost[both] / best[both]
@@ -152,7 +167,8 @@ def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -
 
 experiment = Experiment(
     name="cost",
-    question="What do answers cost over the best of many random starts, where both deliver the wrench?",
+    question="What do answers cost over the best of many random starts, where both deliver the "
+    "wrench?",
     columns=(
         Column("split", "split", "code"),
         Column("objective", "least"),
@@ -167,7 +183,8 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort and tables: "
+        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
+        "and tables: "
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
         f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
     ),

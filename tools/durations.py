@@ -1,9 +1,9 @@
 """Record how long tests take: a plugin of pytest that `make test-durations` loads.
 
-It writes `tests/durations.json`: processor seconds of each test, its set-up and the processes that it starts
-included, by its node id; of a function whose cases take less than a second together one number, by the
-function's. Processor time says the same on a busy machine.
-`tools/near_tests.py` chooses by it what fits into a minute.
+It writes `tests/durations.json`: processor seconds of each test, its set-up and the processes that
+it starts included, by its node id; of a function whose cases take less than a second together one
+number, by the function's. Processor time says the same on a busy machine. `tools/near_tests.py`
+chooses by it what fits into a minute.
 """
 
 import json
@@ -45,7 +45,8 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the file, where this is the process that started the others; functions that did not run stay."""
+    """Write the file, where this is the process that started the others; functions that did not run
+    stay."""
     if hasattr(session.config, "workerinput"):
         return
     sums = defaultdict[str, float](float)

@@ -1,7 +1,7 @@
 """Small faults that can be made in sources: signs, comparisons, bounds and indices.
 
-Python is read by its syntax tree. C is read by its tokens, outside of comments, strings, lines of the
-preprocessor and sizes of arrays.
+Python is read by its syntax tree. C is read by its tokens, outside of comments, strings, lines of
+the preprocessor and sizes of arrays.
 """
 
 import ast
@@ -95,7 +95,9 @@ class PythonFile:
         elif not _is_text(node.left) and not _is_text(node.right):
             yield from self._between(node.left, node.right, SIGNS, "sign")
 
-    def _between(self, left: ast.expr, right: ast.expr, others: dict[str, str], kind: str) -> Iterator[Fault]:
+    def _between(
+        self, left: ast.expr, right: ast.expr, others: dict[str, str], kind: str
+    ) -> Iterator[Fault]:
         """The fault of an operator that stands between two operands."""
         found = re.search(r"[-+<>=!]+", self.source[self.end(left) : self.start(right)])
         if found and found[0] in others:
@@ -117,20 +119,25 @@ class PythonFile:
 
 
 def _computing(tree: ast.Module) -> Iterator[ast.AST]:
-    """The nodes of a module but those of annotations and of `axis=`, where -1 is often another word for 1."""
+    """The nodes of a module but those of annotations and of `axis=`, where -1 is often another word
+    for 1."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
         yield node
         for field, value in ast.iter_fields(node):
-            if field in ("annotation", "returns") or (isinstance(node, ast.keyword) and node.arg == "axis"):
+            if field in ("annotation", "returns") or (
+                isinstance(node, ast.keyword) and node.arg == "axis"
+            ):
                 continue
             parts = value if isinstance(value, list) else [value]
             waiting += [part for part in parts if isinstance(part, ast.AST)]
 
 
 def _is_text(node: ast.expr) -> bool:
-    return isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
+    return isinstance(node, ast.JoinedStr) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
 
 
 def _other_index(index: int) -> int:
@@ -143,16 +150,21 @@ C_TOKEN = re.compile(
 )
 C_HIDDEN = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|^[ \t]*#(?:\\\n|[^\n])*', re.S | re.M)
 """Comments, strings and lines of the preprocessor."""
-C_TYPE = re.compile(r"(?:const|static|unsigned|int|char|void|double|float|size_t|real|wide|fl_\w+|struct)\b")
+C_TYPE = re.compile(
+    r"(?:const|static|unsigned|int|char|void|double|float|size_t|real|wide|fl_\w+|struct)\b"
+)
 """How a declaration begins."""
 OPERAND = re.compile(r"[\w\])]")
 """What the last character before a binary operator is."""
 
 
 def c_faults(file: str, source: str) -> Iterator[Fault]:
-    """Every fault that can be made in a C file, outside of comments, strings, macros and declared sizes."""
+    """Every fault that can be made in a C file, outside of comments, strings, macros and declared
+    sizes."""
     code = C_HIDDEN.sub(lambda hidden: re.sub(r"[^\n]", " ", hidden[0]), source)
-    tokens = [(found[0], found.start()) for found in C_TOKEN.finditer(code) if not found[0].isspace()]
+    tokens = [
+        (found[0], found.start()) for found in C_TOKEN.finditer(code) if not found[0].isspace()
+    ]
     loops = [(found.start(), found.end()) for found in re.finditer(r"\bfor \(.*?;.*?;", code, re.S)]
     for place, (token, start) in enumerate(tokens):
         end = start + len(token)
@@ -178,7 +190,8 @@ def c_faults(file: str, source: str) -> Iterator[Fault]:
 
 
 def _is_size(code: str, place: int) -> bool:
-    """Whether brackets in C hold a size or stand in `sizeof`: those of a name that is being declared."""
+    """Whether brackets in C hold a size or stand in `sizeof`: those of a name that is being
+    declared."""
     statement = re.split(r"[;(]|[{}]\s*\n", _without_calls(code[:place]))[-1].strip()
     if re.search(r"sizeof [^,]*$|\(\*\w*\)\[$", code[:place].rsplit("\n", 1)[-1]):
         return True
@@ -206,7 +219,9 @@ def _without_calls(code: str) -> str:
 def faults_of(root: Path, file: str) -> list[Fault]:
     """Every fault that can be made in a file, in the order of its text."""
     source = (root / file).read_text(encoding="utf-8")
-    return sorted(c_faults(file, source) if file.endswith(".c") else PythonFile(file, source).faults())
+    return sorted(
+        c_faults(file, source) if file.endswith(".c") else PythonFile(file, source).faults()
+    )
 
 
 def drawn_fault(root: Path, file: str, seed: int) -> Fault:
@@ -222,7 +237,9 @@ def drawn_faults(root: Path, count: int, seed: int) -> list[Fault]:
         ("finlab/core/src", "*.c", count // 2),
         ("finlab/allocation", "*.py", count - count // 2),
     ):
-        files = [path.relative_to(root).as_posix() for path in sorted((root / folder).rglob(pattern))]
+        files = [
+            path.relative_to(root).as_posix() for path in sorted((root / folder).rglob(pattern))
+        ]
         faults = [fault for file in files for fault in faults_of(root, file)]
         print(f"{len(faults)} places in {folder}", flush=True)
         chosen += source.sample(faults, share)

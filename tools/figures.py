@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Make the tables of figures in README.md and docs again: `make figures`, or `make figures PAGE=evaluation`.
+"""Make the tables of figures in README.md and docs again: `make figures`, or `make figures
+PAGE=evaluation`.
 
 A page holds a table between two marks,
 
     <!-- figures: NAME KEY... -->
     <!-- end of figures -->
 
-where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, and KEY... are
-the columns to show, by default all; OPTION=VALUE among them is an option in place of that of the quick
-report. What stands between the marks is replaced.
+where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, and
+KEY... are the columns to show, by default all; OPTION=VALUE among them is an option in place of
+that of the quick report. What stands between the marks is replaced.
 """
 
 import re
@@ -29,7 +30,9 @@ END = "<!-- end of figures -->"
 def main(names: list[str]) -> int:
     """Make the tables of the pages of these names, of all pages without any."""
     if unknown := [name for name in names if name not in PAGES]:
-        print(f"figures: expected pages among {', '.join(PAGES)}, got {unknown[0]!r}", file=sys.stderr)
+        print(
+            f"figures: expected pages among {', '.join(PAGES)}, got {unknown[0]!r}", file=sys.stderr
+        )
         return 2
     for page in [PAGES[name] for name in names or PAGES]:
         for mark, name, keys in re.findall(MARK, page.read_text(encoding="utf-8")):

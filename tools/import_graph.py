@@ -1,13 +1,16 @@
-"""Which file of the tree imports which, read from the sources: by it `tools/near_tests.py` measures nearness.
+"""Which file of the tree imports which, read from the sources: by it `tools/near_tests.py` measures
+nearness.
 
-A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go from a file
-to what it imports. What is not said by an import statement is found, too:
+A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go
+from a file to what it imports. What is not said by an import statement is found, too:
 
-- a name that a package only passes on leads to the file that defines it: `from finlab import Allocator` to
+- a name that a package only passes on leads to the file that defines it: `from finlab import
+Allocator` to
   `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
 - a module that is loaded by name, where its full name stands as a string;
 - a fixture, by the name of an argument, leads to its `conftest.py`;
-- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares its name
+- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares
+its name
   with a C file does the same work or calls it.
 """
 
@@ -47,7 +50,9 @@ class ImportGraph:
             self.file_of[module] = relative.as_posix()
             self.trees[relative.as_posix()] = ast.parse(path.read_text(encoding="utf-8"))
         core = sorted((root / CORE).rglob("*"))
-        self.c_files = [path.relative_to(root).as_posix() for path in core if path.suffix in (".c", ".h")]
+        self.c_files = [
+            path.relative_to(root).as_posix() for path in core if path.suffix in (".c", ".h")
+        ]
 
     @cached_property
     def importers(self) -> dict[str, set[str]]:
@@ -68,7 +73,8 @@ class ImportGraph:
     def distances(self, changed: Iterable[str]) -> dict[str, int]:
         """How many imports lie between each file and the nearest of some that were changed.
 
-        What tests share counts as a part of the test: an import of a helper in `tests` adds nothing.
+        What tests share counts as a part of the test: an import of a helper in `tests` adds
+        nothing.
         """
         found = dict.fromkeys(changed, 0)
         waiting = deque(found)
@@ -111,8 +117,8 @@ class ImportGraph:
         return {self.file_of[module]} if module in self.file_of else set()
 
     def _named(self, module: str, name: str) -> set[str]:
-        """Files that `from module import name` needs: the module, and where it only passes the name on, the
-        file that defines it."""
+        """Files that `from module import name` needs: the module, and where it only passes the name
+        on, the file that defines it."""
         found = self._module(module) | self._module(f"{module}.{name}")
         if module not in self.file_of or f"{module}.{name}" in self.file_of:
             return found
@@ -131,12 +137,14 @@ class ImportGraph:
         return found
 
     def _loaded(self, text: str) -> set[str]:
-        """Files of a string that is a module's full name; of one that ends in a dot, such as the beginning of
-        `f"finlab.cli.{verb}"`, all modules in that package."""
+        """Files of a string that is a module's full name; of one that ends in a dot, such as the
+        beginning of `f"finlab.cli.{verb}"`, all modules in that package."""
         if not text.startswith(("finlab.", "webapp.")):
             return set()
         if text.endswith("."):
-            return {path for name, path in self.file_of.items() if name.rpartition(".")[0] == text[:-1]}
+            return {
+                path for name, path in self.file_of.items() if name.rpartition(".")[0] == text[:-1]
+            }
         return self._module(text)
 
     @staticmethod

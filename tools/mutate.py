@@ -3,18 +3,18 @@
 
     python tools/mutate.py --seed 1 --count 60
 
-Faults are drawn by the seed from all places of `finlab/core/src` and `finlab/allocation` where one of these
-can be made (`tools/faults.py`), half of them in C and half in Python:
+Faults are drawn by the seed from all places of `finlab/core/src` and `finlab/allocation` where one
+of these can be made (`tools/faults.py`), half of them in C and half in Python:
 
 - sign: plus for minus, minus for plus, or a minus left out;
 - comparison: its opposite, such as `>=` for `<`;
 - bound: the least for the greatest of two, or a loop that ends one step early;
 - index: another element, such as `[1]` for `[0]`.
 
-Each is made in a copy of the tree, whose core is compiled again where the fault is in C, and the tests that
-`tools/near_tests.py` chooses for the file run until one fails. A test that hangs and a process that dies have
-found the fault, too. What is printed as missed is to be read: some faults change no behaviour, such as that
-of a bound that is never met.
+Each is made in a copy of the tree, whose core is compiled again where the fault is in C, and the
+tests that `tools/near_tests.py` chooses for the file run until one fails. A test that hangs and a
+process that dies have found the fault, too. What is printed as missed is to be read: some faults
+change no behaviour, such as that of a bound that is never met.
 """
 
 import argparse
@@ -44,8 +44,14 @@ from tools.near_tests import ROOT, SECONDS, by_file, near_tests, one_thread, pyt
 HANG = 100
 """Seconds after which one test counts as hung."""
 LOADED = ("numpy", "scipy.optimize", "scipy.linalg", "hypothesis", "pytest")
-"""What tests import that no fault changes: a process loads it once, and each fault begins from there."""
-LOADED_FOR_C = ("finlab.allocation.dual.method", "finlab.cli", "finlab.analysis.authority", "finlab.fit")
+"""What tests import that no fault changes: a process loads it once, and each fault begins from
+there."""
+LOADED_FOR_C = (
+    "finlab.allocation.dual.method",
+    "finlab.cli",
+    "finlab.analysis.authority",
+    "finlab.fit",
+)
 """What no fault in C changes besides."""
 
 
@@ -59,7 +65,9 @@ class Worker:
             folder: where to, a folder that is not there yet.
             objects: what the C files of the core are compiled to, without a fault.
         """
-        skipped = shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "runs", "test-results")
+        skipped = shutil.ignore_patterns(
+            ".*", "__pycache__", "build", "dist", "runs", "test-results"
+        )
         shutil.copytree(ROOT, folder, ignore=skipped)
         environment = one_thread() | {"PYTHONPATH": str(folder)}
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -92,7 +100,8 @@ class Worker:
 
 
 def work(objects: Path) -> None:
-    """What the process of a `Worker` does: a fault comes in a line, and what finds it goes out in one."""
+    """What the process of a `Worker` does: a fault comes in a line, and what finds it goes out in
+    one."""
     for name in LOADED:
         import_module(name)
     library = Path(next((ROOT / "finlab" / "core").glob("libfinlab.*")))
@@ -104,7 +113,11 @@ def work(objects: Path) -> None:
         source = path.read_text(encoding="utf-8")
         path.write_text(fault.applied(source), encoding="utf-8")
         is_built = path.suffix != ".c" or built(path, objects, library)
-        found = failure(words, LOADED_FOR_C if path.suffix == ".c" else ()) if is_built else "the compiler"
+        found = (
+            failure(words, LOADED_FOR_C if path.suffix == ".c" else ())
+            if is_built
+            else "the compiler"
+        )
         path.write_text(source, encoding="utf-8")
         if path.suffix == ".c":
             library.unlink()
@@ -117,7 +130,15 @@ def work(objects: Path) -> None:
 def compiled(path: Path, made: Path) -> bool:
     """Compiles one C file to an object file; returns whether the compiler took it."""
     flags = [flag for flag in FLAGS if flag != "-shared"]
-    command = [*target()[0], *flags, f"-I{ROOT / 'finlab' / 'core'}", "-c", str(path), "-o", str(made)]
+    command = [
+        *target()[0],
+        *flags,
+        f"-I{ROOT / 'finlab' / 'core'}",
+        "-c",
+        str(path),
+        "-o",
+        str(made),
+    ]
     return subprocess.run(command, capture_output=True).returncode == 0
 
 
@@ -134,10 +155,19 @@ def built(path: Path, objects: Path, library: Path) -> bool:
 
 
 def failure(words: list[str], loaded: tuple[str, ...]) -> str:
-    """The first of some tests that fails, or what is said where a process dies; nothing where all pass."""
+    """The first of some tests that fails, or what is said where a process dies; nothing where all
+    pass."""
     for name in loaded:
         import_module(name)
-    options = ["-x", "-q", "--tb=no", "-o", f"faulthandler_timeout={HANG}", "-p", "no:cacheprovider"]
+    options = [
+        "-x",
+        "-q",
+        "--tb=no",
+        "-o",
+        f"faulthandler_timeout={HANG}",
+        "-p",
+        "no:cacheprovider",
+    ]
     with tempfile.TemporaryFile("w+") as output:
         child = os.fork()
         if child == 0:
@@ -177,7 +207,8 @@ def judged(faults: list[Fault], jobs: int, seconds: float) -> Iterator[tuple[Fau
     """
     graph = ImportGraph(ROOT)
     words = {
-        file: pytest_words(by_file(near_tests(graph, [file], seconds))) for file in {f.file for f in faults}
+        file: pytest_words(by_file(near_tests(graph, [file], seconds)))
+        for file in {f.file for f in faults}
     }
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         objects = Path(folder) / "objects"
@@ -210,7 +241,9 @@ def main() -> int:
     parser.add_argument("--files", nargs="*", help="draw one fault in each of these files instead")
     parser.add_argument("--only", type=int, nargs="*", help="numbers of faults; by default all")
     parser.add_argument("--jobs", type=int, default=2, help="faults that are tried at once")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of near tests, as they were timed")
+    parser.add_argument(
+        "--seconds", type=float, default=SECONDS, help="of near tests, as they were timed"
+    )
     parser.add_argument("--list", action="store_true", help="print the faults and make none")
     parser.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -222,9 +255,14 @@ def main() -> int:
     else:
         faults = drawn_faults(ROOT, options.count, options.seed)
     numbered = dict(enumerate(faults))
-    numbers = sorted(options.only or numbered, key=lambda number: numbered[number].file.endswith(".c"))
+    numbers = sorted(
+        options.only or numbered, key=lambda number: numbered[number].file.endswith(".c")
+    )
     wanted = {number: numbered[number] for number in numbers}
-    shown = {number: fault.shown((ROOT / fault.file).read_text("utf-8")) for number, fault in wanted.items()}
+    shown = {
+        number: fault.shown((ROOT / fault.file).read_text("utf-8"))
+        for number, fault in wanted.items()
+    }
     if options.list:
         print(*(f"{number} {text}" for number, text in shown.items()), sep="\n")
         return 0
@@ -232,7 +270,10 @@ def main() -> int:
     for number, (_, found) in zip(
         wanted, judged(list(wanted.values()), options.jobs, options.seconds), strict=True
     ):
-        print(f"{number} {shown[number]}\n    {'found by ' + found if found else 'MISSED'}", flush=True)
+        print(
+            f"{number} {shown[number]}\n    {'found by ' + found if found else 'MISSED'}",
+            flush=True,
+        )
         if not found:
             missed.append(number)
     print(f"{len(wanted) - len(missed)} of {len(wanted)} faults were found; missed:", *missed)

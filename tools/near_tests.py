@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""Run the tests near a change: `make test-near`, or `tools/near_tests.py [PATH...] [-- PYTEST OPTIONS]`.
+"""Run the tests near a change: `make test-near`, or `tools/near_tests.py [PATH...] [-- PYTEST
+OPTIONS]`.
 
-The change is what differs from the branch `main` (from the last commit while on it) and what git does not
-track yet, or the paths that are given.
+The change is what differs from the branch `main` (from the last commit while on it) and what git
+does not track yet, or the paths that are given.
 
 Near is a test whose file imports a changed file, and nearer the fewer imports lie between the two
-(`tools/import_graph.py`). Of a changed file that no import names, such as a table or a style sheet, the files
-in its folder count as changed. Tests that are called after a changed file, and those in the folder of tests
-that mirrors its package, are nearer than their imports say.
+(`tools/import_graph.py`). Of a changed file that no import names, such as a table or a style sheet,
+the files in its folder count as changed. Tests that are called after a changed file, and those in
+the folder of tests that mirrors its package, are nearer than their imports say.
 
-Of near tests so many are run as fit into a minute on two cores, by what each took when `make test-durations`
-was last run: the quicker and the nearer one first. A test file that was changed itself runs whole.
+Of near tests so many are run as fit into a minute on two cores, by what each took when `make
+test-durations` was last run: the quicker and the nearer one first. A test file that was changed
+itself runs whole.
 """
 
 import argparse
@@ -32,7 +34,8 @@ DURATIONS = ROOT / "tests" / "durations.json"
 LEFT_OUT = ("tests/browser/", "tests/packaging/")
 """Tests of the whole, which run where they were changed themselves."""
 SECONDS = 80.0
-"""Sum of the recorded seconds of what is run, by two processes; start and collection take the rest."""
+"""Sum of the recorded seconds of what is run, by two processes; start and collection take the
+rest."""
 UNKNOWN = 0.5
 """Seconds of a test that was never timed."""
 QUICK = 0.1
@@ -100,23 +103,44 @@ def main() -> int:
         return 0
     total = sum(test.seconds for test in tests)
     files = {test.file for test in tests}
-    print(f"{len(tests)} tests in {len(files)} files are near; they took {total:.0f} s when they were timed")
-    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *argv[split + 1 :]]
-    return subprocess.run([*command, *pytest_words(by_halves(tests))], cwd=ROOT, env=one_thread()).returncode
+    print(
+        f"{len(tests)} tests in {len(files)} files are near; they took {total:.0f} s when they "
+        "were timed"
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "2",
+        "--dist",
+        "worksteal",
+        *argv[split + 1 :],
+    ]
+    return subprocess.run(
+        [*command, *pytest_words(by_halves(tests))], cwd=ROOT, env=one_thread()
+    ).returncode
 
 
 def one_thread() -> dict[str, str]:
     """The environment, with one thread for each process."""
-    return os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    return os.environ | dict.fromkeys(
+        ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
+    )
 
 
 def pytest_words(tests: list[NearTest]) -> list[str]:
-    """What pytest is told to run tests: their functions in this order, and which timed cases to leave out."""
+    """What pytest is told to run tests: their functions in this order, and which timed cases to
+    leave out."""
     chosen = {test.node for test in tests}
     functions = list(dict.fromkeys(node.split("[")[0] for node in (test.node for test in tests)))
     left_out = [name for name in durations() if "[" in name and name not in chosen]
     wanted = set(functions)
-    return [*functions, *(f"--deselect={name}" for name in left_out if name.split("[")[0] in wanted)]
+    return [
+        *functions,
+        *(f"--deselect={name}" for name in left_out if name.split("[")[0] in wanted),
+    ]
 
 
 def by_file(tests: list[NearTest]) -> list[NearTest]:
@@ -129,8 +153,8 @@ def by_file(tests: list[NearTest]) -> list[NearTest]:
 def by_halves(tests: list[NearTest]) -> list[NearTest]:
     """Tests in the order in which two processes take them.
 
-    Each begins with one half of what it is told, so every second test file is put into the second half: the
-    nearest come first in both. Slow tests come after all others.
+    Each begins with one half of what it is told, so every second test file is put into the second
+    half: the nearest come first in both. Slow tests come after all others.
     """
     files = list(dict.fromkeys(test.file for test in tests))
     halves = [[test for test in tests if test.file in half] for half in (files[::2], files[1::2])]
@@ -140,7 +164,9 @@ def by_halves(tests: list[NearTest]) -> list[NearTest]:
 def changed_files() -> list[str]:
     """Paths that differ from where this branch left `main`, and those that git does not track."""
     base = git("merge-base", "HEAD", "main") or ["HEAD"]
-    return sorted({*git("diff", "--name-only", base[0]), *git("ls-files", "--others", "--exclude-standard")})
+    return sorted(
+        {*git("diff", "--name-only", base[0]), *git("ls-files", "--others", "--exclude-standard")}
+    )
 
 
 def git(*words: str) -> list[str]:
@@ -176,7 +202,8 @@ def near_tests(graph: ImportGraph, changed: list[str], seconds: float = SECONDS)
                 names = cases.get(f"{file}::{node.name}", [node.name])
                 took = [known.get(f"{file}::{name}", UNKNOWN) for name in names]
                 found += [
-                    NearTest(file, *each) for each in zip(names, [distance] * len(names), took, strict=True)
+                    NearTest(file, *each)
+                    for each in zip(names, [distance] * len(names), took, strict=True)
                 ]
     chosen = list[NearTest]()
     files = set[str]()
@@ -197,7 +224,8 @@ def durations() -> dict[str, float]:
 
 
 def sources_of(graph: ImportGraph, path: str) -> list[str]:
-    """The files of the graph that a changed path stands for: itself, or those in its folder or above it."""
+    """The files of the graph that a changed path stands for: itself, or those in its folder or
+    above it."""
     if path in graph.trees or path in graph.c_files:
         return [path]
     for folder in Path(path).parents:
@@ -213,8 +241,9 @@ def is_test_file(file: str) -> bool:
 
 
 def kinship(test: str, source: str) -> int:
-    """The distance of a test file that its name and its folder say: where its folder mirrors that of the
-    changed file 0 if it is called after it and FOLDER if not, elsewhere 99; of C files see CALLS_THE_CORE."""
+    """The distance of a test file that its name and its folder say: where its folder mirrors that
+    of the changed file 0 if it is called after it and FOLDER if not, elsewhere 99; of C files see
+    CALLS_THE_CORE."""
     if source.endswith((".c", ".h")):
         called = [far for place, far in CALLS_THE_CORE.items() if Path(test).is_relative_to(place)]
         return min(called, default=99)

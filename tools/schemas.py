@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The published JSON Schemas, made of the types that files are read with: `make schemas` writes them."""
+"""The published JSON Schemas, made of the types that files are read with: `make schemas` writes
+them."""
 
 import json
 from pathlib import Path
@@ -20,7 +21,10 @@ def schemas() -> dict[Path, str]:
     }
     texts = {}
     for name, (title, kind) in kinds.items():
-        head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"{title}.schema.json"}
+        head = {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "$id": f"{title}.schema.json",
+        }
         texts[PACKAGE / name] = (
             json.dumps({**head, "title": title, **msgspec.json.schema(kind)}, indent=1) + "\n"
         )

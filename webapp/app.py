@@ -24,7 +24,8 @@ STORAGE_KEY = "finlab-sessions"
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
 REST_S = 3.0
-"""How long after a page has gone its memory is given back [s]; once for all that go in that time."""
+"""How long after a page has gone its memory is given back [s]; once for all that go in that
+time."""
 PRESENT_S = (1.0, 1.0)
 """The same for a page whose work another one asks for: it may be gone without a word."""
 MAX_KEYS = 8
@@ -43,8 +44,9 @@ class SessionStore:
         self._left: dict[str, float] = {}
 
     def enter(self, keys: Iterable[str]) -> tuple[str, Session]:
-        """The session for a tab, and its key. Of the `keys` that this browser remembers, and that no other
-        tab shows, the one left last is taken: a reload finds its work again, a second tab gets its own."""
+        """The session for a tab, and its key. Of the `keys` that this browser remembers, and that
+        no other tab shows, the one left last is taken: a reload finds its work again, a second tab
+        gets its own."""
         self._forget()
         free = [k for k in keys if k in self._sessions and k not in self._open]
         key = max(free, key=lambda k: self._left.get(k, 0.0), default="")
@@ -62,7 +64,8 @@ class SessionStore:
         self._forget()
 
     def _forget(self) -> None:
-        """Of the sessions without a page, those left longest ago are forgotten: too many, or too old."""
+        """Of the sessions without a page, those left longest ago are forgotten: too many, or too
+        old."""
         now = time.monotonic()
         waiting = sorted(
             (key for key in self._sessions if key not in self._open),
@@ -79,7 +82,11 @@ class App:
     """Connects browsers to sessions on a running viser server."""
 
     def __init__(
-        self, server: viser.ViserServer, solver: Solver, layout: Layout, display: Display | None = None
+        self,
+        server: viser.ViserServer,
+        solver: Solver,
+        layout: Layout,
+        display: Display | None = None,
     ) -> None:
         """Take over a server; a new session opens a `layout`, and looks as `display` says."""
         self._server = server
@@ -92,7 +99,8 @@ class App:
         self._door = asyncio.Lock()
         self._giving: asyncio.TimerHandle | None = None
         server.scene.world_axes.visible = False
-        # With the first words to a browser: it would else draw its own light and shadows before ours.
+        # With the first words to a browser: it would else draw its own light and shadows before
+        # ours.
         server.scene.configure_environment_map(None)
         server.scene.configure_default_lights(cast_shadow=False)
         disable_sharing(server)
@@ -103,22 +111,28 @@ class App:
     def stop(self) -> None:
         """Stop clock and threads; the server is stopped by its owner."""
         self._clock.cancel()
-        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that it ends
+        with contextlib.suppress(
+            TimeoutError, RuntimeError
+        ):  # one turn of the loop, so that it ends
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
         self._pools.stop()
 
     async def _connected(self, client: viser.ClientHandle) -> None:
-        """Wait for the page to say which sessions it knows; one that says nothing is dropped in time."""
+        """Wait for the page to say which sessions it knows; one that says nothing is dropped in
+        time."""
         try:
             remembered = _session_keys(await stored(client, STORAGE_KEY, PATIENCE_S))
         except TimeoutError:
             return
         except RuntimeError:  # a browser that forbids storage
             remembered = []
-        # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
+        # A connection that broke may still count as open; its tab is perhaps the one that is coming
+        # back.
         rivals = [known for known, key in self._keys.items() if key in remembered]
         await asyncio.gather(*(self._drop_if_gone(rival) for rival in rivals))
-        async with self._door:  # one at a time: a page takes its time, and all others are heard in between
+        async with (
+            self._door
+        ):  # one at a time: a page takes its time, and all others are heard in between
             if client.client_id in self._server.get_clients():
                 self._open(client, remembered)
             await asyncio.sleep(0.0)
@@ -153,7 +167,8 @@ class App:
             self._giving = self._loop.call_later(REST_S, self._give_back)
 
     def _give_back(self) -> None:
-        """A page is full of references in circles, and what it took would else stay with the process."""
+        """A page is full of references in circles, and what it took would else stay with the
+        process."""
         self._giving = None
         gc.collect()
         with contextlib.suppress(AttributeError, OSError):  # glibc alone has it
@@ -176,4 +191,6 @@ def _session_keys(text: str | None) -> list[str]:
         keys = json.loads(text or "[]")
     except (ValueError, RecursionError):
         return []
-    return [key for key in keys if isinstance(key, str)][:MAX_KEYS] if isinstance(keys, list) else []
+    return (
+        [key for key in keys if isinstance(key, str)][:MAX_KEYS] if isinstance(keys, list) else []
+    )

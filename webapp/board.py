@@ -1,4 +1,5 @@
-"""The board of a page: properties of handles are declared as functions of facts, made when these change.
+"""The board of a page: properties of handles are declared as functions of facts, made when these
+change.
 
 A function names the facts that it is made of as its parameters: `lambda layout, saved: ...`.
 """
@@ -24,13 +25,18 @@ UNKNOWN = object()
 class Rule:
     """One property of a handle, or whatever else is done when facts change."""
 
-    def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
-        """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
+    def __init__(
+        self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = ""
+    ) -> None:
+        """`make` gives the value of the property `key`; where there is no handle, it does all
+        itself."""
         self.group = group
         self.make = make
         self.handle = handle
         self.key = key
-        self.names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
+        self.names = [
+            p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty
+        ]
         self.is_due = True
         self.last = UNKNOWN
 
@@ -53,7 +59,8 @@ class Group:
     """Rules that stand or fall together, and wait while nobody can see what they show."""
 
     def __init__(self, fail: Fail, fault: Callable[[Exception], None]) -> None:
-        """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears why."""
+        """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears
+        why."""
         self.rules: list[Rule] = []
         self.there = True
         self.is_due = True
@@ -99,8 +106,8 @@ class Board:
         """What the view shows soon."""
 
     def group(self, fail: Fail = lambda _: None, is_view: bool = False) -> Group:
-        """Rules that are declared from now on belong to a group; groups are written in their order, that of
-        the view by `draw`."""
+        """Rules that are declared from now on belong to a group; groups are written in their order,
+        that of the view by `draw`."""
         self.groups.append(Group(fail, self._fault))
         if is_view:
             self.view = self.groups[-1]
@@ -113,7 +120,8 @@ class Board:
         return handle
 
     def act(self, make: Callable[..., None], *handles: Any) -> None:
-        """Call a function of facts whenever these change, or a user has changed one of the `handles`."""
+        """Call a function of facts whenever these change, or a user has changed one of the
+        `handles`."""
         rule = self._declare(make)
         for handle in handles:
             self._of_handle.setdefault(id(handle), []).append(rule)

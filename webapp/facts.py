@@ -12,8 +12,9 @@ from webapp.tasks.slot import Slot
 
 
 def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale) -> Facts:
-    """The facts of a session and of what has been worked out for it, and of the view: what is `seen` of the
-    newest answer, the place of the actuator that is `dragged`, and the scale of arrows."""
+    """The facts of a session and of what has been worked out for it, and of the view: what is
+    `seen` of the newest answer, the place of the actuator that is `dragged`, and the scale of
+    arrows."""
     state = session.state
     swimming = jobs.swimming
     swimmer = jobs.swimming.swimmer

@@ -1,4 +1,5 @@
-"""The guard of the server: it lets in pages of its own, from beyond this machine only with the token."""
+"""The guard of the server: it lets in pages of its own, from beyond this machine only with the
+token."""
 
 import hmac
 import secrets
@@ -16,8 +17,8 @@ from websockets.http11 import Response
 COOKIE = "finlab-token"
 """Cookie that carries the token once the page has been opened with it."""
 SECURE = {
-    # The page is one file with its scripts inside; it evaluates those that the server sends, starts workers
-    # from texts, and opens nothing elsewhere.
+    # The page is one file with its scripts inside; it evaluates those that the server sends, starts
+    # workers from texts, and opens nothing elsewhere.
     "Content-Security-Policy": (
         "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
         "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
@@ -55,8 +56,8 @@ class Guard:
         return Guard(host, None if is_loopback(host) else secrets.token_urlsafe(18))
 
     def check(self, path: str, headers: dict[str, str]) -> Response | None:
-        """What to answer a request that is not let through, or that brings the token along; else None.
-        `path` has the query, `headers` names in lower case."""
+        """What to answer a request that is not let through, or that brings the token along; else
+        None. `path` has the query, `headers` names in lower case."""
         host = headers.get("host", "").lower()
         origin = headers.get("origin")
         if is_loopback(self.host) and not is_loopback(_name(host)):
@@ -71,7 +72,9 @@ class Guard:
             return answer(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
         if self._is_token(_cookie(headers.get("cookie", ""))):
             return None
-        return answer(HTTPStatus.UNAUTHORIZED, "Open the address with the token that finlab app printed.\n")
+        return answer(
+            HTTPStatus.UNAUTHORIZED, "Open the address with the token that finlab app printed.\n"
+        )
 
     def _is_token(self, text: str) -> bool:
         return self.token is not None and hmac.compare_digest(
@@ -79,7 +82,9 @@ class Guard:
         )
 
 
-def answer(status: HTTPStatus, text: str, headers: Mapping[str, str] = MappingProxyType({})) -> Response:
+def answer(
+    status: HTTPStatus, text: str, headers: Mapping[str, str] = MappingProxyType({})
+) -> Response:
     """A page of plain text."""
     body = text.encode()
     own = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), **headers}

@@ -1,4 +1,5 @@
-"""Inputs of the page, and words in its own markup that can be pressed (their other half is `presses.js`)."""
+"""Inputs of the page, and words in its own markup that can be pressed (their other half is
+`presses.js`)."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -21,8 +22,8 @@ def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
 
 
 def put(handle: Any, **values: Any) -> None:
-    """Set those properties of a handle that differ, so that an unchanged page gets no message; content not
-    marked as markup is text."""
+    """Set those properties of a handle that differ, so that an unchanged page gets no message;
+    content not marked as markup is text."""
     for key, value in values.items():
         if key == "content":
             value = str(escape(value))
@@ -33,8 +34,8 @@ def put(handle: Any, **values: Any) -> None:
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
-    """Call `act(value)` on the loop when the user, not we, changes an input; a value of another kind than the
-    input's own is not from our page: it goes back to what it held last."""
+    """Call `act(value)` on the loop when the user, not we, changes an input; a value of another
+    kind than the input's own is not from our page: it goes back to what it held last."""
     honest = handle.value
     buttons = isinstance(handle, viser.GuiButtonGroupHandle)
 
@@ -68,7 +69,8 @@ def _alike(known: Any, value: Any) -> bool:
 MAX_MESSAGE = 100_000
 """Longest message of the page that is read; a link with a design is the longest honest one."""
 HEARD_S = 0.1
-"""When a page is told that it was heard [s]: a script would hold up the answer until the next picture."""
+"""When a page is told that it was heard [s]: a script would hold up the answer until the next
+picture."""
 KINDS = [int, str, str, str]
 """Number, kind, key and text of a word."""
 
@@ -77,7 +79,8 @@ Act = Callable[[str, str], object]
 
 
 def press(kind: str, key: str) -> str:
-    """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
+    """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was
+    held."""
     return html("data-press='{}' data-key='{}'", kind, key)
 
 
@@ -96,7 +99,9 @@ def placed(key: str, count: int) -> int:
 class Presses:
     """All of one page."""
 
-    def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None], bell: Bell) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None], bell: Bell
+    ) -> None:
         """Listen to the page; `do` carries out what was meant."""
         self._gui = gui
         self._do = do
@@ -141,8 +146,8 @@ class Presses:
 
 
 class Asking:
-    """The question of one page to its user, on a card over the view that `cards.js` draws; a newer one takes
-    its place."""
+    """The question of one page to its user, on a card over the view that `cards.js` draws; a newer
+    one takes its place."""
 
     def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
         self._gui = gui
@@ -151,8 +156,8 @@ class Asking:
         run_file(gui, "cards.js")
 
     def ask(self, title: str, text: str, answers: Mapping[str, Callable[[], object]]) -> None:
-        """Show a title, a sentence, and a button for each answer that does something; another one leaves all
-        as it is."""
+        """Show a title, a sentence, and a button for each answer that does something; another one
+        leaves all as it is."""
         self._acts = list(answers.values())
         card = json.dumps([title, text, [*answers, "Cancel"]])
         run_script(self._gui, f"finlabCards.ask(...{card});")

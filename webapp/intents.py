@@ -13,7 +13,8 @@ from webapp.theme import BLUE, VERMILLION
 
 
 class Intents:
-    """Carries out intents; nothing else changes a session. What came of it is written when the page wakes.
+    """Carries out intents; nothing else changes a session. What came of it is written when the page
+    wakes.
 
     Everything here is called on viser's event loop.
     """
@@ -29,11 +30,12 @@ class Intents:
         self.doubted: list[Any] = []
         """Handles that a user has changed: the session may have refused it."""
         self.is_distrusted = False
-        """Whether something went wrong since the page was written: nothing that was drawn is trusted."""
+        """Whether something went wrong since the page was written: nothing that was drawn is
+        trusted."""
 
     def do(self, act: Callable[[], object], handle: Any = None) -> None:
-        """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal becomes a
-        note, and the page goes back to what the session holds."""
+        """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal
+        becomes a note, and the page goes back to what the session holds."""
         self._faults.clear()
         try:
             act()
@@ -51,7 +53,9 @@ class Intents:
         if self._note is not None:
             self._note.remove()
         color = BLUE if calm else VERMILLION
-        self._note = self._client.add_notification(title, in_app(body), auto_close_seconds=8.0, color=color)
+        self._note = self._client.add_notification(
+            title, in_app(body), auto_close_seconds=8.0, color=color
+        )
 
     def fault(self, error: Exception) -> None:
         """An error of our own is reported, once however often the page is written."""

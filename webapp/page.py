@@ -23,7 +23,9 @@ from webapp.tasks.jobs import Jobs
 from webapp.tasks.slot import Deferred
 from webapp.viser_internals import hold_uploads, run_script, uuid_of
 
-BEGIN = "What is its first actuator? Add others in the list; it can be deleted once there is another."
+BEGIN = (
+    "What is its first actuator? Add others in the list; it can be deleted once there is another."
+)
 
 Input = TypeVar("Input")
 
@@ -49,7 +51,10 @@ class Page:
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(self.presses)
         self.new = partial(
-            self.ask, "New design", BEGIN, {k.capitalize(): partial(self.designs.new, k) for k in KINDS}
+            self.ask,
+            "New design",
+            BEGIN,
+            {k.capitalize(): partial(self.designs.new, k) for k in KINDS},
         )
         """Asks what a new design begins with."""
         hold_uploads(client.gui, LARGEST_BUNDLE, partial(intents.notify, "Not possible"))
@@ -63,18 +68,24 @@ class Page:
         """Carry out `act(value)` when the user changes an input."""
         on_user_change(handle, lambda value: self.do(partial(act, value), handle))
 
-    def bind(self, handle: Input, act: Callable[[Any], object], value: Callable[..., object]) -> Input:
-        """An input that carries out `act(value)` when the user changes it, and else shows `value` of the
-        facts."""
+    def bind(
+        self, handle: Input, act: Callable[[Any], object], value: Callable[..., object]
+    ) -> Input:
+        """An input that carries out `act(value)` when the user changes it, and else shows `value`
+        of the facts."""
         self.on_change(handle, act)
         self.board.show(handle, value=value)
         return handle
 
     def bind_number(
-        self, handle: Input, act: Callable[[Any], object], value: Callable[..., Any], digits: int = 4
+        self,
+        handle: Input,
+        act: Callable[[Any], object],
+        value: Callable[..., Any],
+        digits: int = 4,
     ) -> Input:
-        """A slider, number or vector; `digits` are shown behind the point. What the page only shows rounded
-        stays as exact as it is."""
+        """A slider, number or vector; `digits` are shown behind the point. What the page only shows
+        rounded stays as exact as it is."""
 
         exact: Any = None
 
@@ -95,12 +106,18 @@ class Page:
         handle.precision = digits  # type: ignore[attr-defined]
         return self.bind(handle, meant, shown)
 
-    def add_html(self, content: Callable[..., str], **made: Callable[..., object]) -> viser.GuiHtmlHandle:
+    def add_html(
+        self, content: Callable[..., str], **made: Callable[..., object]
+    ) -> viser.GuiHtmlHandle:
         """Markup, and what else of it is a function of facts."""
-        handle: viser.GuiHtmlHandle = self.board.show(self.gui.add_html(""), content=content, **made)
+        handle: viser.GuiHtmlHandle = self.board.show(
+            self.gui.add_html(""), content=content, **made
+        )
         return handle
 
-    def add_button(self, label: str, act: Callable[[], object], **options: Any) -> viser.GuiButtonHandle:
+    def add_button(
+        self, label: str, act: Callable[[], object], **options: Any
+    ) -> viser.GuiButtonHandle:
         """A button that carries out an intent; `options` as viser has them."""
         button = self.gui.add_button(label, **options)
         self._hear(button, button.on_click, lambda _: act())
@@ -114,9 +131,11 @@ class Page:
         self._hear(button, button.on_upload, lambda file: act(file.name[-80:], file.content))
         return button
 
-    def _hear(self, button: Any, listen: Callable[..., object], act: Callable[[Any], object]) -> None:
-        """Carry out `act(value)` when a button is pressed, and let the page show its hint: viser shows those
-        of other inputs alone."""
+    def _hear(
+        self, button: Any, listen: Callable[..., object], act: Callable[[Any], object]
+    ) -> None:
+        """Carry out `act(value)` when a button is pressed, and let the page show its hint: viser
+        shows those of other inputs alone."""
 
         async def pressed(event: Any) -> None:
             if event.client is not None:

@@ -1,4 +1,5 @@
-"""Colours and sizes of everything that is drawn: the Okabe-Ito palette, safe for colour-blind eyes."""
+"""Colours and sizes of everything that is drawn: the Okabe-Ito palette, safe for colour-blind
+eyes."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -41,11 +42,15 @@ FIN_COLORS: tuple[Rgb, ...] = (
     (186, 206, 70),  # lime
     (122, 62, 140),  # plum
 )
-"""One colour per fin, in order. None is near blue, green or vermillion: those hues are reserved for what is
-asked, delivered and missing."""
+"""One colour per fin, in order. None is near blue, green or vermillion: those hues are reserved for
+what is asked, delivered and missing."""
 
 MODE_COLORS: tuple[Rgb, ...] = (
-    (92, 92, 196),  # indigo, teal, wine, olive, ...: after Paul Tol's "muted" set, told apart by every eye,
+    (
+        92,
+        92,
+        196,
+    ),  # indigo, teal, wine, olive, ...: after Paul Tol's "muted" set, told apart by every eye,
     (52, 152, 134),  # with the dark ones lightened, so that they can be seen on both themes
     (184, 66, 122),
     (148, 144, 44),
@@ -58,8 +63,9 @@ MODE_COLORS: tuple[Rgb, ...] = (
 
 @dataclass(frozen=True)
 class Look:
-    """What differs between the light and the dark theme: the water at the top and bottom of the view, fine
-    and strong lines of the floor, the hull, the window that marks the bow, shafts and struts, thin lines."""
+    """What differs between the light and the dark theme: the water at the top and bottom of the
+    view, fine and strong lines of the floor, the hull, the window that marks the bow, shafts and
+    struts, thin lines."""
 
     water_top: Rgb
     water_bottom: Rgb

@@ -1,10 +1,10 @@
 """One browser: state, questions, answers, and the page that is written of them, in one loop.
 
-browser   a widget changes            viser calls `Intents.do` on the event loop
-loop      the session changes         nothing else ever changes it
-loop      `Jobs.ask`                  what can be seen is asked; what was asked already costs nothing
-thread    `solve(question)`           pure: it knows no widget, no session, no loop
-loop      `facts_of`, `Board`         widgets are functions of facts; what did not change is not sent
+browser   a widget changes            viser calls `Intents.do` on the event loop loop      the
+session changes         nothing else ever changes it loop      `Jobs.ask`                  what can
+be seen is asked; what was asked already costs nothing thread    `solve(question)`           pure:
+it knows no widget, no session, no loop loop      `facts_of`, `Board`         widgets are functions
+of facts; what did not change is not sent
 """
 
 import asyncio
@@ -25,15 +25,15 @@ from webapp.tasks.slot import Attended, Bell, Pools, Slot
 from webapp.tasks.solver import Solver
 
 PATIENCE_S = 0.025
-"""How long a change waits for its answer before the page is written without it [s]: a browser takes longer to
-write a page twice than once."""
+"""How long a change waits for its answer before the page is written without it [s]: a browser takes
+longer to write a page twice than once."""
 TOGETHER_S = 0.4
 """How long what comes beside an answer waits for the rest of it [s]."""
 Slots = frozenset[Slot[Any, Any]]
 NONE: Slots = frozenset()
 DRAWN_S = 0.004
-"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the view at
-once, and the rest with its next picture."""
+"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the
+view at once, and the rest with its next picture."""
 
 
 class View:
@@ -47,7 +47,8 @@ class View:
         pools: Pools,
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """Build the page and begin; called on `loop`, which is viser's. Threads of `pools` compute."""
+        """Build the page and begin; called on `loop`, which is viser's. Threads of `pools`
+        compute."""
         self.client = client
         self.session = session
         self.bell = Bell(loop)
@@ -97,7 +98,8 @@ class View:
             await self.bell.wait(left)
 
     def _look(self) -> None:
-        """Take what has been answered and done, ask what follows, and see whether the page is due."""
+        """Take what has been answered and done, ask what follows, and see whether the page is
+        due."""
         came = []
         for waiting in self.bell.take():
             if self._attend(waiting):
@@ -133,7 +135,8 @@ class View:
         return came
 
     def _hold(self, seconds: float, slots: Slots) -> None:
-        """Leave the page as it is until some slots are answered, but no longer than some time [s]."""
+        """Leave the page as it is until some slots are answered, but no longer than some time
+        [s]."""
         if self._held_for != slots:
             self._held_for = slots
             self._held_until = time.monotonic() + seconds

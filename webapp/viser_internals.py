@@ -1,16 +1,21 @@
-"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is upgraded.
+"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is
+upgraded.
 
 Each function says why; what would make it needless upstream:
 
 | here | upstream |
 |---|---|
-| `start_server`, `_guarded` | hooks for requests, headers and sizes (`infra/_infra.py`, `WebsockServer`) |
+| `start_server`, `_guarded` | hooks for requests, headers and sizes (`infra/_infra.py`,
+`WebsockServer`) |
 | `_name_page` | title, icon and first page as arguments of `ViserServer` (`_viser.py`) |
 | `stored` | an awaitable `get_item` of `client.local_storage` (`_viser.py`) |
-| `_quicken` | the archive of icons kept open (`_icons.py`), hints per class (`_assignable_props_api.py`) |
+| `_quicken` | the archive of icons kept open (`_icons.py`), hints per class
+(`_assignable_props_api.py`) |
 | `uuid_of` | a public name of a widget's element in the page (`_gui_handles.py`) |
-| `run_script`, `run_file` | a public way to run a script, as its plots do (`_gui_api.py`, `add_plotly`) |
-| `hold_uploads` | sizes and parts checked as they come (`_gui_api.py`, `_handle_file_transfer_part`) |
+| `run_script`, `run_file` | a public way to run a script, as its plots do (`_gui_api.py`,
+`add_plotly`) |
+| `hold_uploads` | sizes and parts checked as they come (`_gui_api.py`,
+`_handle_file_transfer_part`) |
 | `disable_sharing` | an argument that closes the share tunnel (`_viser.py`, `ShareUrlRequest`) |
 """
 
@@ -51,7 +56,8 @@ LOCAL = Guard("127.0.0.1")
 
 
 def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
-    """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave it."""
+    """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
+    it."""
     _quicken()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
@@ -90,7 +96,8 @@ def _guarded(guard: Guard) -> Iterator[None]:
 
 
 def _name_page(answer: Response) -> Response:
-    """Let an answer of viser's bring our first page: with our name and icon, and without its panel."""
+    """Let an answer of viser's bring our first page: with our name and icon, and without its
+    panel."""
     if answer.headers.get("Content-Type", "").startswith("text/html"):
         answer.body = _named(bytes(answer.body), answer.headers.get("Content-Encoding") == "gzip")
         del answer.headers["Content-Length"]
@@ -102,15 +109,18 @@ def _name_page(answer: Response) -> Response:
 def _named(body: bytes, zipped: bool) -> bytes:
     ours = files("webapp.markup").joinpath("first_page.html").read_bytes()
     plain = gzip.decompress(body) if zipped else body
-    plain = plain.replace(b'rel="icon"', b'rel="alternate"', 1).replace(b"<title>Viser</title>", ours, 1)
+    plain = plain.replace(b'rel="icon"', b'rel="alternate"', 1).replace(
+        b"<title>Viser</title>", ours, 1
+    )
     return gzip.compress(plain) if zipped else plain
 
 
 async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]) -> str | None:
     """What a browser keeps for us; `client.local_storage` would hold a thread until it answers.
 
-    A page that is just reconnecting may drop the question, so it is repeated, after each time [s] of
-    `patience` but the last one. TimeoutError: it did not answer at all. RuntimeError: it forbids storage.
+    A page that is just reconnecting may drop the question, so it is repeated, after each time [s]
+    of `patience` but the last one. TimeoutError: it did not answer at all. RuntimeError: it forbids
+    storage.
     """
     connection = client._websock_connection
     question = f"finlab-{secrets.token_hex(8)}"
@@ -140,8 +150,9 @@ async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]
 
 @cache
 def _quicken() -> None:
-    """Spare a first page what viser does again and again: it opens its archive of 4,000 icons for each one
-    that it draws, half a second in all, and looks up the types of properties for each handle."""
+    """Spare a first page what viser does again and again: it opens its archive of 4,000 icons for
+    each one that it draws, half a second in all, and looks up the types of properties for each
+    handle."""
     icons: Any = _icons
     opened: Any = cache(ZipFile)
     icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(opened(archive)))
@@ -168,8 +179,8 @@ def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
 
 
 def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) -> None:
-    """Hold what a page sends against what it announced, where viser trusts it until the last part, and what
-    is on its way from it against `most` bytes; `refuse` hears why a file is dropped."""
+    """Hold what a page sends against what it announced, where viser trusts it until the last part,
+    and what is on its way from it against `most` bytes; `refuse` hears why a file is dropped."""
     interface = gui._websock_interface
     states = gui._current_file_upload_states
 
@@ -186,7 +197,11 @@ def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) 
         if type(size) is not int or type(parts) is not int or not 0 <= parts <= max(size, 0):
             drop(message, 0, f"{name}: is announced with {size!r:.20} bytes in {parts!r:.20} parts")
         elif size + sum(state["total_bytes"] for state in states.values()) > most:
-            drop(message, size, f"{name}: has {size:,} bytes, expected at most {most:,} on their way at once")
+            drop(
+                message,
+                size,
+                f"{name}: has {size:,} bytes, expected at most {most:,} on their way at once",
+            )
         else:
             gui._handle_file_transfer_start(client, message)
 
@@ -196,7 +211,11 @@ def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) 
             return
         came = len(message.content) if isinstance(message.content, bytes) else most
         if state["transferred_bytes"] + came > (size := state["total_bytes"]):
-            drop(message, size, f"{state['filename'][-80:]}: sends more than the {size:,} bytes it announced")
+            drop(
+                message,
+                size,
+                f"{state['filename'][-80:]}: sends more than the {size:,} bytes it announced",
+            )
         else:
             gui._handle_file_transfer_part(client, message)
 

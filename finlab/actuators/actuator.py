@@ -1,12 +1,13 @@
-"""The contract of a kind of actuator: all that is special about a kind stands in one file, in its class.
+"""The contract of a kind of actuator: all that is special about a kind stands in one file, in its
+class.
 
-A kind is a frozen dataclass, a subclass of `Actuator`, whose fields are what a layout file says of one. It
-declares facts (class variables), its law and its answer to a price among them, and overrides what is not as
-usual. One line in `finlab.actuators.kinds` makes it known to all of finlab;
-`docs/howto/kind.md` makes one in thirty lines.
+A kind is a frozen dataclass, a subclass of `Actuator`, whose fields are what a layout file says of
+one. It declares facts (class variables), its law and its answer to a price among them, and
+overrides what is not as usual. One line in `finlab.actuators.kinds` makes it known to all of
+finlab; `docs/howto/kind.md` makes one in thirty lines.
 
-Own frames are right-handed, their rows in the body frame. A command is a row of three numbers, of which a
-kind may use fewer; what it does not have is 0.
+Own frames are right-handed, their rows in the body frame. A command is a row of three numbers, of
+which a kind may use fewer; what it does not have is 0.
 """
 
 import math
@@ -50,8 +51,9 @@ class Uncertainty(Checked):
     floor: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
     """Its part that is there at any force [N]."""
     common: Name | None = None
-    """Name of what the error comes from, such as a fit or a measurement; actuators of one name err together,
-    by the same share along and across their forces. None for an actuator that errs by itself."""
+    """Name of what the error comes from, such as a fit or a measurement; actuators of one name err
+    together, by the same share along and across their forces. None for an actuator that errs by
+    itself."""
     correlation: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
     """Share of the error's variance that actuators of one `common` have together."""
 
@@ -73,8 +75,8 @@ class Faults(NamedTuple):
     torn: float | None = None
     """Share of its force that it gives at every command, as one with a torn blade does."""
     stuck: float | None = None
-    """Where it stays: the angle [rad] at which one that turns no longer turns, though it still pushes; the
-    force [N] at which a thruster hangs."""
+    """Where it stays: the angle [rad] at which one that turns no longer turns, though it still
+    pushes; the force [N] at which a thruster hangs."""
     running: tuple[float, ...] | None = None
     """Command that it keeps whatever is asked, the kind's `NUMBERS` in order."""
 
@@ -115,7 +117,8 @@ class Actuator(Checked, ABC):
     RATES: ClassVar[tuple[str, ...]]
     """Fields with how fast each command changes at most; None in one where nothing limits it."""
     AXES: ClassVar[tuple[str, ...]]
-    """Fields with own axes: one, or two that stand across each other, the first rows of the frame."""
+    """Fields with own axes: one, or two that stand across each other, the first rows of the
+    frame."""
     POINTED: ClassVar[int] = 0
     """Which of these is pointed, by hand and by a search."""
     PUSHES: ClassVar[tuple[int, ...]]
@@ -129,7 +132,8 @@ class Actuator(Checked, ABC):
     TURNS: ClassVar[bool] = True
     """Whether that is an angle."""
     ARC: ClassVar[str] = ""
-    """The field with the angles that it turns through, as they are mirrored; nothing where there is none."""
+    """The field with the angles that it turns through, as they are mirrored; nothing where there is
+    none."""
     LAGS: ClassVar[int] = 0
     """Which command it follows with its time constant; another one at its rate."""
     BY_FLOW: ClassVar[bool] = False
@@ -152,8 +156,8 @@ class Actuator(Checked, ABC):
     uncertainty: Uncertainty | None
 
     def __post_init__(self) -> None:
-        """Raises LayoutError: an argument, or what several say together, is refused; the message names it and
-        the actuator."""
+        """Raises LayoutError: an argument, or what several say together, is refused; the message
+        names it and the actuator."""
         try:
             super().__post_init__()
             self.check_together()
@@ -161,17 +165,19 @@ class Actuator(Checked, ABC):
             raise error.about(f"{self.type} {self.name!r:.66}") from None
 
     def check_together(self) -> None:
-        """Checks what arguments say together, each being right by itself, and makes axes exact. Raises
-        LayoutError: the message names the argument."""
+        """Checks what arguments say together, each being right by itself, and makes axes exact.
+        Raises LayoutError: the message names the argument."""
         if len(self.AXES) == 2:
             first, second = ((name, getattr(self, name)) for name in self.AXES)
-            for (name, _), axis in zip((first, second), axes.axes_across(first, second), strict=True):
+            for (name, _), axis in zip(
+                (first, second), axes.axes_across(first, second), strict=True
+            ):
                 object.__setattr__(self, name, axis)
 
     @classmethod
     def laws(cls, parts: Sequence[Any]) -> Sequence[tuple[Places, ActuatorLaw]]:
-        """Returns the laws of m actuators of the kind, few for many of them, each with its places among these
-        m. Raises DataError: a file that a law reads is bad."""
+        """Returns the laws of m actuators of the kind, few for many of them, each with its places
+        among these m. Raises DataError: a file that a law reads is bad."""
         return [(np.arange(len(parts)), cls.LAW(parts))]
 
     @classmethod
@@ -218,7 +224,8 @@ class Actuator(Checked, ABC):
 
     @property
     def stamp(self) -> tuple[int, int] | None:
-        """Time and size of that file, for what is kept until it changes; None where it reads none."""
+        """Time and size of that file, for what is kept until it changes; None where it reads
+        none."""
         if self.reads is None:
             return None
         from finlab.bundle_files import file_stamp
@@ -240,14 +247,17 @@ class Actuator(Checked, ABC):
         return str(getattr(getattr(self, "model", None), "type", self.LOOKS))
 
     def value(self, key: str) -> Any:
-        """Returns what it has under a key: a field of it, of its limits or of its model; None if nothing."""
+        """Returns what it has under a key: a field of it, of its limits or of its model; None if
+        nothing."""
         holders = (self, getattr(self, "limits", None), getattr(self, "model", None))
         return next((getattr(one, key) for one in holders if hasattr(one, key)), None)
 
     def with_value(self, key: str, value: Any) -> Self:
-        """Returns it with another value under a key, as `value`; as it is where it has no such key. None
-        forgets what may be left unsaid. Raises LayoutError: it may not have that value."""
-        return replace(self, **{key: value}) if key in {field.name for field in fields(self)} else self
+        """Returns it with another value under a key, as `value`; as it is where it has no such key.
+        None forgets what may be left unsaid. Raises LayoutError: it may not have that value."""
+        return (
+            replace(self, **{key: value}) if key in {field.name for field in fields(self)} else self
+        )
 
     def with_model(self, kind: str) -> Self:
         """Returns it with a model of another type of `MODELS`; what both know stays."""
@@ -260,20 +270,24 @@ class Actuator(Checked, ABC):
 
     @property
     def jet(self) -> float:
-        """Diameter of the jet with which it pushes, where that begins [m]; 0 of one without a jet."""
+        """Diameter of the jet with which it pushes, where that begins [m]; 0 of one without a
+        jet."""
         return 0.0
 
     @property
     def advance(self) -> float | None:
-        """Share of thrust lost per speed along the thrust over that of the jet; None where it is unknown."""
+        """Share of thrust lost per speed along the thrust over that of the jet; None where it is
+        unknown."""
         return None
 
     @property
     def delay_s(self) -> float:
-        """How late it follows [s]: its time constant, and the time in which it comes through a fifth of its
-        range at its rate."""
+        """How late it follows [s]: its time constant, and the time in which it comes through a
+        fifth of its range at its rate."""
         ranges = zip(self.lower, self.upper, self.rates, strict=True)
-        return float(getattr(self, "time_constant", 0.0)) + max(0.2 * (b - a) / rate for a, b, rate in ranges)
+        return float(getattr(self, "time_constant", 0.0)) + max(
+            0.2 * (b - a) / rate for a, b, rate in ranges
+        )
 
     def largest(self, speed: float) -> float:
         """Returns its largest force [N], of one `BY_FLOW` at a speed [m/s] through the water."""
@@ -284,7 +298,8 @@ class Actuator(Checked, ABC):
         return None if np.isnan(row[0]) else self.COMMAND(*row[: len(self.NUMBERS)].tolist())
 
     def commands(self, rows: Array) -> Command:
-        """Returns N rows (N, 3) as the kind's own type, with an array (N,) in place of each number."""
+        """Returns N rows (N, 3) as the kind's own type, with an array (N,) in place of each
+        number."""
         return self.COMMAND(*rows[:, : len(self.NUMBERS)].T)
 
     def neutral(self, now: Array | None = None) -> Array:
@@ -307,7 +322,8 @@ class Actuator(Checked, ABC):
 
     @abstractmethod
     def scaled(self, share: float) -> Self:
-        """Returns one that gives a share of the force at every command; one that reads a file stays."""
+        """Returns one that gives a share of the force at every command; one that reads a file
+        stays."""
 
     @property
     def limits_words(self) -> str:
@@ -323,25 +339,28 @@ class Actuator(Checked, ABC):
     def direction_words(self) -> str:
         """Where it points: the axes that its file gives, in the body frame."""
         words = zip(self.AXES, self.frame, strict=False)
-        return ", ".join(f"{name.replace('_', ' ')} {axes.vector_words(axis)}" for name, axis in words)
+        return ", ".join(
+            f"{name.replace('_', ' ')} {axes.vector_words(axis)}" for name, axis in words
+        )
 
     @property
     def joints(self) -> Iterator[tuple[str, axes.Vector, tuple[float, float] | None]]:
-        """Joints of a robot description, from the hull on: suffix of the link's name, axis, and limits of
-        the angle [rad]."""
+        """Joints of a robot description, from the hull on: suffix of the link's name, axis, and
+        limits of the angle [rad]."""
         yield "", self.frame[0], None
 
     def turned(self, frame: ArrayLike, position: ArrayLike | None = None, **changes: Any) -> Self:
-        """Returns it with other own axes (3, 3), rows in the body frame, at another place (3,) [m], and with
-        other changes."""
+        """Returns it with other own axes (3, 3), rows in the body frame, at another place (3,) [m],
+        and with other changes."""
         changes |= dict(zip(self.AXES, map(tuple, _plain(frame)), strict=False))
         if position is not None:
             changes["position"] = tuple(_plain(position))
         return replace(self, **changes)
 
     def image(self) -> Self:
-        """Returns it on the other side of the plane y = 0, under the same name. What turns one way about a
-        shaft turns the other way about its image: arcs and the reaction torque change sign."""
+        """Returns it on the other side of the plane y = 0, under the same name. What turns one way
+        about a shaft turns the other way about its image: arcs and the reaction torque change
+        sign."""
         changes: dict[str, Any] = {}
         if self.ARC:
             changes[self.ARC] = tuple(-end + 0.0 for end in reversed(getattr(self, self.ARC)))
@@ -352,11 +371,13 @@ class Actuator(Checked, ABC):
         return self.turned(frame, place, **changes)
 
     def facing(self, towards: axes.Vector) -> Self:
-        """Returns it with its `direction` along a vector of any length; the other axis turns along as little
-        as can be, or as its kind has it. Raises FinlabError: the vector has no length."""
+        """Returns it with its `direction` along a vector of any length; the other axis turns along
+        as little as can be, or as its kind has it. Raises FinlabError: the vector has no length."""
         length = math.hypot(*towards)
         if not axes.SHORT < length < math.inf:
-            raise FinlabError(f"direction of {self.name}: expected a vector with a length, got {towards}")
+            raise FinlabError(
+                f"direction of {self.name}: expected a vector with a length, got {towards}"
+            )
         wanted = np.array(towards) / length
         frame = np.array(self.frame)
         k = self.POINTED
@@ -371,15 +392,17 @@ class Actuator(Checked, ABC):
         return frame
 
     def turned_about(self, towards: axes.Vector) -> Self:
-        """Returns it turned about its `direction`, with its other axis as near to a vector of any length as
-        stands across it. Raises FinlabError: the vector points along the direction."""
+        """Returns it turned about its `direction`, with its other axis as near to a vector of any
+        length as stands across it. Raises FinlabError: the vector points along the direction."""
         if len(self.AXES) == 1:
             return self
         frame = np.array(self.frame)
         wanted = np.array(towards, dtype=np.float64)
         k = self.POINTED
         if not axes.SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
-            raise FinlabError(f"{self.name}: expected a direction across its {self.AXES[k]}, got {towards}")
+            raise FinlabError(
+                f"{self.name}: expected a direction across its {self.AXES[k]}, got {towards}"
+            )
         frame[1 - k] = axes.across(frame[k], wanted)
         return self.turned(frame)
 
@@ -391,8 +414,8 @@ def key_words(key: str) -> str:
 
 
 def held_limits(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:
-    """Returns an angle [rad] as both limits, whole turns off, within them where there is such a one;
-    themselves where it is None."""
+    """Returns an angle [rad] as both limits, whole turns off, within them where there is such a
+    one; themselves where it is None."""
     if angle is None:
         return limits
     held = angle + round((0.5 * sum(limits) - angle) / axes.TURN) * axes.TURN

@@ -1,7 +1,7 @@
 """Thrusters that turn, all round or within an arc: pods, and tilts.
 
-Command: (angle [rad], force [N], 0). Own frame: turn_axis, zero, turn_axis x zero; at the angle a the force
-points along cos(a) zero + sin(a) (turn_axis x zero).
+Command: (angle [rad], force [N], 0). Own frame: turn_axis, zero, turn_axis x zero; at the angle a
+the force points along cos(a) zero + sin(a) (turn_axis x zero).
 """
 
 import math
@@ -48,7 +48,9 @@ class AzimuthLaw(PropellerLaw):
         force[..., 2] = size * np.sin(command[..., 0])
         return force
 
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         force = self.force(command)
         jacobian = np.zeros((*command.shape, 3))
         jacobian[..., 0, 1] = -force[..., 2]
@@ -101,7 +103,9 @@ def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
     return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))
 
 
-class AzimuthCommand(actuator.Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
+class AzimuthCommand(
+    actuator.Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}
+):
     """The command of a thruster that turns, by name."""
 
     angle: float
@@ -142,11 +146,20 @@ class Azimuth(Propeller):
     OTHER = "Turns about"
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
     BOXES = (
-        actuator.Box("Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True),
         actuator.Box(
-            "Arc [°]", "arc", "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True, pair=True
+            "Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True
         ),
-        actuator.Box("Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True),
+        actuator.Box(
+            "Arc [°]",
+            "arc",
+            "Least and greatest angle from zero; −180 to 180 is any.",
+            5.0,
+            True,
+            pair=True,
+        ),
+        actuator.Box(
+            "Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True
+        ),
         *Propeller.BOXES,
     )
     type: ClassVar[str] = "azimuth"
@@ -158,10 +171,11 @@ class Azimuth(Propeller):
     turn_axis: Direction3
     """Unit vector about which the thruster turns, body frame."""
     zero: Direction3
-    """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x zero."""
+    """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x
+    zero."""
     force: tuple[Newtons, Newtons]
-    """Least and most force [N]: below 0 for one that also pushes against its angle, above 0 for one that
-    cannot stop."""
+    """Least and most force [N]: below 0 for one that also pushes against its angle, above 0 for one
+    that cannot stop."""
     model: ThrustModel
     """What power it takes."""
     arc: tuple[Angle, Angle] = (-math.pi, math.pi)
@@ -181,9 +195,11 @@ class Azimuth(Propeller):
     diameter: actuator.Diameter | None = None
     """Of the propeller [m], for its jet; None where it is guessed from the force."""
     open_water: OpenWater | None = None
-    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
+    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are
+    unknown."""
     hangs: bool = False
-    """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
+    """Whether damage has left it a single force, that of both limits, of any sign; no file says
+    so."""
 
     def check_together(self) -> None:
         """See `Actuator`."""
@@ -192,7 +208,8 @@ class Azimuth(Propeller):
         hangs = self.hangs and least == most
         if not hangs and not (least < most and most > 0.0):
             raise LayoutError(
-                f"expected a most force above 0 and above the least, got {least:g} and {most:g}; turn `zero` "
+                f"expected a most force above 0 and above the least, got {least:g} and {most:g}; "
+                "turn `zero` "
                 "round where it only pulls",
                 "force",
             )
@@ -203,7 +220,9 @@ class Azimuth(Propeller):
         width = self.arc[1] - self.arc[0]
         if not 0.0 <= width <= TURN + FILE_TURN_TOLERANCE:
             low, high = map(math.degrees, self.arc)
-            raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g} deg", "arc")
+            raise LayoutError(
+                f"must rise, by at most one turn, got {low:g} and {high:g} deg", "arc"
+            )
         check_force(self.model, self.force)
 
     @classmethod
@@ -214,7 +233,14 @@ class Azimuth(Propeller):
         force = (0.0, 51.44)
         model = PowerLaw(T200.forward)
         return cls(
-            cls.type, (0.0, 0.0, 0.0), up, (1.0, 0.0, 0.0), force, model, cls.SAMPLE_ARC, turn_rate=rate
+            cls.type,
+            (0.0, 0.0, 0.0),
+            up,
+            (1.0, 0.0, 0.0),
+            force,
+            model,
+            cls.SAMPLE_ARC,
+            turn_rate=rate,
         )
 
     def neutral(self, now: Array | None = None) -> Array:
@@ -227,14 +253,20 @@ class Azimuth(Propeller):
     def damaged(self, faults: actuator.Faults) -> Self:
         left = faults.weak
         low, high = self.force
-        force = self.force if left is None else actuator.weakened((max(low, left * low), high), left)
+        force = (
+            self.force if left is None else actuator.weakened((max(low, left * low), high), left)
+        )
         angle = faults.stuck if faults.running is None else faults.running[0]
         held = replace(self, force=force, arc=actuator.held_limits(angle, self.arc))
         return held if faults.running is None else held.hung(faults.running[1])
 
     @property
     def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
-        yield "_mount", self.turn_axis, None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc
+        yield (
+            "_mount",
+            self.turn_axis,
+            None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc,
+        )
         yield "", self.zero, None
 
 

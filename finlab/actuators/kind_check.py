@@ -1,4 +1,5 @@
-"""Whether a class is a kind of actuator: what it has to declare, said in a sentence where it does not."""
+"""Whether a class is a kind of actuator: what it has to declare, said in a sentence where it does
+not."""
 
 import inspect
 from dataclasses import fields
@@ -10,15 +11,16 @@ from finlab.actuators.response import Group
 from finlab.errors import FinlabError
 
 CONTRACT = (
-    "the contract of a kind is `Actuator` in finlab/actuators/actuator.py, docs/howto/kind.md makes one"
+    "the contract of a kind is `Actuator` in finlab/actuators/actuator.py, docs/howto/kind.md "
+    "makes one"
 )
 LOOKS = "fin", "thruster", "pod", "foil"
 """How an actuator may be drawn."""
 
 
 def check_kind(name: str, kind: Any) -> None:
-    """Refuses what is no kind of actuator of that type. Raises FinlabError: it lacks what the contract asks
-    for, whose name the sentence says."""
+    """Refuses what is no kind of actuator of that type. Raises FinlabError: it lacks what the
+    contract asks for, whose name the sentence says."""
     if problem := _problem(name, kind):
         home = getattr(kind, "__module__", "?")
         raise FinlabError(f"kind of actuator {name!r} of module {home!r}: {problem}; {CONTRACT}")
@@ -33,21 +35,29 @@ def _problem(name: str, kind: Any) -> str:
     if missing := _missing(kind):
         return f"{kind.__name__} lacks {', '.join(missing)}"
     if name != kind.type:
-        return f"{kind.__name__} has the type {kind.type!r}, expected the name under which it is added"
+        return (
+            f"{kind.__name__} has the type {kind.type!r}, expected the name under which it is added"
+        )
     own_laws = kind.laws.__func__ is not Actuator.laws.__func__  # type: ignore[attr-defined]
     bases: dict[str, Any] = {"LAW": ActuatorLaw, "GROUP": Group, "COMMAND": Command}
     for key, base in bases.items():
         part: Any = getattr(kind, key)
         if not (isinstance(part, type) and issubclass(part, base)):
-            return f"{key} of {kind.__name__}: expected a subclass of {base.__name__}, got {part!r:.60}"
+            return (
+                f"{key} of {kind.__name__}: expected a subclass of {base.__name__}, got "
+                f"{part!r:.60}"
+            )
         lacking = [] if key == "LAW" and own_laws else _methods_left(part)
         if lacking:
             return f"{key} of {kind.__name__}: {part.__name__} lacks {', '.join(lacking)}"
     if kind.LOOKS not in LOOKS:
-        return f"LOOKS of {kind.__name__}: expected one of {', '.join(LOOKS)}, got {kind.LOOKS!r:.60}"
+        return (
+            f"LOOKS of {kind.__name__}: expected one of {', '.join(LOOKS)}, got {kind.LOOKS!r:.60}"
+        )
     if others := [fault for fault in kind.FAULTS if fault not in Faults._fields]:
         return (
-            f"FAULTS of {kind.__name__}: expected some of {', '.join(Faults._fields)}, got {others[0]!r:.60}"
+            f"FAULTS of {kind.__name__}: expected some of {', '.join(Faults._fields)}, got "
+            f"{others[0]!r:.60}"
         )
     return ""
 
@@ -66,7 +76,9 @@ def _missing(kind: type[Actuator]) -> list[str]:
             declared.discard(key)
     missing = [name for name in Actuator.__annotations__ if name in declared and not has(name)]
     for key in ("LIMITS", "RATES", "AXES"):
-        missing += [f"the field {name!r} of its {key}" for name in getattr(kind, key, ()) if not has(name)]
+        missing += [
+            f"the field {name!r} of its {key}" for name in getattr(kind, key, ()) if not has(name)
+        ]
     return missing + _methods_left(kind)
 
 

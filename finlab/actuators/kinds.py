@@ -1,8 +1,9 @@
-"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one line here;
-it is imported when a robot has one.
+"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one
+line here; it is imported when a robot has one.
 
-Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds its own to
-`KINDS`, which refuses what is no kind. A module that cannot be imported is a `FinlabError`.
+Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds
+its own to `KINDS`, which refuses what is no kind. A module that cannot be imported is a
+`FinlabError`.
 """
 
 import os
@@ -21,8 +22,9 @@ from finlab.errors import FinlabError
 
 
 class Kinds(MutableMapping[str, type[Actuator]]):
-    """Kinds by the type that layouts give them, each imported when it is asked for. Raises FinlabError where
-    one is added that is none: it lacks what the contract asks for, whose name the sentence says."""
+    """Kinds by the type that layouts give them, each imported when it is asked for. Raises
+    FinlabError where one is added that is none: it lacks what the contract asks for, whose name the
+    sentence says."""
 
     def __init__(self, homes: dict[str, str]) -> None:
         """Takes types of actuators -> where their classes stand, `module:Class`."""
@@ -67,7 +69,8 @@ KINDS = Kinds(
 
 
 def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places, by kind. Raises DataError: a bad table."""
+    """Returns the laws of a robot's actuators with their places, by kind. Raises DataError: a bad
+    table."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(actuators):
         groups += [(places[among], law) for among, law in kind.laws([actuators[i] for i in places])]
@@ -75,15 +78,16 @@ def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Places, ActuatorLaw]]:
 
 
 def groups_of(actuators: Sequence[Actuator], effectiveness: Array) -> list[tuple[Places, Group]]:
-    """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
-    6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
+    """Returns the answers to prices of a robot's actuators by kind, with their places;
+    `effectiveness` (n, 3, 6) is the wrench of 1 N along their own axes. Errors as for
+    `FinGroup`."""
     kinds = [(places, kind, [actuators[i] for i in places]) for places, kind in _kinds(actuators)]
     return [(places, kind.GROUP(parts, effectiveness[places])) for places, kind, parts in kinds]
 
 
 def _kinds(actuators: Sequence[Actuator]) -> Iterator[tuple[Places, type[Actuator]]]:
-    """The kinds of a robot's actuators, in the order in which they come, with their places; those that share
-    their law (tilts are azimuths) are one."""
+    """The kinds of a robot's actuators, in the order in which they come, with their places; those
+    that share their law (tilts are azimuths) are one."""
     laws = [type(part).LAW for part in actuators]
     for law in dict.fromkeys(laws):
         places = np.array([i for i, own in enumerate(laws) if own is law])
@@ -96,8 +100,8 @@ def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
 
 
 def import_kinds(module: str) -> None:
-    """Imports a module that `FINLAB_KINDS` names, which adds its kinds. Raises FinlabError: it cannot be
-    imported, or one of its kinds is none."""
+    """Imports a module that `FINLAB_KINDS` names, which adds its kinds. Raises FinlabError: it
+    cannot be imported, or one of its kinds is none."""
     try:
         import_module(module)
     except FinlabError as error:
@@ -105,7 +109,8 @@ def import_kinds(module: str) -> None:
     except Exception as error:  # whatever somebody else's module does
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise FinlabError(
-            f"FINLAB_KINDS: the module {module!r} cannot be imported ({said:.200}); put it where Python "
+            f"FINLAB_KINDS: the module {module!r} cannot be imported ({said:.200}); put it where "
+            "Python "
             "finds it, such as in PYTHONPATH, mend it, or leave it out"
         ) from error
 

@@ -1,14 +1,14 @@
 """Base of the laws of actuators: command to force in its own frame, and to power, with derivatives.
 
-Own frames are those of `finlab.layout`, of a fin: shaft, zero, shaft x zero. A law's parameters are numbers,
-or arrays (n,) where it speaks for n actuators at once. Laws of fins are written once, for numpy's arrays,
-torch's tensors (which training differentiates by itself) and CasADi's symbols; derivatives in closed form
-stand beside them. The other laws work with numpy's arrays.
+Own frames are those of `finlab.layout`, of a fin: shaft, zero, shaft x zero. A law's parameters are
+numbers, or arrays (n,) where it speaks for n actuators at once. Laws of fins are written once, for
+numpy's arrays, torch's tensors (which training differentiates by itself) and CasADi's symbols;
+derivatives in closed form stand beside them. The other laws work with numpy's arrays.
 
-The power of a fin is that of a rigid plate that beats in still water, its inertia and its drag: it turns as
-theta = A sin(2 pi f t) about its zero direction against the torque J theta'' + K theta' |theta'|. Driving
-costs power; braking wins none back. The mean over a cycle of max(torque theta', 0) has the closed form used
-here: driving ends where sin = s0 with (K A / J) cos^2 = sin.
+The power of a fin is that of a rigid plate that beats in still water, its inertia and its drag: it
+turns as theta = A sin(2 pi f t) about its zero direction against the torque J theta'' + K theta'
+|theta'|. Driving costs power; braking wins none back. The mean over a cycle of max(torque theta',
+0) has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 = sin.
 """
 
 import math
@@ -23,8 +23,8 @@ from finlab.actuators.hermite_grid import size_numbers
 from finlab.arrays import Array, Values, library_of
 
 OWN_INERTIA = 0.0097
-"""Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot description
-has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its centre 0.09 m from the shaft."""
+"""Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot
+description has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its centre 0.09 m from the shaft."""
 EIGHT_PI2 = 8.0 * math.pi**2
 
 
@@ -90,7 +90,8 @@ class Blade:
         """The parts of drag (over A) and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
         sqrt = library_of(amplitude).sqrt
         twice = 2.0 * self._drag_over_inertia * amplitude
-        # Where the torque changes sign: s0 = (drag / inertia) A (1 - s0^2). The mean does not change with s0.
+        # Where the torque changes sign: s0 = (drag / inertia) A (1 - s0^2). The mean does not
+        # change with s0.
         end = twice / (1.0 + sqrt(1.0 + twice * twice))
         squared = end * end
         drag = self.drag * (end * (1.0 - squared / 3.0) + 2.0 / 3.0)
@@ -100,8 +101,8 @@ class Blade:
 class ActuatorLaw(ABC):
     """Command to force and power of one actuator, or of n actuators that share a law.
 
-    `inflow` is the velocity (..., n, 3) [m/s] of their places through the water, in their own frames; None at
-    rest. Laws that do not feel the flow pass over it.
+    `inflow` is the velocity (..., n, 3) [m/s] of their places through the water, in their own
+    frames; None at rest. Laws that do not feel the flow pass over it.
     """
 
     feels_flow: bool = False
@@ -109,12 +110,15 @@ class ActuatorLaw(ABC):
 
     @abstractmethod
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """Returns the force (..., n, 3) [N], of fins the mean over a beat, in own frames, of commands
-        (..., n, 3), in single or double precision as the commands are."""
+        """Returns the force (..., n, 3) [N], of fins the mean over a beat, in own frames, of
+        commands (..., n, 3), in single or double precision as the commands are."""
 
     @abstractmethod
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3
+        axes)."""
 
     @abstractmethod
     def power(self, command: Values, inflow: Array | None = None) -> Values:
@@ -126,8 +130,8 @@ class ActuatorLaw(ABC):
 
 
 class FinLaw(ActuatorLaw):
-    """The law of one flapping fin, or of n fins that share a model. Commands are half amplitude [rad],
-    frequency [Hz] and zero direction [rad]."""
+    """The law of one flapping fin, or of n fins that share a model. Commands are half amplitude
+    [rad], frequency [Hz] and zero direction [rad]."""
 
     uniform: bool = True
     """Whether the size of the force is the same whatever the zero direction."""
@@ -158,7 +162,9 @@ class FinLaw(ActuatorLaw):
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         jacobian = np.zeros(command.shape)
-        jacobian[..., 0], jacobian[..., 1] = self.blade.power_gradient(command[..., 0], command[..., 1])
+        jacobian[..., 0], jacobian[..., 1] = self.blade.power_gradient(
+            command[..., 0], command[..., 1]
+        )
         return jacobian
 
 
@@ -173,7 +179,8 @@ class PlanarLaw(FinLaw):
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
-        """Returns the size [N] of the force at half amplitude [rad], frequency [Hz], zero direction [rad]."""
+        """Returns the size [N] of the force at half amplitude [rad], frequency [Hz], zero direction
+        [rad]."""
 
     @abstractmethod
     def thrust_gradient(
@@ -189,7 +196,8 @@ class PlanarLaw(FinLaw):
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
         if xp is np:
-            # Half the time of `stack`, which counts: every answer of an allocator is judged by this.
+            # Half the time of `stack`, which counts: every answer of an allocator is judged by
+            # this.
             force = np.zeros((*thrust.shape, 3), thrust.dtype)
             np.cos(direction, out=force[..., 1])
             np.sin(direction, out=force[..., 2])
@@ -200,7 +208,9 @@ class PlanarLaw(FinLaw):
         parts = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(parts, axis=-1)
 
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         parts = command[..., 0], command[..., 1], command[..., 2]
         direction = parts[2] + self.offset
         cos = np.cos(direction)

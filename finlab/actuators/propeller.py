@@ -1,4 +1,5 @@
-"""The propeller of thrusters, fixed or turning: its description, its law, and its input for a force."""
+"""The propeller of thrusters, fixed or turning: its description, its law, and its input for a
+force."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,12 +26,15 @@ T200_FORCE, T200_DIAMETER = 51.44, 0.076
 """Its largest force [N], and the diameter of its propeller [m]."""
 LEAST_DIAMETER = 1e-3
 """The smallest diameter that a propeller may have [m]."""
-OpenWater = tuple[Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]]
+OpenWater = tuple[
+    Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]
+]
 LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
 
 
 class Propeller(Actuator):
-    """Base of thrusters, fixed or turning: limits of the force [N], dead band, power, jet; see `Actuator`."""
+    """Base of thrusters, fixed or turning: limits of the force [N], dead band, power, jet; see
+    `Actuator`."""
 
     KEYS: ClassVar[Mapping[str, str]] = {
         "position": "position_m",
@@ -45,13 +49,28 @@ class Propeller(Actuator):
         Box("Dead band [N]", "dead_band", "Forces smaller than this, but 0, cannot be held."),
         Box("Rate [N/s]", "rate", "How fast the force changes; 0: at once.", free=True),
         Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
-        Box("Diameter [m]", "diameter", "Of the propeller, for its jet; 0: by its force.", 0.01, free=True),
+        Box(
+            "Diameter [m]",
+            "diameter",
+            "Of the propeller, for its jet; 0: by its force.",
+            0.01,
+            free=True,
+        ),
         Box("Torque/force [m]", "torque_per_newton", "Reaction torque, signed.", 0.001),
     )
     LAW_BOXES = (
-        Box("Ahead [W]", "forward", "Power at 1 N; F newtons take it times F^exponent.", law="power_law"),
         Box(
-            "Astern [W]", "reverse", "The same of a negative force; 0: as ahead.", free=True, law="power_law"
+            "Ahead [W]",
+            "forward",
+            "Power at 1 N; F newtons take it times F^exponent.",
+            law="power_law",
+        ),
+        Box(
+            "Astern [W]",
+            "reverse",
+            "The same of a negative force; 0: as ahead.",
+            free=True,
+            law="power_law",
         ),
         Box("Exponent", "exponent", "1.5 is that of an ideal propeller at rest.", law="power_law"),
     )
@@ -70,15 +89,16 @@ class Propeller(Actuator):
     def hung(self, force: float) -> Self:
         """Returns it with a force [N] as its only one, at which it hangs whatever is asked.
 
-        The propeller is the same: a jet that was guessed from the largest force stays as it is. Raises
-        AllocationError: it cannot give that force, which is not clipped, since then the others would make up
-        for a force that is not there.
+        The propeller is the same: a jet that was guessed from the largest force stays as it is.
+        Raises AllocationError: it cannot give that force, which is not clipped, since then the
+        others would make up for a force that is not there.
         """
         least, most = self.force
         rounding = NEARLY * max(-least, most)
         if not least - rounding <= force <= most + rounding:
             raise AllocationError(
-                f"damage of {self.name!r}: expected a force from {least:g} to {most:g} N, which is what this "
+                f"damage of {self.name!r}: expected a force from {least:g} to {most:g} N, which "
+                "is what this "
                 f"{self.type} can give, got {force:g} N"
             )
         held = min(max(force, least), most)
@@ -87,12 +107,14 @@ class Propeller(Actuator):
 
     @property
     def jet(self) -> float:
-        """See `Actuator`: its diameter, or that at which its largest force loads the disc as a T200's."""
+        """See `Actuator`: its diameter, or that at which its largest force loads the disc as a
+        T200's."""
         return self.diameter or T200_DIAMETER * math.sqrt(max(map(abs, self.force)) / T200_FORCE)
 
     @property
     def advance(self) -> float | None:
-        """See `Actuator`. Along the line `Kt = Kt0 (1 - J / J0)`, `J = V / (n D)` (Fossen, 2011, section
+        """See `Actuator`. Along the line `Kt = Kt0 (1 - J / J0)`, `J = V / (n D)` (Fossen, 2011,
+        section
         9.4), the loss is `J / J0`, and the jet's speed at rest is `n D sqrt(8 Kt0 / pi)`."""
         if self.open_water is None:
             return None
@@ -106,11 +128,13 @@ class Propeller(Actuator):
         return replace(self, model=replace(self.model, **{key: value})) if known else self
 
     def with_model(self, kind: str) -> Self:
-        return replace(self, model=_law_of(self.model)) if isinstance(self.model, PowerTable) else self
+        return (
+            replace(self, model=_law_of(self.model)) if isinstance(self.model, PowerTable) else self
+        )
 
     def scaled(self, share: float) -> Self:
-        """See `Actuator`. The command is the force that it gives: one of 0.8 has limits of 0.8 as much, and
-        takes the power of force / 0.8."""
+        """See `Actuator`. The command is the force that it gives: one of 0.8 has limits of 0.8 as
+        much, and takes the power of force / 0.8."""
         return replace(
             self,
             force=(share * self.force[0], share * self.force[1]),
@@ -137,7 +161,8 @@ class Propeller(Actuator):
 
 
 def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
-    """Returns what a table says to send for forces (...) [N], in the table's unit; None for a power law.
+    """Returns what a table says to send for forces (...) [N], in the table's unit; None for a power
+    law.
 
     Where several inputs give no force, the middle of them stops the propeller.
     """
@@ -160,16 +185,17 @@ def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
 
 
 def given_force(part: Any) -> tuple[float, float]:
-    """Returns the least and the most force [N] that one gives of `force` with its `dead_band`: none where all
-    of its commands lie in the band."""
+    """Returns the least and the most force [N] that one gives of `force` with its `dead_band`: none
+    where all of its commands lie in the band."""
     least, most = part.force
     largest = max(-least, most)
     return (least, most) if largest >= part.dead_band * (1.0 - NOTHING) else (0.0, 0.0)
 
 
 def form_of(kind: Literal["thruster", "pod"], given: Array, sign: float = 1.0) -> Form:
-    """Returns how the forces of one become commands, by the least and most force (2,) that it gives [N] and
-    the sign of a thruster's command: the law of one whose commands all lie in its dead band gives nothing."""
+    """Returns how the forces of one become commands, by the least and most force (2,) that it gives
+    [N] and the sign of a thruster's command: the law of one whose commands all lie in its dead band
+    gives nothing."""
     gives_nothing = not given.any()
     return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, sign=sign)
 
@@ -185,7 +211,9 @@ def _law_of(table: PowerTable) -> PowerLaw:
 
 def _scaled(model: ThrustModel, share: float) -> ThrustModel:
     if isinstance(model, PowerTable):
-        return replace(model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows))
+        return replace(
+            model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows)
+        )
     more = share**-model.exponent
     reverse = None if model.reverse is None else more * model.reverse
     return PowerLaw(more * model.forward, reverse, model.exponent)
@@ -212,7 +240,8 @@ class PropellerLaw(ActuatorLaw):
         return held(command[..., self.column], self.dead_band)
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes none."""
+        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes
+        none."""
         return self.power_curve.watts(self.given(command))
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
@@ -222,5 +251,6 @@ class PropellerLaw(ActuatorLaw):
 
 
 def held(force: AnyArray, dead_band: Array, rest: Array | float = 0.0) -> AnyArray:
-    """Returns the forces (..., n) [N] that come of commanded ones: `rest` within the dead bands (n,) [N]."""
+    """Returns the forces (..., n) [N] that come of commanded ones: `rest` within the dead bands
+    (n,) [N]."""
     return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), rest, force))

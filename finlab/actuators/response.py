@@ -1,10 +1,11 @@
-"""The answer of one actuator to a price: the force that is worth its watts, as a table over the price.
+"""The answer of one actuator to a price: the force that is worth its watts, as a table over the
+price.
 
 An actuator that is paid `v` [W/N] for its force along a direction gives the force `T(v)` that
-maximizes `v T - c(T)`, with `c` its power. `T` rises with the price; its integral is the conjugate `c*`. Both
-are kept as piecewise polynomials on prices that are dense near zero, so that `T = dc*/dv` to rounding
-whatever the law is, and powers `T ~ v^2` (cost `~ T^1.5`) are exact. A cost that is not convex is replaced by
-its convex hull, at which `T` has a steep place.
+maximizes `v T - c(T)`, with `c` its power. `T` rises with the price; its integral is the conjugate
+`c*`. Both are kept as piecewise polynomials on prices that are dense near zero, so that `T =
+dc*/dv` to rounding whatever the law is, and powers `T ~ v^2` (cost `~ T^1.5`) are exact. A cost
+that is not convex is replaced by its convex hull, at which `T` has a steep place.
 """
 
 from abc import ABC, abstractmethod
@@ -48,7 +49,8 @@ class RadialTable:
 
     @classmethod
     def of_forces(cls, top: float, force: Array, rest: float) -> "RadialTable":
-        """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson, 1980)."""
+        """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson,
+        1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
         return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
 
@@ -77,7 +79,8 @@ class RadialTable:
         return np.asarray(price * force - self.conjugate(price))
 
     def conjugate(self, price: Array) -> Array:
-        """The most (...) [W] that a force is worth, less its power, at prices (...) [W/N] from 0 to `top`."""
+        """The most (...) [W] that a force is worth, less its power, at prices (...) [W/N] from 0 to
+        `top`."""
         cell = np.clip(np.searchsorted(_GRID, price / self.top, side="right") - 1, 0, CELLS - 1)
         width = self.top * np.diff(_GRID)
         share = price / self.top - _GRID[cell]
@@ -120,12 +123,14 @@ class RadialTable:
         m0 = few[2][cell] * width
         m1 = few[2][cell + 1] * width
         rise = np.diff(few[1])[cell]
-        found = few[1][cell] + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
+        found = few[1][cell] + t * (
+            m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise))
+        )
         return bool(np.abs(found - self.force).max() <= 0.1 * NOTHING * self.largest)
 
     def with_square(self, weight: float) -> "RadialTable":
-        """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before
-        v."""
+        """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as
+        before v."""
         price = price_grid(self.top) + 2.0 * weight * self.force
         top = float(price[-1])
         rest = self.rest + weight * float(self.force[0]) ** 2
@@ -133,8 +138,8 @@ class RadialTable:
 
 
 def table_numbers(top: float, force: Array, slope: Array, rest: float) -> Array:
-    """Returns a table as the core takes it: `top`, cells k, `rest`, then force, its derivative and conjugate
-    (k + 1,) at prices top (j / k)^4."""
+    """Returns a table as the core takes it: `top`, cells k, `rest`, then force, its derivative and
+    conjugate (k + 1,) at prices top (j / k)^4."""
     width = np.diff(top * np.linspace(0.0, 1.0, len(force)) ** 4)
     mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
     start = np.concatenate([[0.0], np.cumsum(width * mean)]) - rest
@@ -143,7 +148,8 @@ def table_numbers(top: float, force: Array, slope: Array, rest: float) -> Array:
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:
-    """Slopes (K,) of a rising cubic spline through points (K,), third order where the data allow."""
+    """Slopes (K,) of a rising cubic spline through points (K,), third order where the data
+    allow."""
     width = np.diff(x)
     chord = np.diff(y) / np.diff(x)
     slope = np.empty_like(y)
@@ -200,12 +206,13 @@ class Plane:
     half: float = np.pi
     """Half of that arc [rad]; pi for a full circle."""
     gauge: Array | None = None
-    """Share (G,) of the table's force that the same cost gives in each of G directions around the circle,
-    from angle 0 on; None for a fin that is alike all round."""
+    """Share (G,) of the table's force that the same cost gives in each of G directions around the
+    circle, from angle 0 on; None for a fin that is alike all round."""
     band: float = 0.0
     """Forces smaller than this one, other than 0, cannot be held [N]."""
     reverse: RadialTable | None = None
-    """Answer of forces against the directions of the arc, from rest on; None where it pushes one way."""
+    """Answer of forces against the directions of the arc, from rest on; None where it pushes one
+    way."""
     high: float = np.inf
     """Largest force [N], below 0 in reverse, where that is less than the tables give."""
 
@@ -226,8 +233,8 @@ Response = Line | Plane
 
 
 def with_square(response: Response, weight: float) -> Response:
-    """Returns what an actuator offers where a force F [N] costs `weight` F^2 [W] more; of a fin that is not
-    alike all round with the mean over all directions."""
+    """Returns what an actuator offers where a force F [N] costs `weight` F^2 [W] more; of a fin
+    that is not alike all round with the mean over all directions."""
     if isinstance(response, Line):
         reverse = response.reverse and response.reverse.with_square(weight)
         return replace(response, table=response.table.with_square(weight), reverse=reverse)
@@ -246,8 +253,8 @@ def power_of(response: Response, force: Array) -> Array:
 
 
 class Form(NamedTuple):
-    """How a force of one actuator becomes a command, and a command a force, as numbers for the core:
-    finlab/core/src/command_law.c reads them."""
+    """How a force of one actuator becomes a command, and a command a force, as numbers for the
+    core: finlab/core/src/command_law.c reads them."""
 
     kind: Literal["thruster", "pod", "fin", "foil"]
     """A force; an angle and a force; a beat of a fin; an angle of a foil."""
@@ -256,8 +263,8 @@ class Form(NamedTuple):
     law: Array | None = None
     """A grid of the law, see `finlab.actuators.hermite_grid.grid_numbers`."""
     beat: Array | None = None
-    """Of a fin: amplitudes and frequencies (K + 1, 2) of the shares (j / K)^2 of its largest force. Of a
-    foil: coefficients of lift, rising, and angles (K, 2)."""
+    """Of a fin: amplitudes and frequencies (K + 1, 2) of the shares (j / K)^2 of its largest force.
+    Of a foil: coefficients of lift, rising, and angles (K, 2)."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
     sign: float = 1.0
@@ -277,7 +284,8 @@ class Form(NamedTuple):
 
 
 class Group(ABC):
-    """The m actuators of one type in a robot: what they offer for prices, and which commands give a force."""
+    """The m actuators of one type in a robot: what they offer for prices, and which commands give a
+    force."""
 
     responses: list[Response]
     """What each offers, by the effectiveness of its own directions."""
@@ -285,8 +293,8 @@ class Group(ABC):
     """Whether that depends on the water that meets them."""
 
     def at(self, inflow: Array | None) -> "Group":
-        """Returns the group with velocities (m, 3) [m/s] of its places through the water, own frames, or
-        None."""
+        """Returns the group with velocities (m, 3) [m/s] of its places through the water, own
+        frames, or None."""
         return self
 
     @property
@@ -299,13 +307,15 @@ class Group(ABC):
         return np.zeros((len(force), 6))
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array | None:
-        """Returns the most that force along its own direction is worth, less its power, by the law itself.
+        """Returns the most that force along its own direction is worth, less its power, by the law
+        itself.
 
         Args:
             price: prices (N, m) [W/N] of that force, of lines signed.
             back: the same of a force in reverse, of planes that push either way.
-            ends: least and largest force (m, 2) [N] now, of planes below 0 in reverse; None for all that
-                the limits allow. What a law may give beyond them makes the bound weaker, not wrong.
+            ends: least and largest force (m, 2) [N] now, of planes below 0 in reverse; None for all
+                that the limits allow. What a law may give beyond them makes the bound weaker, not
+                wrong.
 
         Returns:
             (N, m) [W]; NaN, or None, where that is what the tables say.
@@ -313,8 +323,9 @@ class Group(ABC):
         return None
 
     def worth(self, price: Array) -> Array | None:
-        """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth at prices
-        (N, 6) of the wrench, less its power, or more; NaN, or None, where the answers' forces are all."""
+        """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth
+        at prices (N, 6) of the wrench, less its power, or more; NaN, or None, where the answers'
+        forces are all."""
         return None
 
     @property

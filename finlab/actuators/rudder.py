@@ -1,10 +1,11 @@
 """Rudders: lift and drag of a foil in the water that flows past it, with stall.
 
-Command: (deflection [rad], 0, 0). Own frame: shaft, zero (the chord at deflection 0, pointing forward), and
-shaft x zero. U is the speed of the foil's place through the water across the shaft, and the angle a goes from
-the direction of travel to the chord. Lift is 1/2 rho U^2 S CL(a) across the travel, drag 1/2 rho U^2 S CD(a)
-against it. Below stall CL = slope a and CD = CD0 + k CL^2. Beyond it they are those of a flat plate, CL =
-2 |sin a| sin a cos a and CD = CD0 + 2 sin^2 a, with a logistic blend between (Beard and McLain, 2012, section
+Command: (deflection [rad], 0, 0). Own frame: shaft, zero (the chord at deflection 0, pointing
+forward), and shaft x zero. U is the speed of the foil's place through the water across the shaft,
+and the angle a goes from the direction of travel to the chord. Lift is 1/2 rho U^2 S CL(a) across
+the travel, drag 1/2 rho U^2 S CD(a) against it. Below stall CL = slope a and CD = CD0 + k CL^2.
+Beyond it they are those of a flat plate, CL = 2 |sin a| sin a cos a and CD = CD0 + 2 sin^2 a, with
+a logistic blend between (Beard and McLain, 2012, section
 4.2). A foil that goes astern is taken to be as good as ahead. At rest there is no force.
 """
 
@@ -33,7 +34,8 @@ SHARPNESS = 50.0
 PEAK = 0.995
 """Share of the largest lift that is asked of a rudder: towards the peak a newton has no price."""
 LEAST_DRAG = 1e-3
-"""Drag coefficient per squared lift coefficient that counts at least, so that each price has one answer."""
+"""Drag coefficient per squared lift coefficient that counts at least, so that each price has one
+answer."""
 
 _EFFICIENCY = 0.9
 """Induced drag of an elliptic wing over that of such a foil (Whicker and Fehlner, 1958)."""
@@ -74,7 +76,8 @@ class Met(NamedTuple):
 
 
 class RudderLaw(ActuatorLaw):
-    """The law of n rudders, whose command is the deflection [rad]; their force is that of the flow."""
+    """The law of n rudders, whose command is the deflection [rad]; their force is that of the
+    flow."""
 
     feels_flow = True
 
@@ -84,7 +87,9 @@ class RudderLaw(ActuatorLaw):
         self.drag = np.array([rudder.drag for rudder in rudders])
         self.induced = np.array([rudder.induced for rudder in rudders])
         self.stall = np.array([rudder.stall for rudder in rudders])
-        self.half_density_area = np.array([0.5 * rudder.density * rudder.area for rudder in rudders])
+        self.half_density_area = np.array(
+            [0.5 * rudder.density * rudder.area for rudder in rudders]
+        )
 
     def met(self, inflow: Array) -> Met:
         """Returns the water that meets the foils, of velocities (..., n, 3) [m/s] in own frames."""
@@ -117,7 +122,9 @@ class RudderLaw(ActuatorLaw):
         plate_lift = 2.0 * np.abs(sin) * sin * cos
         plate_drag = 2.0 * sin * sin
         plate_lift_slope = 4.0 * np.abs(sin) * cos * cos - 2.0 * np.abs(sin) * sin * sin
-        lift_slope = self.slope + sigma * (plate_lift_slope - self.slope) + sigma_slope * (plate_lift - lift)
+        lift_slope = (
+            self.slope + sigma * (plate_lift_slope - self.slope) + sigma_slope * (plate_lift - lift)
+        )
         drag_slope = (
             2.0 * self.induced * self.slope * lift * (1.0 - sigma)
             + sigma * 4.0 * sin * cos
@@ -133,7 +140,9 @@ class RudderLaw(ActuatorLaw):
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         return self.force_and_jacobian(command, inflow)[0]
 
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
         result = self.coefficients(command[..., 0] - met.course)
         force = met.force(result.lift, result.drag)
@@ -150,12 +159,15 @@ class RudderLaw(ActuatorLaw):
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
-        slope = met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
+        slope = (
+            met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
+        )
         return slope[..., None] * [1.0, 0.0, 0.0]
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it."""
+    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes
+    with it."""
 
     feels_flow = True
 
@@ -191,8 +203,8 @@ class RudderGroup(Group):
         return grids
 
     def _add_curve(self, angle: Array, lift: Array, drag: Array) -> None:
-        """Adds the rising part of the curve of one foil's coefficients over angles (CELLS,) from 0 on, and
-        the table of lift over price that follows from it."""
+        """Adds the rising part of the curve of one foil's coefficients over angles (CELLS,) from 0
+        on, and the table of lift over price that follows from it."""
         falls = np.append(np.diff(lift) <= 0.0, True)
         largest = lift[np.argmax(falls)]
         last = int(np.argmax(lift >= PEAK * largest)) + 1
@@ -230,7 +242,9 @@ class RudderGroup(Group):
                 continue
             table = self._tables[i].scaled(pressure, pressure * speed)
             drag = self._against[i]
-            responses.append(Line(self._across[i], table, table, low=low, high=high, drag=drag, speed=speed))
+            responses.append(
+                Line(self._across[i], table, table, low=low, high=high, drag=drag, speed=speed)
+            )
         return responses
 
     def worth(self, price: Array) -> Array:
@@ -266,11 +280,14 @@ class RudderGroup(Group):
 
     def beside_of(self, force: Array) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
-        drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
+        drag = [
+            np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)
+        ]
         return np.asarray((np.stack(drag, axis=-1) * self._met.pressure) @ self._against)
 
     def _lift(self, deflection: Array) -> Array:
-        """Least and largest lifts (m, 2) [N] between deflections (m, 2) [rad], each at its least drag."""
+        """Least and largest lifts (m, 2) [N] between deflections (m, 2) [rad], each at its least
+        drag."""
         angle = deflection - self._turned[:, None]
         end = np.array([angles[-1] for _, angles, _ in self._curves])
         parted = np.clip(0.0, angle[:, 0], angle[:, 1])
@@ -318,9 +335,9 @@ class RudderCommand(actuator.Command, frozen=True, rename={"deflection": "deflec
 class Rudder(actuator.Actuator):
     """A foil on a shaft; its command is the deflection. Checked on construction.
 
-    Its force is that of the flow: with the speed U across the shaft and the angle a between chord and flow,
-    lift 1/2 density U^2 area CL(a) across the flow and drag 1/2 density U^2 area CD(a) along it. At rest it
-    gives nothing.
+    Its force is that of the flow: with the speed U across the shaft and the angle a between chord
+    and flow, lift 1/2 density U^2 area CL(a) across the flow and drag 1/2 density U^2 area CD(a)
+    along it. At rest it gives nothing.
     """
 
     KEYS: ClassVar[Mapping[str, str]] = {
@@ -370,8 +387,8 @@ class Rudder(actuator.Actuator):
     shaft: Direction3
     """Unit vector of the shaft, body frame."""
     zero: Direction3
-    """Unit vector across it: from the trailing to the leading edge at deflection 0; it turns towards shaft x
-    zero."""
+    """Unit vector across it: from the trailing to the leading edge at deflection 0; it turns
+    towards shaft x zero."""
     area: Annotated[float, Meta(ge=1e-6, le=1000.0)]
     """Area of the foil [m^2]."""
     deflection: tuple[Deflection, Deflection]
@@ -379,11 +396,13 @@ class Rudder(actuator.Actuator):
     aspect_ratio: Annotated[float, Meta(ge=0.05, le=100.0)]
     """Effective aspect ratio, 2 span^2 / area for a foil on a hull."""
     lift_slope: Slope | None = None
-    """Lift coefficient per angle [1/rad]; from the aspect ratio after Whicker and Fehlner when None."""
+    """Lift coefficient per angle [1/rad]; from the aspect ratio after Whicker and Fehlner when
+    None."""
     drag: Coefficient = 0.0065
     """Drag coefficient without lift; the default is that of a NACA 0015 section."""
     stall: Annotated[float, Meta(ge=0.08, le=1.23)] = 0.47
-    """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a plate."""
+    """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a
+    plate."""
     density: Annotated[float, Meta(ge=500.0, le=2000.0)] = 1000.0
     """Density of the water [kg/m^3]."""
     time_constant: actuator.Seconds = 0.1
@@ -399,7 +418,8 @@ class Rudder(actuator.Actuator):
         if not self.deflection[0] < self.deflection[1]:
             low, high = map(math.degrees, self.deflection)
             raise LayoutError(
-                f"expected a least below the greatest angle, got {low:g} and {high:g} deg", "deflection"
+                f"expected a least below the greatest angle, got {low:g} and {high:g} deg",
+                "deflection",
             )
 
     @property

@@ -1,4 +1,5 @@
-"""Force and power of a propeller, as a layout file gives them: a power law, or a table of measurements."""
+"""Force and power of a propeller, as a layout file gives them: a power law, or a table of
+measurements."""
 
 import os
 from dataclasses import dataclass
@@ -19,14 +20,16 @@ MAX_ROWS = 2000
 MAX_BYTES = 1_000_000
 """Largest CSV file of a table that is read [bytes]."""
 NOISE = 0.05
-"""By how much, as a share of the largest power of a side, a table's power may lie above its convex hull:
-measured tables rise with noise, and their marginal cost falls here and there."""
+"""By how much, as a share of the largest power of a side, a table's power may lie above its convex
+hull: measured tables rise with noise, and their marginal cost falls here and there."""
 COLUMNS = ("command", "force_n", "power_w")
 """Columns of a table, by name; their order in a CSV file is free."""
 
 Newtons = Annotated[float, Meta(ge=-MAX_FORCE, le=MAX_FORCE)]
 Factor = Annotated[float, Meta(ge=1e-9, le=1e9)]
-Row = tuple[Annotated[float, Meta(ge=-1e9, le=1e9)], Newtons, Annotated[float, Meta(ge=0.0, le=1e9)]]
+Row = tuple[
+    Annotated[float, Meta(ge=-1e9, le=1e9)], Newtons, Annotated[float, Meta(ge=0.0, le=1e9)]
+]
 
 
 @dataclass(frozen=True)
@@ -71,15 +74,19 @@ class PowerTable(Checked, Part):
                 "rows",
             )
         if not force[0] <= 0.0 <= force[-1] or force[0] == force[-1]:
-            raise LayoutError(f"must reach a force of 0, got {force[0]:g} .. {force[-1]:g} N", "rows")
+            raise LayoutError(
+                f"must reach a force of 0, got {force[0]:g} .. {force[-1]:g} N", "rows"
+            )
         for sign, side in ((1, "forward"), (-1, "reverse")):
             size, watts = side_points(force, power, sign)
             above = watts - np.interp(size, *lower_hull(size, watts))
             if above.max() > NOISE * watts.max():
                 at = size[int(np.argmax(above))] * sign
                 raise LayoutError(
-                    f"the power must grow ever faster with the force, but {side} it lies {above.max():.3g} W "
-                    f"above its convex hull at {at:g} N, more than {NOISE:.0%} of {watts.max():.4g} W",
+                    f"the power must grow ever faster with the force, but {side} it lies "
+                    f"{above.max():.3g} W "
+                    f"above its convex hull at {at:g} N, more than {NOISE:.0%} of "
+                    f"{watts.max():.4g} W",
                     "rows",
                 )
 
@@ -95,7 +102,9 @@ class PowerTable(Checked, Part):
     @classmethod
     def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
         if ("rows" in values) == ("path" in values):
-            raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
+            raise LayoutError(
+                "give either rows, or the path of a CSV file, not both or neither", "rows"
+            )
         if "rows" in values:
             return cls(**values)
         if not may_open:
@@ -104,13 +113,15 @@ class PowerTable(Checked, Part):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], unit: str = "") -> Self:
-        """Returns the table in a CSV file with the columns `COLUMNS`. Raises LayoutError: the file cannot be
-        read, lacks a column, or its rows are not acceptable."""
+        """Returns the table in a CSV file with the columns `COLUMNS`. Raises LayoutError: the file
+        cannot be read, lacks a column, or its rows are not acceptable."""
         try:
             table = read_table(path, MAX_BYTES, "a table of thrust (CSV)")
             missing = [name for name in COLUMNS if name not in table.header]
             if missing:
-                raise DataError(f"{path}: has no column {missing[0]}, expected {', '.join(COLUMNS)}")
+                raise DataError(
+                    f"{path}: has no column {missing[0]}, expected {', '.join(COLUMNS)}"
+                )
             rows, _ = table.numbers([table.header.index(name) for name in COLUMNS])
         except DataError as error:
             raise LayoutError(str(error), "path") from None
@@ -126,9 +137,10 @@ class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=Tru
     stands_for: ClassVar[type[PowerTable]] = PowerTable
 
     rows: Annotated[list[Row], Meta(min_length=3, max_length=MAX_ROWS)] | None = None
-    path: Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of thrust")] | None = (
-        None
-    )
+    path: (
+        Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of thrust")]
+        | None
+    ) = None
     unit: Annotated[str, Meta(max_length=20)] | None = None
 
 
@@ -137,20 +149,21 @@ ThrustModel = PowerLaw | PowerTable
 
 
 def check_force(model: ThrustModel, force: tuple[float, float]) -> None:
-    """Refuses limits of the force that a table does not cover. Raises LayoutError: a limit [N] lies beyond
-    the table's rows."""
+    """Refuses limits of the force that a table does not cover. Raises LayoutError: a limit [N] lies
+    beyond the table's rows."""
     if isinstance(model, PowerTable):
         least = model.rows[0][1]
         most = model.rows[-1][1]
         if not least <= force[0] <= force[1] <= most:
             raise LayoutError(
-                f"the table ends at {least:g} and {most:g} N, got {force[0]:g} .. {force[1]:g}", "force"
+                f"the table ends at {least:g} and {most:g} N, got {force[0]:g} .. {force[1]:g}",
+                "force",
             )
 
 
 def side_points(force: Array, power: Array, sign: int) -> tuple[Array, Array]:
-    """Returns sizes of force (K,) [N], from 0 on and rising, and the least power (K,) [W] known at each, of
-    the forward (`sign` 1) or the reverse side (-1) of a table."""
+    """Returns sizes of force (K,) [N], from 0 on and rising, and the least power (K,) [W] known at
+    each, of the forward (`sign` 1) or the reverse side (-1) of a table."""
     kept = sign * force >= 0.0
     size = (sign * force)[kept]
     watts = power[kept]

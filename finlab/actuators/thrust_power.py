@@ -1,5 +1,5 @@
-"""Propellers: the law that thrusters share, and their power over the force, a power law or a convex curve
-through a table of measurements."""
+"""Propellers: the law that thrusters share, and their power over the force, a power law or a convex
+curve through a table of measurements."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -35,7 +35,9 @@ class ByPower:
 
     def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
-        slope = np.where(force < 0.0, -self.reverse, self.forward) * np.abs(force) ** (self.exponent - 1.0)
+        slope = np.where(force < 0.0, -self.reverse, self.forward) * np.abs(force) ** (
+            self.exponent - 1.0
+        )
         return slope * force, self.exponent * slope
 
     def answer(self, price: Array) -> Array:
@@ -46,11 +48,12 @@ class ByPower:
 
 
 class Curve:
-    """Watts over the force's size of one side: convex, quadratic between knots, its slope from 0 at rest."""
+    """Watts over the force's size of one side: convex, quadratic between knots, its slope from 0 at
+    rest."""
 
     def __init__(self, size: Array, watts: Array) -> None:
-        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots between are
-        those of Schumaker (1983): quadratic splines that keep the shape."""
+        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots
+        between are those of Schumaker (1983): quadratic splines that keep the shape."""
         step = np.diff(size)
         chord = np.diff(watts) / step
         slope = np.zeros_like(size)
@@ -72,11 +75,14 @@ class Curve:
         """Power [W] there."""
 
     def at(self, size: AnyArray) -> tuple[Array, Array]:
-        """Returns power [W] and marginal cost [W/N] of sizes [N]; beyond the last knot on with its slope."""
+        """Returns power [W] and marginal cost [W/N] of sizes [N]; beyond the last knot on with its
+        slope."""
         i = np.clip(np.searchsorted(self.size, size, "right") - 1, 0, len(self.size) - 2)
         step = size - self.size[i]
         bend = (self.marginal[i + 1] - self.marginal[i]) / (self.size[i + 1] - self.size[i])
-        return self.watts[i] + step * (self.marginal[i] + 0.5 * bend * step), self.marginal[i] + bend * step
+        return self.watts[i] + step * (self.marginal[i] + 0.5 * bend * step), self.marginal[
+            i
+        ] + bend * step
 
     def answer(self, price: Array) -> Array:
         """Returns the sizes [N] that are worth most at prices [W/N] from 0 on."""
@@ -111,7 +117,8 @@ class Sides:
         return watts, marginal
 
     def answer(self, price: Array) -> Array:
-        """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is not."""
+        """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is
+        not."""
         force = np.zeros_like(price)
         for curve, sign in self.curves:
             on = price * sign > 0.0
@@ -123,7 +130,8 @@ _sides_of = lru_cache(maxsize=256)(Sides)
 
 
 class ThrustPower:
-    """Watts over newtons, convex, of n propellers, whatever their models; those of one model together."""
+    """Watts over newtons, convex, of n propellers, whatever their models; those of one model
+    together."""
 
     def __init__(self, models: Sequence[ThrustModel | PowerCurve]) -> None:
         """Takes n models, or curves themselves."""
@@ -152,8 +160,8 @@ class ThrustPower:
         return force
 
     def worth(self, price: Array, least: Array, most: Array) -> Array:
-        """Returns the most [W] that forces from `least` to `most` (n,) [N] are worth at prices (..., n)
-        [W/N]."""
+        """Returns the most [W] that forces from `least` to `most` (n,) [N] are worth at prices
+        (..., n) [W/N]."""
         force = np.clip(self.answer(price), least, most)
         return np.asarray(price * force - self.watts(force))
 
@@ -164,9 +172,11 @@ class ThrustPower:
         return result
 
 
-def radial_table(model: ThrustModel | PowerCurve, sign: int, least: float, most: float) -> RadialTable:
-    """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least` to `most`
-    [N]."""
+def radial_table(
+    model: ThrustModel | PowerCurve, sign: int, least: float, most: float
+) -> RadialTable:
+    """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least`
+    to `most` [N]."""
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     top = abs(float(own.marginal(ends)[1, 0]))

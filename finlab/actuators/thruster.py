@@ -1,7 +1,7 @@
 """Thrusters with a fixed axis: the force is the command, but none in the dead band.
 
-Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts. The
-reaction torque of the propeller is part of the effectiveness.
+Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts.
+The reaction torque of the propeller is part of the effectiveness.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,16 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from finlab.actuators.actuator import Box, Command, Diameter, Faults, Metres, Place, Seconds, Uncertainty
+from finlab.actuators.actuator import (
+    Box,
+    Command,
+    Diameter,
+    Faults,
+    Metres,
+    Place,
+    Seconds,
+    Uncertainty,
+)
 from finlab.actuators.propeller import (
     T200,
     ForceRate,
@@ -41,7 +50,9 @@ class ThrusterLaw(PropellerLaw):
         force[..., 0] = self.given(command)
         return force
 
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         jacobian = np.zeros((*command.shape, 3))
         force = self.force(command)
         jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
@@ -74,7 +85,8 @@ class ThrusterGroup(Group):
 
 
 def _line(thruster: "Thruster", along: Array) -> Line:
-    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in reverse."""
+    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in
+    reverse."""
     least, most = given_force(thruster)
     if most <= 0.0:
         return Line(along, radial_table(thruster.model, -1, -most, -least), band=thruster.dead_band)
@@ -113,7 +125,13 @@ class Thruster(Propeller):
     FAULTS = ("weak", "stuck", "running")
     LOOKS = "thruster"
     BOXES = (
-        Box("Force [N]", "force", "Least and most along the axis; astern it is negative.", 1.0, pair=True),
+        Box(
+            "Force [N]",
+            "force",
+            "Least and most along the axis; astern it is negative.",
+            1.0,
+            pair=True,
+        ),
         *Propeller.BOXES,
     )
     type: ClassVar[str] = "thruster"
@@ -141,9 +159,11 @@ class Thruster(Propeller):
     diameter: Diameter | None = None
     """Of the propeller [m], for its jet; None where it is guessed from the force."""
     open_water: OpenWater | None = None
-    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are unknown."""
+    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are
+    unknown."""
     hangs: bool = False
-    """Whether damage has left it a single force, that of both limits, of any sign; no file says so."""
+    """Whether damage has left it a single force, that of both limits, of any sign; no file says
+    so."""
 
     def check_together(self) -> None:
         """See `Actuator`."""
@@ -154,10 +174,13 @@ class Thruster(Propeller):
         if self.hangs and least == most:
             return
         if not least <= 0.0 <= most or least == most:
-            raise LayoutError(f"must include 0, and more than that, got {least:g} and {most:g}", "force")
+            raise LayoutError(
+                f"must include 0, and more than that, got {least:g} and {most:g}", "force"
+            )
         if self.dead_band > max(-least, most):
             raise LayoutError(
-                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band"
+                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N",
+                "dead_band",
             )
 
     @classmethod

@@ -31,7 +31,8 @@ class Later(Protocol):
 
     @property
     def plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators, lost ones included, in the question's flow."""
+        """Judge of commands: the laws of all actuators, lost ones included, in the question's
+        flow."""
         ...
 
     def notes(self) -> tuple[str, ...]: ...
@@ -51,8 +52,9 @@ def read_only(array: Array) -> Array:
 class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many share, as plain data; many have N rows of each array.
 
-    Arrays are read-only, and nobody else's: no figure changes because an array was written to. Properties
-    that take time are computed when they are first read, and kept; copies have all of them.
+    Arrays are read-only, and nobody else's: no figure changes because an array was written to.
+    Properties that take time are computed when they are first read, and kept; copies have all of
+    them.
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (
@@ -85,7 +87,8 @@ class Answer(PlainData, Generic[Number]):
     wrench_expected: Array | None = None
     """Wrench (6,) or (N, 6) that the method itself expected, if it used a model of its own."""
     unknown_fins: tuple[str, ...] = ()
-    """Names of fins whose model the method's networks have not learned; answers for them are wrong."""
+    """Names of fins whose model the method's networks have not learned; answers for them are
+    wrong."""
     later: Later | None = field(default=None, compare=False)
     """Gives the lazy properties; None in copies, which have them all."""
 
@@ -136,7 +139,8 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Sentences that the user should read, such as about a fin model that the checkpoint never saw."""
+        """Sentences that the user should read, such as about a fin model that the checkpoint never
+        saw."""
         return self._general_notes + self._doubts()
 
     @cached_property
@@ -149,8 +153,8 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def expected_miss(self) -> Array:
-        """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
-        what the layout says, or a table's own; zeros where nothing is known to be."""
+        """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the
+        actuators: what the layout says, or a table's own; zeros where nothing is known to be."""
         if not self._plant.is_uncertain:
             return self._by_parts(lambda plant, rows: np.zeros((len(rows), 6)))
         from finlab.physics.expected_miss import expected_miss
@@ -164,7 +168,8 @@ class Answer(PlainData, Generic[Number]):
 
     @property
     def expected_error(self) -> Number:
-        """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be off."""
+        """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be
+        off."""
         counted = np.where(np.isnan(self.target), 0.0, self.expected_miss / self.scale)
         return self._number(np.linalg.norm(counted, axis=-1))
 
@@ -175,14 +180,16 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def effort(self) -> Number | None:
-        """Effort `J_en` of a command, the paper's energy proxy; None where not all actuators are fins."""
+        """Effort `J_en` of a command, the paper's energy proxy; None where not all actuators are
+        fins."""
         if not self.layout.is_of_fins:
             return None
         return self._number(self._by_parts(lambda plant, rows: judged_effort(plant.layout, rows)))
 
     @cached_property
     def bound(self) -> Number | None:
-        """Power [W] that no answer for the same wrench can undercut; None for methods that prove none."""
+        """Power [W] that no answer for the same wrench can undercut; None for methods that prove
+        none."""
         bound = None if self.later is None else self.later.bound()
         return None if bound is None else self._number(bound)
 
@@ -232,11 +239,14 @@ class BatchAllocation(Answer[Array]):
 
     @cached_property
     def commands(self) -> dict[str, Command | None]:
-        """Commands of each actuator by its name, in a type of its own whose numbers are arrays (N,), such as
-        `commands["lift"].force`; with `input`, what a table of thrust says to send. None for a lost one."""
+        """Commands of each actuator by its name, in a type of its own whose numbers are arrays
+        (N,), such as `commands["lift"].force`; with `input`, what a table of thrust says to send.
+        None for a lost one."""
         lost = set(self.lost)
         parts = zip(self.layout.actuators, np.moveaxis(self.command, 1, 0), strict=True)
-        return {part.name: None if part.name in lost else part.commands(rows) for part, rows in parts}
+        return {
+            part.name: None if part.name in lost else part.commands(rows) for part, rows in parts
+        }
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
@@ -255,14 +265,16 @@ class BatchAllocation(Answer[Array]):
         worst = f"{self.err_norm.max():.2e}" if len(self) else "none"
         return (
             f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, "
-            f"actuators={len(self.names)}, method={self.method!r}, delivered={int(self.reachable.sum())}, "
+            f"actuators={len(self.names)}, method={self.method!r}, "
+            f"delivered={int(self.reachable.sum())}, "
             f"largest err_norm={worst})"
         )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Allocation(Answer[float]):
-    """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and printed.
+    """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and
+    printed.
 
     `print(result)` shows it as a table.
     """
@@ -277,7 +289,8 @@ class Allocation(Answer[float]):
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
     prices: Array | None = field(default=None, compare=False)
-    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method says."""
+    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method
+    says."""
 
     @property
     def commands(self) -> dict[str, Command | None]:
@@ -287,8 +300,9 @@ class Allocation(Answer[float]):
 
     @cached_property
     def calm_power(self) -> float:
-        """Part of the power [W] that goes into less turning, as the setting `calm` weighs it: what an answer
-        for the same wrench in the same tick takes less where turning costs nothing. 0 outside of ticks."""
+        """Part of the power [W] that goes into less turning, as the setting `calm` weighs it: what
+        an answer for the same wrench in the same tick takes less where turning costs nothing. 0
+        outside of ticks."""
         part = None if self.later is None else self.later.calm_power()
         return 0.0 if part is None else self._number(part)
 
@@ -307,7 +321,8 @@ class Allocation(Answer[float]):
 
     @cached_property
     def measure_next(self) -> str:
-        """The sentence about what adds most to `expected_error`; empty where that is at most 0.001."""
+        """The sentence about what adds most to `expected_error`; empty where that is at most
+        0.001."""
         return "" if self.expected_error <= REACHED else next_measurement(self, self._plant)
 
     @cached_property
@@ -325,10 +340,11 @@ class Allocation(Answer[float]):
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering the
-        target.
+        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering
+        the target.
 
-        None where it does, nor where its networks do not know the fins: then limits are not what keeps it.
+        None where it does, nor where its networks do not know the fins: then limits are not what
+        keeps it.
         """
         if self.reachable or self.unknown_fins:
             return ()
@@ -339,7 +355,8 @@ class Allocation(Answer[float]):
         return what_binds(self.layout, self.command, missing, self.previous, period_s)
 
     def with_command(self, command: Array) -> Self:
-        """The same question with another command (n, 3) in place of the answer, judged by the plant."""
+        """The same question with another command (n, 3) in place of the answer, judged by the
+        plant."""
         other = replace(self, command=command, wrench_expected=None)
         if self.later is None:
             kept = ("bound", "calm_power", "candidates", "samples", "_general_notes")

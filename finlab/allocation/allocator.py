@@ -1,4 +1,5 @@
-"""The one interface of every allocation method: made for a robot, it checks questions and answers them."""
+"""The one interface of every allocation method: made for a robot, it checks questions and answers
+them."""
 
 from __future__ import annotations
 
@@ -71,9 +72,9 @@ class Question(NamedTuple):
     def solution(
         self, targets: Array, previous: Array | None = None, offset: int = 0, **options: Any
     ) -> Solution:
-        """The answer to targets (N, 6) for all actuators, NaN for lost ones; in a tick after commands (n, 3)
-        never outside of what the drives' limits and rates allow, else with rest for actuators that have
-        nothing to do."""
+        """The answer to targets (N, 6) for all actuators, NaN for lost ones; in a tick after
+        commands (n, 3) never outside of what the drives' limits and rates allow, else with rest for
+        actuators that have nothing to do."""
         robot, method, *_ = self.ready
         if method.takes_losses:
             options["lost"] = robot.lost
@@ -128,15 +129,18 @@ class Answered(NamedTuple):
         """Candidates of the healthy actuators, put among all."""
         robot = self.question.ready.robot
         own = None if make is None else make()
-        return replace(own, command=robot.among_all(own.command)) if own and robot.damage.lost else own
+        return (
+            replace(own, command=robot.among_all(own.command)) if own and robot.damage.lost else own
+        )
 
 
 class Allocator:
     """Turns a target wrench into one command per actuator, for one robot.
 
-    All that a method needs of the robot is prepared when the allocator is made. A damaged robot is prepared
-    when it is first asked about; lost actuators are removed before a method solves and put back (as NaN)
-    after, so no method can use one. Force tables are read once. An allocator can be copied and pickled.
+    All that a method needs of the robot is prepared when the allocator is made. A damaged robot is
+    prepared when it is first asked about; lost actuators are removed before a method solves and put
+    back (as NaN) after, so no method can use one. Force tables are read once. An allocator can be
+    copied and pickled.
     """
 
     def __init__(
@@ -157,14 +161,16 @@ class Allocator:
         Args:
             layout: the robot.
             method: one of `finlab.allocation.METHODS`, or a class of your own.
-            checkpoint: for methods with networks: a checkpoint folder, the name of a shipped checkpoint,
-                or what `read_checkpoint` gives; by default the shipped one.
-            robust: what an expected miss of 1 % of the yardstick is worth [W], growing with its square; from
-                0 to 1e9, 0 by default: how far actuators may be from their laws then costs nothing.
-            period_s: time between ticks [s], above 0 and up to 1000, 0.1 by default: with the rates of the
-                drives it says how far a command may change from `previous`. Method `mdn` has it, too.
-            calm: what turning costs in a tick, from 0 to 10, 2 by default: 0 is nothing, 2 spends some power
-                for half the turning of azimuths and tilts.
+            checkpoint: for methods with networks: a checkpoint folder, the name of a shipped
+                checkpoint, or what `read_checkpoint` gives; by default the shipped one.
+            robust: what an expected miss of 1 % of the yardstick is worth [W], growing with its
+                square; from 0 to 1e9, 0 by default: how far actuators may be from their laws then
+                costs nothing.
+            period_s: time between ticks [s], above 0 and up to 1000, 0.1 by default: with the rates
+                of the drives it says how far a command may change from `previous`. Method `mdn` has
+                it, too.
+            calm: what turning costs in a tick, from 0 to 10, 2 by default: 0 is nothing, 2 spends
+                some power for half the turning of azimuths and tilts.
             settings: of other methods, by name.
 
         Raises:
@@ -179,7 +185,9 @@ class Allocator:
             self._made(layout, methods.choose_method(method, checkpoint, **settings))
         elif isinstance(method, type) and issubclass(method, Method):
             known = methods.checked_settings(method, settings)
-            self._made(layout, methods.MethodChoice(method, known, method.read_networks(checkpoint)))
+            self._made(
+                layout, methods.MethodChoice(method, known, method.read_networks(checkpoint))
+            )
         else:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
 
@@ -261,7 +269,8 @@ class Allocator:
 
     @property
     def unknown_fins(self) -> tuple[str, ...]:
-        """Names of the fins whose model the networks have not learned; answers for them are wrong."""
+        """Names of the fins whose model the networks have not learned; answers for them are
+        wrong."""
         return self._whole.method.unknown_fins
 
     def on(self, layout: Layout) -> Allocator:
@@ -286,22 +295,25 @@ class Allocator:
         Args:
             wrench: desired wrench (6,) [N, N m] in the body frame.
             lost: names of actuators that do not work; they leave the graph.
-            damage: these and actuators that work in part; the result's layout has what is left of their
-                limits.
-            previous: command (n, 3) of the previous tick: what follows stays within the rates of the
-                actuators. Or the answer that gave it: the search then begins there, which is quicker.
-            reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
-                follow answers the one that they will be in time for, which is then the result's target; but
-                pods, whose turning costs, turn in time for what comes, and the target stays the wrench.
-            free: names of axes that are free here: they take what the cheapest answer gives them, as those
-                do that the layout does not command.
+            damage: these and actuators that work in part; the result's layout has what is left of
+                their limits.
+            previous: command (n, 3) of the previous tick: what follows stays within the rates of
+                the actuators. Or the answer that gave it: the search then begins there, which is
+                quicker.
+            reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late
+                actuators follow answers the one that they will be in time for, which is then the
+                result's target; but pods, whose turning costs, turn in time for what comes, and the
+                target stays the wrench.
+            free: names of axes that are free here: they take what the cheapest answer gives them,
+                as those do that the layout does not command.
             policy: what to do when the wrench is out of reach; see `Policy`.
-            flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
+            rest.
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six finite numbers, no axis counts, or another array has a wrong
-                shape.
+            CommandError: the wrench is not six finite numbers, no axis counts, or another array has
+                a wrong shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
@@ -338,14 +350,16 @@ class Allocator:
         )
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
-        """What a network proposes for the question of a result, whoever answered it, then the same rows after
-        each step of their refinement; nothing for methods that have no such proposals.
+        """What a network proposes for the question of a result, whoever answered it, then the same
+        rows after each step of their refinement; nothing for methods that have no such proposals.
 
         Raises:
             AllocationError: the answer is of another robot.
         """
         ready = self._ready_for(result)
-        ways = ready.method.refinement(np.nan_to_num(result.target), flow=result.flow, seed=result.seed)
+        ways = ready.method.refinement(
+            np.nan_to_num(result.target), flow=result.flow, seed=result.seed
+        )
         if ready.robot.alive.all():
             return ways
         return tuple(replace(way, command=ready.robot.among_all(way.command)) for way in ways)
@@ -402,8 +416,11 @@ class Allocator:
         ready.method.check_policy(policy)
         return Question(ready, policy, water, int(seed))
 
-    def _about(self, question: Question, target: Array, values: Array, solution: Solution) -> dict[str, Any]:
-        """Fields that answers to one target and to many share; `values` are the wrenches as they came."""
+    def _about(
+        self, question: Question, target: Array, values: Array, solution: Solution
+    ) -> dict[str, Any]:
+        """Fields that answers to one target and to many share; `values` are the wrenches as they
+        came."""
         (robot, method, *_), policy, flow, seed = question
         return dict(
             layout=robot.layout,
@@ -443,8 +460,8 @@ class Allocator:
         return ready
 
     def _make(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> Ready:
-        """The robot in a state. A method that takes losses with the question is that of the state without
-        any, and a loss prepares nothing."""
+        """The robot in a state. A method that takes losses with the question is that of the state
+        without any, and a loss prepares nothing."""
         robot = usable(self._layout, damage)
         choice = self._choice
         counts = self._layout.commanded if free is None else self._layout.commanded & ~free

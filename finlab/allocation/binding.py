@@ -1,4 +1,5 @@
-"""What keeps a robot from delivering a wrench: limits, rates and dead bands of its actuators, in words."""
+"""What keeps a robot from delivering a wrench: limits, rates and dead bands of its actuators, in
+words."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
 
 
 def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns which actuators are at full thrust (..., n), and which at the end of their arc (..., n).
+    """Returns which actuators are at full thrust (..., n), and which at the end of their arc (...,
+    n).
 
     Args:
         layout: the robot.
@@ -51,7 +53,9 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
     return full, ended
 
 
-def limit_words(layout: Layout, full: NDArray[np.bool_], ended: NDArray[np.bool_]) -> tuple[str, ...]:
+def limit_words(
+    layout: Layout, full: NDArray[np.bool_], ended: NDArray[np.bool_]
+) -> tuple[str, ...]:
     """Returns the same flags (n,) as sentences."""
     words: list[str] = []
     for name, is_full, is_ended in zip(layout.names, full, ended, strict=True):
@@ -83,12 +87,16 @@ def rate_words(layout: Layout, previous: Array, command: Array, period_s: float)
 
 
 def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
-    """Returns sentences about the actuators that rest, or are at the edge, of their dead bands, by a command
-    (n, 3)."""
+    """Returns sentences about the actuators that rest, or are at the edge, of their dead bands, by
+    a command (n, 3)."""
     words: list[str] = []
     for part, row in zip(layout.actuators, command, strict=True):
         band = getattr(part, "dead_band", 0.0)
-        if band > 0.0 and part.THRUST is not None and abs(row[part.THRUST]) <= (1.0 + WITHIN) * band:
+        if (
+            band > 0.0
+            and part.THRUST is not None
+            and abs(row[part.THRUST]) <= (1.0 + WITHIN) * band
+        ):
             words.append(f"dead band of {part.name}")
     return tuple(words)
 
@@ -106,8 +114,8 @@ def what_binds(
         period_s: time between ticks [s].
 
     Returns:
-        Limits, then rates; where there are none of either, dead bands, and then the axes that these actuators
-        do not give apart from the others.
+        Limits, then rates; where there are none of either, dead bands, and then the axes that these
+        actuators do not give apart from the others.
     """
     words = limits_reached(layout, command)
     if previous is not None:

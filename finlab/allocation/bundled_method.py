@@ -8,9 +8,9 @@ from finlab.files.guarded import decoded
 
 
 def bundled_method(files: Files, source: str) -> MethodChoice:
-    """The method of a bundle with what its files hold. Raises CheckpointError: its networks are damaged, or
-    it has none and this finlab has not those that it names; DataError: the bundle is of another format, has a
-    method that runs on no robot, or settings that no robot should try."""
+    """The method of a bundle with what its files hold. Raises CheckpointError: its networks are
+    damaged, or it has none and this finlab has not those that it names; DataError: the bundle is of
+    another format, has a method that runs on no robot, or settings that no robot should try."""
     place = f"{source}/{ABOUT}"
     document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
@@ -26,6 +26,8 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
         settings = checked_settings(kind, values)
     except AllocationError as error:
         raise DataError(f"{place}: settings: {error}") from None
-    inside = {key.removeprefix(NETWORKS): part for key, part in files.items() if key.startswith(NETWORKS)}
+    inside = {
+        key.removeprefix(NETWORKS): part for key, part in files.items() if key.startswith(NETWORKS)
+    }
     networks = kind.networks_in(inside, f"{source}/{NETWORKS.rstrip('/')}", checkpoint)
     return MethodChoice(kind, settings, networks)

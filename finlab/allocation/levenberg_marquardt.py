@@ -1,7 +1,8 @@
-"""Levenberg-Marquardt on the commands, through closed-form Jacobians of the forces, inside the limits.
+"""Levenberg-Marquardt on the commands, through closed-form Jacobians of the forces, inside the
+limits.
 
-The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so it removes
-the error that compiled tables leave. The paper's method uses it with its surrogate.
+The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so
+it removes the error that compiled tables leave. The paper's method uses it with its surrogate.
 """
 
 from dataclasses import dataclass, replace
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from finlab.allocation.rates import Box
 
 RIDGE = (1e-9, 1e-14)
-"""Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
-strong fins on long levers are singular to rounding."""
+"""Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter
+those of strong fins on long levers are singular to rounding."""
 ZERO_DIRECTION = np.array([False, False, True])
 """Which numbers of a fin's command are angles."""
 
@@ -30,8 +31,9 @@ class CommandProblem:
     """One layout as the refinement sees it."""
 
     forces: Any
-    """Gives forces (..., n, 3) [N] of commands by `force`, with derivatives by `force_and_jacobian`, as a
-    `Plant` does, each in a frame of its own choice: the actuators' own laws, or a surrogate."""
+    """Gives forces (..., n, 3) [N] of commands by `force`, with derivatives by
+    `force_and_jacobian`, as a `Plant` does, each in a frame of its own choice: the actuators' own
+    laws, or a surrogate."""
     effectiveness: AnyArray
     """Normalized wrench (n, 3, 6) per newton along the axes of each force."""
     lower: AnyArray
@@ -41,7 +43,8 @@ class CommandProblem:
     full_turn: NDArray[np.bool_]
     """True (n,) where the zero direction may turn a full circle."""
     sigma: Array | None = None
-    """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any other."""
+    """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any
+    other."""
     works: NDArray[np.bool_] | None = None
     """Which actuators (n,) give a force; None where all do."""
     counts: NDArray[np.bool_] | None = None
@@ -51,10 +54,13 @@ class CommandProblem:
     def of(cls, plant: Plant, sigma: Array) -> Self:
         """A robot as its actuators' own laws say, wrenches normalized by `sigma` (6,)."""
         own = None if plant.interaction is None else sigma
-        return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own)
+        return cls(
+            plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own
+        )
 
     def standing(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
-        """Returns the problem of the same robot where some actuators (n,) work and some axes (6,) count."""
+        """Returns the problem of the same robot where some actuators (n,) work and some axes (6,)
+        count."""
         effectiveness = self.effectiveness
         if works is not None:
             effectiveness = np.where(works[:, None, None], effectiveness, 0.0)
@@ -74,7 +80,8 @@ class CommandProblem:
 
     @cached_property
     def edges(self) -> tuple[AnyArray, AnyArray]:
-        """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
+        """Below the first and above the second (n, 3), a command is at its limit; full circles have
+        none."""
         low = self.lower + NOTHING
         high = self.upper - NOTHING
         low[self.full_turn, 2] = -np.inf
@@ -107,7 +114,9 @@ class CommandProblem:
         if self.works is not None:
             effectiveness = np.where(self.works[:, None, None], effectiveness, 0.0)
         if self.counts is not None:
-            offset, effectiveness = (np.where(self.counts, each, 0.0) for each in (offset, effectiveness))
+            offset, effectiveness = (
+                np.where(self.counts, each, 0.0) for each in (offset, effectiveness)
+            )
         wrench = np.einsum("rnk,nkw->rw", force, self.effectiveness) + offset
         return wrench, np.matmul(jacobian, effectiveness)
 
@@ -130,11 +139,11 @@ class Refined(NamedTuple):
 def refine(
     problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, enough: float = 0.0
 ) -> Refined:
-    """Reduces the error of commands (R, n, 3) towards normalized targets (R, 6), or one (1, 6), in some
-    steps; a row whose error is `enough` takes no more.
+    """Reduces the error of commands (R, n, 3) towards normalized targets (R, 6), or one (1, 6), in
+    some steps; a row whose error is `enough` takes no more.
 
-    Each step is the smallest change, in units of the limit ranges, that cancels the error to first order;
-    commands at a limit that would leave it are held.
+    Each step is the smallest change, in units of the limit ranges, that cancels the error to first
+    order; commands at a limit that would leave it are held.
     """
 
     from finlab.least_squares import Damping, levenberg_marquardt
@@ -147,15 +156,16 @@ def refine(
         there += at.command
         return _evaluated(problem, target, problem.feasible(there), at.jacobian if last else None)
 
-    # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
+    # Where nothing better is found this is the answer: it must not lie outside by a turn or a
+    # rounding error.
     start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)
     best = levenberg_marquardt(start, moved, steps, Damping(1e-6), enough=enough**2)
     return Refined(best.command, best.wrench, np.sqrt(best.cost))
 
 
 class _Evaluated(NamedTuple):
-    """R commands, normalized wrenches (R, 6), targets minus these, squared sizes of that (R,), and the
-    derivatives of the wrenches (R, n, 3 commands, 6)."""
+    """R commands, normalized wrenches (R, 6), targets minus these, squared sizes of that (R,), and
+    the derivatives of the wrenches (R, n, 3 commands, 6)."""
 
     command: AnyArray
     wrench: AnyArray
@@ -176,10 +186,14 @@ def _evaluated(
     else:
         wrench = problem.wrench(command)
     residual = target - wrench
-    return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), jacobian)
+    return _Evaluated(
+        command, wrench, residual, np.einsum("ri,ri->r", residual, residual), jacobian
+    )
 
 
-def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: AnyArray) -> AnyArray:
+def _step(
+    problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: AnyArray
+) -> AnyArray:
     """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
@@ -196,7 +210,9 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: 
     held = leaving(step)
     if not held.any():
         return step
-    step = _smallest_change(free * ~held.reshape(rows, 3 * n, 1), right, damping).reshape(rows, n, 3)
+    step = _smallest_change(free * ~held.reshape(rows, 3 * n, 1), right, damping).reshape(
+        rows, n, 3
+    )
     return np.where(leaving(step), 0.0, step)
 
 
@@ -204,6 +220,7 @@ def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyA
     """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
     gram = free.swapaxes(1, 2) @ free
     diagonal = gram.reshape(-1, 36)[:, ::7]
-    # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from rest.
+    # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from
+    # rest.
     diagonal += (damping + RIDGE[0] + RIDGE[1] * np.einsum("ri->r", diagonal))[:, None]
     return np.asarray(free @ solve(gram, right))

@@ -1,4 +1,5 @@
-"""Base of all allocation methods: made once for a layout of healthy actuators, each solves for wrenches."""
+"""Base of all allocation methods: made once for a layout of healthy actuators, each solves for
+wrenches."""
 
 import os
 from abc import ABC, abstractmethod
@@ -26,7 +27,8 @@ Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 
 
 class Networks(Protocol):
-    """Trained networks, as far as allocating has to know them; methods that have some know the rest."""
+    """Trained networks, as far as allocating has to know them; methods that have some know the
+    rest."""
 
     @property
     def name(self) -> str:
@@ -44,7 +46,8 @@ Checkpoint = str | os.PathLike[str] | Networks | None
 
 
 class Method(ABC):
-    """Turns target wrenches into commands. `finlab.Allocator` asks, and makes results of answers."""
+    """Turns target wrenches into commands. `finlab.Allocator` asks, and makes results of
+    answers."""
 
     name: ClassVar[str]
     """What the method is called."""
@@ -57,8 +60,8 @@ class Method(ABC):
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
     takes_losses: ClassVar[bool] = False
-    """Whether `solve` takes `lost` actuators and `free` axes, rather than being made for a robot without
-    them."""
+    """Whether `solve` takes `lost` actuators and `free` axes, rather than being made for a robot
+    without them."""
     begins_at_prices: ClassVar[bool] = False
     """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
     looks_ahead: ClassVar[bool] = False
@@ -69,11 +72,12 @@ class Method(ABC):
     def __init__(
         self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
     ) -> None:
-        """Prepares the method for a layout of healthy actuators and the axes that count, with settings of its
-        `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot, and trained networks, where
-        it has any. Raises AllocationError: the method cannot work with these settings; CheckpointError: the
-        networks are of another kind; DataError: a fin's force table cannot be read; LayoutError: the robot
-        has an actuator that the method does not take."""
+        """Prepares the method for a layout of healthy actuators and the axes that count, with
+        settings of its `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot,
+        and trained networks, where it has any. Raises AllocationError: the method cannot work with
+        these settings; CheckpointError: the networks are of another kind; DataError: a fin's force
+        table cannot be read; LayoutError: the robot has an actuator that the method does not
+        take."""
         self.check_robot(layout)
         self.layout = layout
         self.settings = settings
@@ -106,20 +110,23 @@ class Method(ABC):
     def read_networks(cls, checkpoint: Checkpoint) -> Networks | None:
         """Returns the networks that the method is made with.
 
-        Methods that need some inherit from `finlab.research.networks.learned_method.LearnedMethod`, which
-        reads them; any other is made with what it is given.
+        Methods that need some inherit from `finlab.research.networks.learned_method.LearnedMethod`,
+        which reads them; any other is made with what it is given.
         """
         return None if isinstance(checkpoint, str | os.PathLike) else checkpoint
 
     @classmethod
-    def networks_in(cls, files: Mapping[str, bytes], source: str, name: str | None) -> Networks | None:
+    def networks_in(
+        cls, files: Mapping[str, bytes], source: str, name: str | None
+    ) -> Networks | None:
         """Returns the networks that came with a bundle; None for methods without."""
         return None
 
     @classmethod
     def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
-        """Returns the SHA-256 of the networks' weights, and by name the files of those that a bundle has to
-        bring, since they do not come with finlab; None and no files for methods without."""
+        """Returns the SHA-256 of the networks' weights, and by name the files of those that a
+        bundle has to bring, since they do not come with finlab; None and no files for methods
+        without."""
         return None, {}
 
     @classmethod
@@ -153,9 +160,10 @@ class Method(ABC):
         return ()
 
     def in_time(self, target: Array, reference: Array) -> Array:
-        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, that
-        of the moment at which the slowest actuator will have followed, among those of the next K ticks (K,
-        6); after the last, the last. A command held for a period is late by half of it besides."""
+        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a
+        setting, that of the moment at which the slowest actuator will have followed, among those of
+        the next K ticks (K, 6); after the last, the last. A command held for a period is late by
+        half of it besides."""
         if self._late is None:
             return target
         late = int(self._late)
@@ -174,7 +182,8 @@ class Method(ABC):
         """Raise an `AllocationError` at a policy that the method does not know."""
         if not (self.every_policy or policy.is_plain):
             raise AllocationError(
-                f"policy: method {self.name!r} minimizes the plain error and knows nothing else; use method "
+                f"policy: method {self.name!r} minimizes the plain error and knows nothing else; "
+                "use method "
                 "'dual', or policy 'closest' without axis weights"
             )
 
@@ -210,12 +219,14 @@ class Method(ABC):
 
     @property
     def unknown_fins(self) -> tuple[str, ...]:
-        """Names of the fins whose model the networks have not learned; answers for them are wrong."""
+        """Names of the fins whose model the networks have not learned; answers for them are
+        wrong."""
         return ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences that the user should read before trusting any answer of the method for its robot."""
+        """Sentences that the user should read before trusting any answer of the method for its
+        robot."""
         return ()
 
 

@@ -11,7 +11,17 @@ from finlab.allocation.settings import Settings
 from finlab.errors import AllocationError
 
 MethodName = Literal[
-    "dual", "mdn", "paper", "qp", "sqp", "paper_sqp", "px4", "ardusub", "analytic", "fixed_frequency", "ipopt"
+    "dual",
+    "mdn",
+    "paper",
+    "qp",
+    "sqp",
+    "paper_sqp",
+    "px4",
+    "ardusub",
+    "analytic",
+    "fixed_frequency",
+    "ipopt",
 ]
 """Names of the methods that come with finlab; `METHODS` says where their classes stand."""
 METHODS: dict[str, str] = {
@@ -55,29 +65,32 @@ def method_class(method: str) -> type[Method]:
 
 
 def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -> MethodChoice:
-    """A method of `METHODS` by name, with its networks and settings. Raises AllocationError: unknown method
-    or setting, or a checkpoint for a method without networks; CheckpointError: missing, corrupt or foreign
-    checkpoint."""
+    """A method of `METHODS` by name, with its networks and settings. Raises AllocationError:
+    unknown method or setting, or a checkpoint for a method without networks; CheckpointError:
+    missing, corrupt or foreign checkpoint."""
     kind = method_class(method)
     if method not in LEARNED and checkpoint is not None:
         raise AllocationError(
-            f"checkpoint: method {method!r} has no networks, only {' and '.join(LEARNED)} have; leave it out"
+            f"checkpoint: method {method!r} has no networks, only {' and '.join(LEARNED)} have; "
+            "leave it out"
         )
     networks = kind.read_networks(checkpoint)
     return MethodChoice(kind, checked_settings(kind, settings), networks)
 
 
 def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:
-    """The settings of a method, by name. Raises AllocationError: the method knows no such setting, or cannot
-    work with its value."""
+    """The settings of a method, by name. Raises AllocationError: the method knows no such setting,
+    or cannot work with its value."""
     known = kind.option_names()
     if "objective" in settings and "objective" not in known:
         raise AllocationError(
-            f"objective: method {kind.name!r} has no choice; 'dual' keeps watts least, 'mdn' and 'paper' the "
+            f"objective: method {kind.name!r} has no choice; 'dual' keeps watts least, 'mdn' and "
+            "'paper' the "
             "paper's effort, and 'sqp' what it is told"
         )
     if unknown := [name for name in settings if name not in known]:
         raise AllocationError(
-            f"method {kind.name!r} knows the settings {', '.join(known) or 'none'}, got {unknown[0]!r}"
+            f"method {kind.name!r} knows the settings {', '.join(known) or 'none'}, got "
+            f"{unknown[0]!r}"
         )
     return kind.settings_class(**settings)

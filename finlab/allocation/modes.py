@@ -1,8 +1,9 @@
-"""The distinct ways in which a robot can deliver a wrench: alternatives that do the same are one mode.
+"""The distinct ways in which a robot can deliver a wrench: alternatives that do the same are one
+mode.
 
-A fin that hardly pushes counts as resting, however it does so. Two commands are the same mode if the same
-fins rest and all others push about as hard in about the same direction, angles compared the shorter way
-round.
+A fin that hardly pushes counts as resting, however it does so. Two commands are the same mode if
+the same fins rest and all others push about as hard in about the same direction, angles compared
+the shorter way round.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,8 @@ from finlab.layout import Layout
 from finlab.physics import plant_of
 
 RESTING, STILL = 0.15, 0.01
-"""Shares of the strongest fin's thrust below which a fin counts as resting, and below which it truly does."""
+"""Shares of the strongest fin's thrust below which a fin counts as resting, and below which it
+truly does."""
 SAME_DIRECTION = float(np.radians(25.0))
 """Zero directions closer than this are the same [rad]."""
 SAME_SIZE = 0.25
@@ -65,9 +67,11 @@ class Mode(PlainData):
         return tuple(np.flatnonzero(self.signature.resting).tolist())
 
 
-def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array) -> tuple[Mode, ...]:
-    """The modes among K candidates, best first, in their order, by the size of each fin's force (K, n) [N] as
-    `force_sizes` has it, and the lower and upper limits (n, 3)."""
+def find_modes(
+    candidates: Candidates, force: Array, lower: Array, upper: Array
+) -> tuple[Mode, ...]:
+    """The modes among K candidates, best first, in their order, by the size of each fin's force (K,
+    n) [N] as `force_sizes` has it, and the lower and upper limits (n, 3)."""
     modes = []
     span = np.maximum(upper - lower, 1e-9)
     signatures = mode_signature(candidates.command, force)
@@ -101,7 +105,8 @@ def _row(signatures: ModeSignature, place: Any) -> ModeSignature:
 
 
 def force_sizes(layout: Layout, command: Array) -> Array:
-    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for lost fins."""
+    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for lost
+    fins."""
     return np.asarray(np.linalg.norm(plant_of(layout).forces(command), axis=-1))
 
 
@@ -118,7 +123,8 @@ def mode_signature(command: Array, force: Array) -> ModeSignature:
 
 
 def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
-    """How `b` differs from `a` (3, ..., n) in direction, thrust and style; 1 is what counts as different."""
+    """How `b` differs from `a` (3, ..., n) in direction, thrust and style; 1 is what counts as
+    different."""
     turn = wrapped(b.direction - a.direction) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
     return np.asarray(np.nan_to_num(np.concatenate([turn[None], rest])))

@@ -12,8 +12,8 @@ from finlab.axes import Axis, mask_of
 from finlab.errors import CommandError
 
 PolicyName = Literal["closest", "direction", "priority"]
-"""`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
-each served as far as those before it allow."""
+"""`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups
+of axes, each served as far as those before it allow."""
 KINDS: tuple[PolicyName, ...] = get_args(PolicyName)
 """All of them."""
 
@@ -30,19 +30,23 @@ def check_order(groups: Any, argument: str) -> None:
     """
     if not isinstance(groups, Sequence) or any(isinstance(group, str) for group in groups):
         raise CommandError(
-            f"{argument}: expected groups of axes such as (('Fz',), ('Tx', 'Ty')), got {groups!r:.100}"
+            f"{argument}: expected groups of axes such as (('Fz',), ('Tx', 'Ty')), got "
+            f"{groups!r:.100}"
         )
     named = [axis for group in groups for axis in group]
     unknown = [axis for axis in named if axis not in AXES]
     if unknown:
-        raise CommandError(f"{argument}: expected axes among {', '.join(AXES)}, got {unknown[0]!r:.60}")
+        raise CommandError(
+            f"{argument}: expected axes among {', '.join(AXES)}, got {unknown[0]!r:.60}"
+        )
     if len(set(named)) < len(named):
         raise CommandError(f"{argument}: every axis may be named once, got {', '.join(named)}")
 
 
 @dataclass(frozen=True)
 class Policy:
-    """One way to answer an unreachable wrench; reachable ones are delivered whole by all of them."""
+    """One way to answer an unreachable wrench; reachable ones are delivered whole by all of
+    them."""
 
     kind: PolicyName = "closest"
     """One of `KINDS`."""
@@ -73,7 +77,8 @@ class Policy:
 
     @property
     def groups(self) -> list[NDArray[np.bool_]]:
-        """For `priority`: masks (6,) of the groups of axes in order; those that are not named come last."""
+        """For `priority`: masks (6,) of the groups of axes in order; those that are not named come
+        last."""
         named = {axis for group in self.order for axis in group}
         rest = tuple(axis for axis in AXES if axis not in named)
         groups = (*self.order, *((rest,) if rest else ()))
@@ -89,7 +94,9 @@ def as_policy(policy: Policy | PolicyName) -> Policy:
     return policy if isinstance(policy, Policy) else Policy(policy)
 
 
-def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None) -> Policy:
+def policy_from(
+    kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None
+) -> Policy:
     """A policy as the command line names it.
 
     Args:

@@ -69,8 +69,8 @@ def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:
 
 
 def usable(layout: Layout, damage: Damage) -> Usable:
-    """A robot some of whose actuators are lost or damaged. Raises LayoutError: an unknown actuator, or none
-    left."""
+    """A robot some of whose actuators are lost or damaged. Raises LayoutError: an unknown actuator,
+    or none left."""
     left = damage.applied_to(layout)
     lost = set(damage.lost)
     alive = np.array([name not in lost for name in left.names])
@@ -80,8 +80,8 @@ def usable(layout: Layout, damage: Damage) -> Usable:
 
 
 def _numbers(values: ArrayLike, name: str, expected: str) -> Array:
-    """A copy of what is called `name` as float64, or a `CommandError` that says what was expected; truth
-    values and text are no numbers, also where they could be read as such."""
+    """A copy of what is called `name` as float64, or a `CommandError` that says what was expected;
+    truth values and text are no numbers, also where they could be read as such."""
     try:
         array = np.array(values)
         if array.dtype.kind not in "iufO" or _has_others(values):
@@ -92,10 +92,14 @@ def _numbers(values: ArrayLike, name: str, expected: str) -> Array:
 
 
 def _has_others(values: object) -> bool:
-    """Whether truth values or text are among numbers, in lists of any depth: numpy reads `True` beside
-    numbers as 1."""
+    """Whether truth values or text are among numbers, in lists of any depth: numpy reads `True`
+    beside numbers as 1."""
     if isinstance(values, np.ndarray):
-        return _has_others(values.tolist()) if values.dtype.kind == "O" else values.dtype.kind not in "iuf"
+        return (
+            _has_others(values.tolist())
+            if values.dtype.kind == "O"
+            else values.dtype.kind not in "iuf"
+        )
     if isinstance(values, list | tuple):
         # Most are plain numbers, and every tick asks.
         return any(type(value) is not float and _has_others(value) for value in values)
@@ -103,8 +107,8 @@ def _has_others(values: object) -> bool:
 
 
 def _size(array: Array) -> float:
-    """A bound of the sizes of some numbers, NaN where one of them is and none is infinite; of few numbers
-    found in less time than numpy's calls take."""
+    """A bound of the sizes of some numbers, NaN where one of them is and none is infinite; of few
+    numbers found in less time than numpy's calls take."""
     return math.hypot(*array.ravel().tolist()) if array.size <= FEW else float(np.abs(array).max())
 
 
@@ -113,7 +117,9 @@ def _wrenches(wrench: ArrayLike, name: str, single: bool) -> Array:
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     array = _numbers(wrench, name, f"{expected} in N and N m")
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
-        raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
+        raise CommandError(
+            f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}"
+        )
     if _size(array) <= MAX_WRENCH:
         return array
     bad = ~(np.abs(array) <= MAX_WRENCH)
@@ -162,7 +168,8 @@ def free_mask(layout: Layout, free: Sequence[str]) -> NDArray[np.bool_] | None:
     mask = mask_of(free)
     if not (layout.commanded & ~mask).any():
         raise CommandError(
-            f"free: names each axis that layout {layout.name} commands ({', '.join(layout.axes)}), expected "
+            f"free: names each axis that layout {layout.name} commands "
+            f"({', '.join(layout.axes)}), expected "
             "one of them to be left"
         )
     return mask
@@ -179,7 +186,8 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
         raise CommandError(f"flow: expected {expected}, got an array of shape {array.shape}")
     if not (np.abs(array) <= MAX_FLOW).all():
         raise CommandError(
-            f"flow: each component must be finite and at most {MAX_FLOW:g} in size, got {flow!r:.100}"
+            f"flow: each component must be finite and at most {MAX_FLOW:g} in size, got "
+            f"{flow!r:.100}"
         )
     return array if array.any() else None
 
@@ -202,7 +210,9 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
     """The previous command (n, 3), a copy, in which lost actuators may hold NaN."""
     array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
     if not _size(array) < math.inf and np.isinf(array).any():
-        raise CommandError("previous: expected finite commands (NaN only for lost fins), got infinity")
+        raise CommandError(
+            "previous: expected finite commands (NaN only for lost fins), got infinity"
+        )
     if array.shape != (layout.n, 3):
         raise CommandError(
             f"previous: expected a command of shape ({layout.n}, 3) for layout {layout.name!r}, "

@@ -1,4 +1,5 @@
-"""What commands may follow a previous one: from tick to tick they change no faster than the drives allow."""
+"""What commands may follow a previous one: from tick to tick they change no faster than the drives
+allow."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,8 +25,8 @@ class Box(NamedTuple):
     """Angles (n, 3) that are counted around the circle."""
 
     def held(self, command: Array, plant: Plant) -> Array:
-        """Returns commands (..., n, 3) brought into the box, their angles within the limits of a robot; NaN
-        of a lost actuator stays."""
+        """Returns commands (..., n, 3) brought into the box, their angles within the limits of a
+        robot; NaN of a lost actuator stays."""
         return plant.feasible(self.clipped(command))
 
     def clipped(self, command: Array) -> Array:
@@ -45,7 +46,8 @@ class Rates:
     """Largest changes (n, 3) in a tick; infinite where nothing limits them."""
 
     def allow(self, previous: Array, command: Array) -> bool:
-        """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be NaN."""
+        """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be
+        NaN."""
         change = np.abs(command - previous)
         around = np.minimum(change, np.abs(2.0 * np.pi - change))
         return not (np.where(self.plant.turns, around, change) > self.step).any()

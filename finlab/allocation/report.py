@@ -1,4 +1,5 @@
-"""What is said of an answer: two small tables and sentences for people, a JSON object for programs."""
+"""What is said of an answer: two small tables and sentences for people, a JSON object for
+programs."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
 STEPS = (5, 5, 16)
-"""Amplitudes, frequencies and zero directions at which a fin is asked for its smallest and largest force."""
+"""Amplitudes, frequencies and zero directions at which a fin is asked for its smallest and largest
+force."""
 
 
 def summary(result: Allocation) -> str:
@@ -63,7 +65,8 @@ def remarks(result: Allocation) -> list[str]:
 
 
 def _short_of(result: Allocation) -> str:
-    """What is missing, in words: the share that is there, or where that is nearly all, the worst axis."""
+    """What is missing, in words: the share that is there, or where that is nearly all, the worst
+    axis."""
     if result.share < NEARLY_ALL:
         return f"{100 * result.share:.0f} % of the wrench is delivered"
     worst = int(np.argmax(np.abs(result.unallocated / result.scale)))
@@ -92,23 +95,31 @@ def allocation_blocks(result: Allocation) -> list[Block]:
 
 
 def doubts(result: Allocation) -> tuple[str, ...]:
-    """Sentences about what is not certain of an answer: its forces, and that no other takes less power."""
+    """Sentences about what is not certain of an answer: its forces, and that no other takes less
+    power."""
     doubt = (result.measure_next,) if result.measure_next else ()
     if result.bound is None or result.power <= (1.0 + PLAIN_GAP) * result.bound:
         return doubt
     least = result.bound
     if (calm := result.calm_power) > PLAIN_GAP * result.power:
-        doubt = (*doubt, f"of its power, {100.0 * calm / result.power:.0f} % goes into less turning (calm)")
+        doubt = (
+            *doubt,
+            f"of its power, {100.0 * calm / result.power:.0f} % goes into less turning (calm)",
+        )
         least += calm
     if result.power <= (1.0 + PLAIN_GAP) * least:
         return doubt
     gap = f"of its power, {100.0 * (1.0 - least / result.power):.0f} % may be more than needed"
     if result.layout.interaction is not None:
-        cause = "the bound is that of the actuators' laws for what they push; what the jets take is not in it"
+        cause = (
+            "the bound is that of the actuators' laws for what they push; what the jets take is "
+            "not in it"
+        )
     else:
         rates = "" if result.previous is None else ", or is held by its rates"
         cause = (
-            "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured table"
+            "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured "
+            "table"
             f"{rates}, the least is not proved"
         )
     return (*doubt, f"{gap}: {cause}")
@@ -130,7 +141,16 @@ def next_measurement(result: Allocation, plant: Plant) -> str:
 
 RECORD = (
     *("lost", "target", "flow", "wrench_expected", "wrench_plant", "unallocated", "err_norm"),
-    *("expected_error", "expected_miss", "effort", "power", "bound", "calm_power", "scale", "solve_ms"),
+    *(
+        "expected_error",
+        "expected_miss",
+        "effort",
+        "power",
+        "bound",
+        "calm_power",
+        "scale",
+        "solve_ms",
+    ),
     *("method", "checkpoint", "reachable", "share", "binding", "unknown_fins", "notes"),
 )
 """Keys of the JSON object, beside those of the commands; they are a contract."""
@@ -151,8 +171,8 @@ def plain_target(target: Array) -> list[float | None]:
 
 
 def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
-    """Commands (n, 3) with their forces (n, 3) [N], body frame, as plain values, along an axis of its own the
-    signed one; None for a lost actuator, whose row is NaN."""
+    """Commands (n, 3) with their forces (n, 3) [N], body frame, as plain values, along an axis of
+    its own the signed one; None for a lost actuator, whose row is NaN."""
     values: list[dict[str, object]] = []
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
         own = part.command(row)
@@ -169,9 +189,9 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
 def answer_notes(
     layout: Layout, method: Method, flow: Array | None, target: Array, own: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of the method, those
-    of `fin_notes`, those about these very answers (`own`), and what is asked of axes that nothing drives or
-    that do not count."""
+    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of the
+    method, those of `fin_notes`, those about these very answers (`own`), and what is asked of axes
+    that nothing drives or that do not count."""
     notes = fin_notes(layout, flow) + own
     wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
     named = axes_in(wanted)
@@ -185,9 +205,10 @@ def answer_notes(
 
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
-    """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
-    why the layout itself is not to be trusted, where its description begins so. After them, what needs the
-    flow and has none, what a flow (6,) leaves unknown, or that no actuator feels it.
+    """Returns a sentence for each fin that cannot rest, and for each that may leave its table;
+    before them, why the layout itself is not to be trusted, where its description begins so. After
+    them, what needs the flow and has none, what a flow (6,) leaves unknown, or that no actuator
+    feels it.
 
     None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
@@ -199,19 +220,27 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         names = ", ".join(part.name for part in foils)
         one = len(foils) == 1
         them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
-        return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
+        return (
+            *notes,
+            f"{them} nothing at rest; tell how the robot moves through the water (flow)",
+        )
     if layout.interaction is not None:
         guessed = [part.name for part in layout.actuators if part.jet and part.advance is None]
-        taken = f"what speed takes from {', '.join(guessed)} is guessed: no open_water is known of them"
+        taken = (
+            f"what speed takes from {', '.join(guessed)} is guessed: no open_water is known of them"
+        )
         return (*notes, taken) if guessed else notes
     if not foils:
         kind = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
         return (
             *notes,
-            f"the flow is without effect: layout {layout.name} has no {kind}, and what speed through the "
+            f"the flow is without effect: layout {layout.name} has no {kind}, and what speed "
+            "through the "
             "water takes from other actuators is not known",
         )
-    models = {part.name: getattr(part, "model", None) for part in layout.actuators if not part.BY_FLOW}
+    models = {
+        part.name: getattr(part, "model", None) for part in layout.actuators if not part.BY_FLOW
+    }
     tables = ", ".join(name for name, model in models.items() if model and model.type == "table")
     speed = (f"the tables of {tables} hold forces at rest; what speed changes is not known",)
     return notes + (speed if tables else ())
@@ -228,10 +257,14 @@ def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[s
 
 
 @lru_cache(maxsize=1024)
-def _notes_of(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> tuple[str, ...]:
+def _notes_of(
+    model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
+) -> tuple[str, ...]:
     """The sentences about any fin of a model within limits, with a place for its name."""
     law = make_law(model)
-    doubts = [f"the model of fin {{name}} is {note}" for note in law.notes if note.startswith(DOUBT)]
+    doubts = [
+        f"the model of fin {{name}} is {note}" for note in law.notes if note.startswith(DOUBT)
+    ]
     notes = (*doubts, *_restless(law, limits))
     if not law.measured:
         return notes
@@ -249,6 +282,7 @@ def _restless(law: FinLaw, limits: Limits) -> list[str]:
     if least <= RESTLESS * most:
         return []
     return [
-        f"fin {{name}} cannot rest: within its limits it always pushes with at least {least:.3g} N of at "
+        f"fin {{name}} cannot rest: within its limits it always pushes with at least {least:.3g} "
+        "N of at "
         f"most {most:.3g} N; wrenches that need less of it are out of reach"
     ]

@@ -37,9 +37,16 @@ class Range(NamedTuple):
 
 
 def number(
-    default: float | None, low: float, high: float, meaning: str, unit: str = "", *, above: bool = False
+    default: float | None,
+    low: float,
+    high: float,
+    meaning: str,
+    unit: str = "",
+    *,
+    above: bool = False,
 ) -> Any:
-    """A field that is a number within a range, a whole one where `low` is; None only as the default."""
+    """A field that is a number within a range, a whole one where `low` is; None only as the
+    default."""
     return field(default=default, metadata={"range": Range(low, high, meaning, unit, above)})
 
 
@@ -55,8 +62,8 @@ def switch(default: bool, meaning: str) -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a method that has none; base of all others. Raises AllocationError: a value of the wrong
-    kind, or out of its range."""
+    """Settings of a method that has none; base of all others. Raises AllocationError: a value of
+    the wrong kind, or out of its range."""
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -83,12 +90,15 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     right = isinstance(value, kind) and not isinstance(value, bool)
     if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
         return int(value) if integer else float(value)
-    raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
+    raise AllocationError(
+        f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})"
+    )
 
 
 @dataclass(frozen=True)
 class MdnSettings(Settings):
-    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are refined."""
+    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are
+    refined."""
 
     objective: ClassVar[Name] = "effort"
     """What is kept least."""
@@ -96,5 +106,7 @@ class MdnSettings(Settings):
         48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
     )
     n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
-    temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")
+    temperature: float = number(
+        1.0, 0.0, 100.0, "what the variances of the samples are multiplied by"
+    )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

@@ -14,7 +14,8 @@ ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
 
 
 class PlainData:
-    """Base of frozen dataclasses with arrays. NaN equals NaN; fields with `compare=False` do not count."""
+    """Base of frozen dataclasses with arrays. NaN equals NaN; fields with `compare=False` do not
+    count."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -81,7 +82,9 @@ class Candidates(PlainData):
 
     def beside(self, others: "Candidates") -> "Candidates":
         """These, then others."""
-        both = {name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in ARRAYS}
+        both = {
+            name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in ARRAYS
+        }
         return Candidates(**both, source=self.source + others.source)
 
 
@@ -91,11 +94,11 @@ class Solution(NamedTuple):
     command: Array
     """Chosen commands (N, n, 3)."""
     bound: Callable[[Array], Array] | None = None
-    """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen commands
-    (N, n, 3); None for methods that prove none."""
+    """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen
+    commands (N, n, 3); None for methods that prove none."""
     calm_power: Callable[[Array], Array] | None = None
-    """Gives the part (N,) of the power [W] of the chosen commands (N, n, 3) that goes into less turning; None
-    for methods that weigh no turning, and outside of ticks."""
+    """Gives the part (N,) of the power [W] of the chosen commands (N, n, 3) that goes into less
+    turning; None for methods that weigh no turning, and outside of ticks."""
     wrench: Array | None = None
     """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
@@ -103,13 +106,15 @@ class Solution(NamedTuple):
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
     prices: Array | None = None
-    """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method tells."""
+    """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method
+    tells."""
     notes: tuple[str, ...] = ()
     """Sentences about these answers."""
 
 
 def among_all(command: Array, alive: NDArray[np.bool_]) -> Array:
-    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the lost ones hold NaN."""
+    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the lost ones hold
+    NaN."""
     if len(alive) == command.shape[-2]:
         return command
     full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
@@ -121,9 +126,11 @@ Rows = slice | NDArray[np.intp]
 """Places of targets."""
 
 
-def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np.bool_]) -> Solution:
-    """Returns one solution for `count` targets and all n actuators, of which some are alive (n,), of
-    solutions for some targets and those that are alive."""
+def joined(
+    parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np.bool_]
+) -> Solution:
+    """Returns one solution for `count` targets and all n actuators, of which some are alive (n,),
+    of solutions for some targets and those that are alive."""
     command = np.full((count, len(alive), 3), np.nan)
     places = np.flatnonzero(alive)
     all_rows = True

@@ -12,8 +12,9 @@ BEYOND = 1e-6
 
 
 def beyond_table(law: FinLaw, limits: Limits) -> list[str]:
-    """Returns the sentences about a fin with a table, with a place for its `{name}`: where its limits leave
-    the table, and where the table has too few lines to tell how wrong it is between them."""
+    """Returns the sentences about a fin with a table, with a place for its `{name}`: where its
+    limits leave the table, and where the table has too few lines to tell how wrong it is between
+    them."""
     assert isinstance(law, TableLaw)
     ends = [("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency)]
     if not law.periodic:
@@ -30,7 +31,8 @@ def beyond_table(law: FinLaw, limits: Limits) -> list[str]:
     ]
     if few := [AXES_OF_TABLES[k] for k in grid_uncertainty(law).error.few]:
         notes.append(
-            f"the table of fin {{name}} has two {' and two '.join(few)} alone: how wrong it is between them "
+            f"the table of fin {{name}} has two {' and two '.join(few)} alone: how wrong it is "
+            "between them "
             "cannot be told"
         )
     return notes

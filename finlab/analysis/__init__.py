@@ -1,4 +1,5 @@
-"""Abilities of a layout, and their improvement: authority, attainable sets, power, score cards, optimization.
+"""Abilities of a layout, and their improvement: authority, attainable sets, power, score cards,
+optimization.
 
 It works from the actuators' own laws with numpy and scipy.
 """

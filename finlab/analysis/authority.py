@@ -18,8 +18,8 @@ from finlab.layout import Layout
 MotionAxis = Literal["surge", "sway", "heave", "roll", "pitch", "yaw"]
 AXES: tuple[MotionAxis, ...] = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4
-"""Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about
-1e-5."""
+"""Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to
+about 1e-5."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,17 @@ class HeldAxes:
     condition: float | None
     """Largest over smallest singular value; None below the rank of all axes that count."""
     free: tuple[MotionAxis, ...]  # axes that the robot does not command, which do not count
-    without_authority: tuple[MotionAxis, ...]  # axes that are commanded and that no actuator pushes at all
+    without_authority: tuple[
+        MotionAxis, ...
+    ]  # axes that are commanded and that no actuator pushes at all
     coupled: tuple[MotionAxis, ...]  # axes that are pushed, but never without pushing others too
 
     @property
     def alone(self) -> tuple[MotionAxis, ...]:
         """Axes that can be pushed alone."""
-        return tuple(axis for axis in AXES if axis not in self.free + self.without_authority + self.coupled)
+        return tuple(
+            axis for axis in AXES if axis not in self.free + self.without_authority + self.coupled
+        )
 
     @property
     def counted(self) -> int:
@@ -49,13 +53,14 @@ class Authority(HeldAxes):
     """What a set of actuators holds, within their limits too."""
 
     singular_values: tuple[float, ...]
-    """Of the matrix whose columns are the actuators' scaled wrenches at full thrust [N], falling; as many as
-    axes count."""
+    """Of the matrix whose columns are the actuators' scaled wrenches at full thrust [N], falling;
+    as many as axes count."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]  # the same along the negative axes, as a size (6,) [N, N m]
     weakest: float
-    """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below that rank."""
+    """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below
+    that rank."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
 
@@ -75,22 +80,28 @@ class Loss:
     reachable: tuple[MotionAxis, ...]  # axes still reachable alone
     lost: tuple[MotionAxis, ...]  # axes that were and no longer are
     share_left: tuple[float | None, ...]
-    """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where
-    there was nothing."""
+    """Share of the largest wrench along each axis that is left (6,), the smaller of both signs;
+    None where there was nothing."""
     weakest: float  # scaled wrench [N] that is within reach in every direction afterwards
 
 
-def authority(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> Authority:
+def authority(
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
+) -> Authority:
     """Returns what the working actuators hold; arguments and errors as for `losses`."""
     return _authorities(layout, [lost], flow)[0]
 
 
 def losses(
-    layout: Layout, lost: Collection[str] = (), before: Authority | None = None, flow: ArrayLike | None = None
+    layout: Layout,
+    lost: Collection[str] = (),
+    before: Authority | None = None,
+    flow: ArrayLike | None = None,
 ) -> tuple[Loss, ...]:
-    """Returns what the loss of each working actuator, on top of `lost`, would cost; none when only one is
-    left. What these hold `before` may be known; `flow` is the velocity (6,) of the body relative to the water
-    [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no actuator of a name in `lost`."""
+    """Returns what the loss of each working actuator, on top of `lost`, would cost; none when only
+    one is left. What these hold `before` may be known; `flow` is the velocity (6,) of the body
+    relative to the water [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no
+    actuator of a name in `lost`."""
     held = authority(layout, lost, flow) if before is None else before
     working = [name for name in layout.names if name not in lost]
     if len(working) < 2:
@@ -112,7 +123,8 @@ def _authorities(
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
     if flow is not None and layout.by_flow:
-        # The hull of a rudder's lift and drag has drag without lift, which pushes alone what nothing does.
+        # The hull of a rudder's lift and drag has drag without lift, which pushes alone what
+        # nothing does.
         alone = np.array([[axis in own.alone for axis in AXES] for own in held])
         size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
@@ -138,11 +150,13 @@ def commanded_axes(layout: Layout) -> tuple[MotionAxis, ...]:
 
 
 def named_axes(names: Sequence[MotionAxis]) -> tuple[Axis, ...]:
-    """Returns the axes of a wrench, each once, in order, of some of `AXES`. Raises LayoutError: there is
-    none, or one of another name."""
+    """Returns the axes of a wrench, each once, in order, of some of `AXES`. Raises LayoutError:
+    there is none, or one of another name."""
     wrong = [name for name in names if name not in AXES]
     if wrong or not names:
-        raise LayoutError(f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}")
+        raise LayoutError(
+            f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}"
+        )
     return tuple(axis for axis, name in zip(WRENCH, AXES, strict=True) if name in names)
 
 
@@ -156,7 +170,8 @@ def held_axes(layout: Layout, sets: ForceSets) -> list[HeldAxes]:
 def _held(axes: tuple[MotionAxis, ...], values: Array, vectors: Array) -> HeldAxes:
     """What singular values (m,), falling, and left vectors (m, m) hold of m axes."""
     kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
-    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
+    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed
+    # alone.
     held = np.linalg.norm(vectors[:, kept], axis=1)
     pushed = held > RANK_TOLERANCE
     coupled = pushed & (held <= 1.0 - RANK_TOLERANCE)

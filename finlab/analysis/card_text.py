@@ -14,11 +14,19 @@ _UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
 def card_blocks(card: ScoreCard) -> list[Block]:
     """Returns everything on the card."""
-    blocks: list[Block] = ["\n".join(_span_lines(card)), _axis_table(card), _evenness(card.authority)]
+    blocks: list[Block] = [
+        "\n".join(_span_lines(card)),
+        _axis_table(card),
+        _evenness(card.authority),
+    ]
     if card.losses:
         rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
-        what = "fin" if card.counted.endswith(" fins") and " and " not in card.counted else "actuator"
-        title = f"Share of the largest wrench that is left without one {what} (* the worst to lose):"
+        what = (
+            "fin" if card.counted.endswith(" fins") and " and " not in card.counted else "actuator"
+        )
+        title = (
+            f"Share of the largest wrench that is left without one {what} (* the worst to lose):"
+        )
         head = ("without", "rank", "weakest [N]", *AXES, "lost")
         blocks.append(Table(head, rows, (True, *(False,) * 8, True), title))
     return [*blocks, "\n".join(card.notes)] if card.notes else blocks

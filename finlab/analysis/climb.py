@@ -10,20 +10,24 @@ from finlab.analysis.moves import Moves
 from finlab.analysis.slopes import Hill, Look, difference, nudged
 from finlab.arrays import Array
 
-CLEARANCE = 0.10  # least distance between two actuators [m]; those that are closer already need not part
-PENALTY = 1e3  # cost of actuators that are too close or break another rule, per metre; far beyond any goal
+CLEARANCE = (
+    0.10  # least distance between two actuators [m]; those that are closer already need not part
+)
+# cost of actuators that are too close or break another rule, per metre; far beyond any goal
+PENALTY = 1e3
 ROUNDING = 1e-9  # distance [m] that counts for nothing
 FIRST, WIDEST, LEAST = 0.1, 0.3, 2e-5
 """Radii of the trust region, shares of the bounds: at first, at most, and where a climb ends."""
 SETTLED = 1e-5  # gain of a step, as a share of the value, at which a climb ends
 
 Rule = Callable[[Array, Array], Array]
-"""How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they
-keep it."""
+"""How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0
+where they keep it."""
 
 
 class Rules:
-    """What vectors have to keep beside their bounds: distances between actuators, a rule of the caller."""
+    """What vectors have to keep beside their bounds: distances between actuators, a rule of the
+    caller."""
 
     def __init__(self, moves: Moves, rule: Rule | None) -> None:
         self.moves = moves
@@ -36,14 +40,16 @@ class Rules:
         return np.asarray(np.linalg.norm(position[:, first] - position[:, second], axis=-1))
 
     def gaps(self, vectors: Array) -> Array:
-        """Returns by how much (P, pairs) [m] actuators moved by vectors (P, D) are farther apart than they
-        have to be."""
+        """Returns by how much (P, pairs) [m] actuators moved by vectors (P, D) are farther apart
+        than they have to be."""
         return np.asarray(self._apart(self.moves.positions(vectors)) - self._needed)
 
     def broken(self, vectors: Array) -> Array:
         """Returns how far vectors (P, D) break the rules (P,) [m]."""
         close = np.maximum(-self.gaps(vectors) - ROUNDING, 0.0).sum(-1)
-        return np.asarray(close if self._rule is None else close + self._rule(*self.moves.geometry(vectors)))
+        return np.asarray(
+            close if self._rule is None else close + self._rule(*self.moves.geometry(vectors))
+        )
 
 
 @dataclass
@@ -96,8 +102,8 @@ class Climb:
                 self._slopes = None
 
     def rounded(self, grid: Moves) -> tuple[float, Array]:
-        """Returns a vector (D,) on a grid nearby that is best by the slopes, one number after the other, and
-        its goal; minus infinity where it breaks a rule."""
+        """Returns a vector (D,) on a grid nearby that is best by the slopes, one number after the
+        other, and its goal; minus infinity where it breaks a rule."""
         value, slope = self.hill.slopes(self.at)
         best = grid.on_grid(self.at.vector[None])
         change = np.concatenate([np.zeros_like(best), np.diag(grid.step), -np.diag(grid.step)])
@@ -106,7 +112,8 @@ class Climb:
             near = np.abs(vectors - self.at.vector) <= 1.5 * grid.step + ROUNDING
             ahead = value + (vectors - self.at.vector) / self._width @ slope.T
             return np.asarray(
-                np.where(near.all(-1), ahead.min(-1), -np.inf) - PENALTY * self.rules.broken(vectors)
+                np.where(near.all(-1), ahead.min(-1), -np.inf)
+                - PENALTY * self.rules.broken(vectors)
             )
 
         for _ in range(3 * len(slope[0])):
@@ -119,7 +126,8 @@ class Climb:
         return self.hill.look(best[0], self.at).value if kept else -np.inf, best[0]
 
     def _bend(self, step: Array, turn: Array) -> None:
-        """Learn the curvature (BFGS, damped) from a step and by how much the slope is less at its end."""
+        """Learn the curvature (BFGS, damped) from a step and by how much the slope is less at its
+        end."""
         if self._curve is None:
             self._curve = np.eye(len(step)) * max(float(turn @ step / (step @ step)), 1e-3)
         ahead = self._curve @ step
@@ -140,10 +148,14 @@ class Climb:
         left = left[near]
         if self._curve is not None:
             return self._bent(self._curve, slope[0], (low, high), apart, left)
-        rows = np.concatenate([np.c_[-slope, np.ones(len(value))], np.c_[-apart, np.zeros(len(left))]])
+        rows = np.concatenate(
+            [np.c_[-slope, np.ones(len(value))], np.c_[-apart, np.zeros(len(left))]]
+        )
         box = np.c_[np.append(low, -np.inf), np.append(high, np.inf)]
         cost = np.append(np.zeros(len(low)), -1.0)
-        best = linprog(cost, A_ub=rows, b_ub=np.concatenate([value, left]), bounds=box, method="highs")
+        best = linprog(
+            cost, A_ub=rows, b_ub=np.concatenate([value, left]), bounds=box, method="highs"
+        )
         if best.x is None:
             return np.zeros(len(low)), 0.0
         return best.x[:-1], float(best.x[-1] - value.min())
@@ -165,8 +177,8 @@ class Climb:
         return np.clip(best.x, *box), -float(best.fun)
 
     def _keeping(self, vector: Array) -> Array | None:
-        """Of a step to a vector, what keeps all rules: all of it, or the numbers that do so each; None where
-        nothing does."""
+        """Of a step to a vector, what keeps all rules: all of it, or the numbers that do so each;
+        None where nothing does."""
         if self.rules.broken(vector[None])[0] <= 0.0:
             return vector
         step = vector - self.at.vector

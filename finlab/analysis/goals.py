@@ -1,7 +1,8 @@
 """Goals of improving a layout, measured for many variants of one layout at once.
 
-A search asks for quick measures, which are within about a percent of the fine ones on the score card.
-Actuators whose arc is wider than half a turn count with the convex hull of what they can push.
+A search asks for quick measures, which are within about a percent of the fine ones on the score
+card. Actuators whose arc is wider than half a turn count with the convex hull of what they can
+push.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +24,8 @@ from finlab.physics.objective import REACHED
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
 Goal = Callable[[ForceSets, Callable[[int], Layout]], Array]
-"""What variants (P) are worth (P,): more is better; of their sets and, one by one, their layouts."""
+"""What variants (P) are worth (P,): more is better; of their sets and, one by one, their
+layouts."""
 
 MISSION = (
     (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -46,18 +48,18 @@ def make_goal(
     axes: Sequence[MotionAxis] | None = None,
     flow: Array | None = None,
 ) -> Goal:
-    """Returns the measure called `name` for variants of a layout. Raises LayoutError: unknown goal or axis,
-    or too few actuators for a failure.
+    """Returns the measure called `name` for variants of a layout. Raises LayoutError: unknown goal
+    or axis, or too few actuators for a failure.
 
     Args:
         name: `weakest_direction`: the scaled wrench that is within reach in every direction [N].
-            `worst_single_failure`: the same after the loss of the actuator that leaves least of it [N].
-            `mission_power`: minus the mean least power of the mission's wrenches [W].
+            `worst_single_failure`: the same after the loss of the actuator that leaves least of it
+            [N]. `mission_power`: minus the mean least power of the mission's wrenches [W].
         layout: its limits and models hold for all variants.
         mission: wrenches (N, 6) [N, N m].
         fine: as the score card has it; otherwise quick.
-        axes: those of `AXES` whose directions count; on the others, anything may come. None for all that the
-            layout commands.
+        axes: those of `AXES` whose directions count; on the others, anything may come. None for all
+            that the layout commands.
         flow: velocity (6,) of the body relative to the water; None at rest.
     """
     search: dict[str, Any] = {} if fine else QUICK_SEARCH
@@ -79,7 +81,9 @@ def make_goal(
         """Of wrenches out of reach by what is missing."""
         robots = (Allocator(layout_of(row)) for row in range(len(sets.radius)))
         answers = [robot.allocate_batch(mission, flow=flow) for robot in robots]
-        power, missing = (np.stack([getattr(a, key) for a in answers]) for key in ("power", "err_norm"))
+        power, missing = (
+            np.stack([getattr(a, key) for a in answers]) for key in ("power", "err_norm")
+        )
         cost = np.where(missing <= REACHED, power, UNREACHED * (1.0 + missing))
         return np.asarray(-cost.mean(axis=1))
 
@@ -89,8 +93,10 @@ def make_goal(
         counts = [shape.axes for shape in shapes_of(layout, flow)]
         if sum(counts) - max(counts) < len(places):
             raise LayoutError(
-                f"the goal {name} needs {len(places)} directions after a loss, and layout {layout.name} has "
-                f"{layout.counted}, which push in {sum(counts)}; none can fail without losing an axis"
+                f"the goal {name} needs {len(places)} directions after a loss, and layout "
+                f"{layout.name} has "
+                f"{layout.counted}, which push in {sum(counts)}; none can fail without losing an "
+                "axis"
             )
         return after_worst_failure
     if name == "mission_power":
@@ -99,9 +105,9 @@ def make_goal(
 
 
 def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[MotionAxis, ...]:
-    """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
-    alone now where it has too few actuators to push both ways along all, wherever they go. Raises
-    LayoutError: there are none."""
+    """Returns the axes that count when none are named: all that the layout commands, or those that
+    it pushes alone now where it has too few actuators to push both ways along all, wherever they
+    go. Raises LayoutError: there are none."""
     shapes = shapes_of(layout, flow)
     commanded = commanded_axes(layout)
     # What pushes one way only has to be one more than there are axes.
@@ -111,7 +117,8 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[MotionAxis
     held = authority(layout, flow=flow).reachable
     if not held:
         raise LayoutError(
-            f"layout {layout.name} pushes along no axis alone, so there is nothing to raise; name axes, or a "
+            f"layout {layout.name} pushes along no axis alone, so there is nothing to raise; name "
+            "axes, or a "
             "flow where actuators need one"
         )
     return held

@@ -62,7 +62,8 @@ class Improvement:
     value_after: float  # the same for `layout`
     moved: tuple[str, ...]
     axes: tuple[str, ...]
-    """Those whose directions count for the goals of directions; on the others, anything may come."""
+    """Those whose directions count for the goals of directions; on the others, anything may
+    come."""
     card_before: ScoreCard
     card_after: ScoreCard
 
@@ -85,13 +86,14 @@ def optimize_layout(
     cancelled: Callable[[], bool] | None = None,
     mapped: Mapped = map,
 ) -> Improvement:
-    """Moves actuators to raise a goal: by its slopes from several starts, and, where these find nothing
-    better or the flow changes what actuators push, by SciPy's differential evolution.
+    """Moves actuators to raise a goal: by its slopes from several starts, and, where these find
+    nothing better or the flow changes what actuators push, by SciPy's differential evolution.
 
-    The same arguments and seed give the same layout. The present layout is among the first candidates, so the
-    result is never worse, unless the present one breaks the rule: then the best that keeps it is the result.
-    Raises LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what;
-    CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
+    The same arguments and seed give the same layout. The present layout is among the first
+    candidates, so the result is never worse, unless the present one breaks the rule: then the best
+    that keeps it is the result. Raises LayoutError: something about the actuators, bounds, pairs,
+    goal or axes does not fit; it says what; CommandError: `flow` is not six finite numbers, or
+    `mission` not such wrenches.
 
     Args:
         layout: where to start; its limits and models stay.
@@ -104,21 +106,26 @@ def optimize_layout(
         seed: of its random numbers.
         rule: another one that they have to keep, such as to stand outside of a hull.
         grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
-        axes: axes whose directions count for the two goals of directions, with anything on the others; all
-            that the layout commands when None, or, with too few actuators for them, those that are pushed
-            alone now, of which no move of a single coordinate costs one.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
+        axes: axes whose directions count for the two goals of directions, with anything on the
+            others; all that the layout commands when None, or, with too few actuators for them,
+            those that are pushed alone now, of which no move of a single coordinate costs one.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
+        rest.
         progress: called after each round.
-        cancelled: asked after each round, and within long ones; the search stops when it answers True.
-        mapped: gives a function's results for parts of the work, in order, as `map` does in this process;
-            `finlab.research.executor.map_parts` does on a cluster.
+        cancelled: asked after each round, and within long ones; the search stops when it answers
+        True.
+        mapped: gives a function's results for parts of the work, in order, as `map` does in this
+            process; `finlab.research.executor.map_parts` does on a cluster.
     """
     bounds = bounds or {}
     water = check_flow(flow)
     start = layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
-    known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
+    known = {
+        name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)])
+        for name in names
+    }
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, known, pairs, grid, water)
     if axes is None and goal != "mission_power":
@@ -138,7 +145,9 @@ def optimize_layout(
         search.climb(
             Power(moves.smooth, mission, water)
             if goal == "mission_power"
-            else Directions(moves.smooth, axes or commanded_axes(layout), goal == "worst_single_failure"),
+            else Directions(
+                moves.smooth, axes or commanded_axes(layout), goal == "worst_single_failure"
+            ),
             seed,
         )
     if not search.gained and not search.stopped:
@@ -146,7 +155,9 @@ def optimize_layout(
     best = moves.moved(search.vector)
     after = measured(best)
     best = replace(best, axes=start.axes)
-    wrong = [0.0 if rule is None else rule(p.position[None], p.frames[None])[0] for p in (layout, best)]
+    wrong = [
+        0.0 if rule is None else rule(p.position[None], p.frames[None])[0] for p in (layout, best)
+    ]
     improved = bool(wrong[1] <= 0.0 and (wrong[0] > 0.0 or after > before + 1e-9 * abs(before)))
     card = score_card(start, flow=water)
     return Improvement(
@@ -211,7 +222,8 @@ class _Search:
         return self.stopped or self._done >= self._rounds
 
     def climb(self, hill: Hill, seed: int) -> None:
-        """Climb a little from several starts, then on from the best of them; round what was found."""
+        """Climb a little from several starts, then on from the best of them; round what was
+        found."""
         best = self.best
         self.stopped = self._cancelled()
         climbs = list[Climb]()
@@ -231,8 +243,8 @@ class _Search:
                 self._note(*climb.rounded(self._moves))
 
     def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
-        """The present vector and the best of some random ones, as they are and as symmetric as the robot is
-        now, of those that keep all rules."""
+        """The present vector and the best of some random ones, as they are and as symmetric as the
+        robot is now, of those that keep all rules."""
         moves = self._moves
         random = np.random.default_rng(seed)
         if self._kept:
@@ -244,7 +256,9 @@ class _Search:
         most = -(-count // len(ways))
         for way in ways:
             nearer = [moves.start + share * (way - moves.start) for share in (1.0, 0.5, 0.25)]
-            kept = np.concatenate([some[self._rules.broken(some) <= 0.0] for some in nearer])[: RANK * most]
+            kept = np.concatenate([some[self._rules.broken(some) <= 0.0] for some in nearer])[
+                : RANK * most
+            ]
             for k in np.argsort(-hill.guess(kept), kind="stable")[:most]:
                 yield hill.look(kept[k])
 
@@ -268,7 +282,9 @@ class _Search:
             """Costs (P,), and the best measure of a variant that keeps all rules."""
             value = measure(moves.sets(vectors), lambda row: moves.moved(vectors[row]))
             close = self._rules.broken(moves.on_grid(vectors))
-            return np.asarray(-value + PENALTY * close), float(value[close <= 0.0].max(initial=-np.inf))
+            return np.asarray(-value + PENALTY * close), float(
+                value[close <= 0.0].max(initial=-np.inf)
+            )
 
         def cost(vectors: Array) -> Array:
             nonlocal least
@@ -300,4 +316,5 @@ class _Search:
             vectorized=True,
             updating="deferred",
             callback=self._after_round,  # type: ignore[arg-type]  # True stops it
-        )  # rows that were not looked at any more count as bad: the best is kept above, not scipy's own
+        )
+        # Rows that were not looked at any more count as bad: the best is the one kept above.

@@ -29,10 +29,15 @@ from finlab.physics.objective import REACHED
 
 
 def least_power(
-    layout: Layout, wrenches: ArrayLike, *, lost: Collection[str] = (), flow: ArrayLike | None = None
+    layout: Layout,
+    wrenches: ArrayLike,
+    *,
+    lost: Collection[str] = (),
+    flow: ArrayLike | None = None,
 ) -> Array:
-    """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
-    as for an allocator. Raises LayoutError: there is no actuator of a name in `lost`."""
+    """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of
+    reach; `flow` as for an allocator. Raises LayoutError: there is no actuator of a name in
+    `lost`."""
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
     if len(set(layout.indices(tuple(lost), "lost"))) == layout.n:
         return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
@@ -59,13 +64,14 @@ class ScoreCard:
     unit_wrench: tuple[float, ...]
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
-    """Least power [W] for it along each positive axis (6,), other axes zero; None where out of reach."""
+    """Least power [W] for it along each positive axis (6,), other axes zero; None where out of
+    reach."""
     notes: tuple[str, ...]  # sentences on where these numbers are not exact; none when they are
 
     @property
     def worst_loss(self) -> Loss | None:
-        """The loss that leaves least: the lowest rank, then the weakest direction, then the smallest
-        shares."""
+        """The loss that leaves least: the lowest rank, then the weakest direction, then the
+        smallest shares."""
         return min(self.losses, key=_left, default=None)
 
     def __str__(self) -> str:
@@ -84,10 +90,12 @@ class ScoreCard:
         return asdict(self) | {"axes": list(AXES), "reachable": reachable, "worst_loss": worst}
 
 
-def score_card(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `lost` push nothing, in a flow as for
-    `losses`. Raises LayoutError: there is no actuator of a name in `lost`; CommandError: `flow` is not six
-    finite numbers."""
+def score_card(
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
+) -> ScoreCard:
+    """Returns the score card of a layout whose actuators called `lost` push nothing, in a flow as
+    for `losses`. Raises LayoutError: there is no actuator of a name in `lost`; CommandError: `flow`
+    is not six finite numbers."""
     water = check_flow(flow)
     held = authority(layout, lost, water)
     power = least_power(layout, np.diag(UNIT), lost=lost, flow=water)
@@ -121,16 +129,24 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
         what = "The weakest direction is"
         if n_wide > MAX_CUT:
             what = "Largest wrenches, the weakest direction and energies are"
-        notes.append(f"{what} of the convex hull: some arcs are wider than half a turn but not full circles.")
+        notes.append(
+            f"{what} of the convex hull: some arcs are wider than half a turn but not full circles."
+        )
     still = [name for name in layout.by_flow if name not in lost]
     if flow is not None and still:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     if flow is None and still:
-        notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
+        notes.append(
+            f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow)."
+        )
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in lost):
-        notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
+        notes.append(
+            "Fins that follow a table count with the largest thrust that was sampled from it."
+        )
     if layout.interaction is not None:
-        notes.append("Reach and power are those of the actuators' laws: what their jets take is not in them.")
+        notes.append(
+            "Reach and power are those of the actuators' laws: what their jets take is not in them."
+        )
     return tuple(notes)
 
 
@@ -139,12 +155,15 @@ class QuickCheck(HeldAxes):
     """Axes that the working actuators hold, and those that a loss costs."""
 
     lost: tuple[tuple[str, tuple[MotionAxis, ...]], ...]
-    """Working actuators with the axes that the loss of each costs; those that cost none are left out."""
+    """Working actuators with the axes that the loss of each costs; those that cost none are left
+    out."""
 
 
-def quick_check(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> QuickCheck:
-    """Returns what the working actuators hold in a flow as of `score_card`, from singular values alone.
-    Raises LayoutError: there is no actuator of a name in `lost`."""
+def quick_check(
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
+) -> QuickCheck:
+    """Returns what the working actuators hold in a flow as of `score_card`, from singular values
+    alone. Raises LayoutError: there is no actuator of a name in `lost`."""
     working = [name for name in layout.names if name not in lost]
     single = working if len(working) > 1 else []
     sets = force_sets(layout, lost, check_flow(flow)).tile(1 + len(single))
@@ -155,4 +174,6 @@ def quick_check(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | No
         name: tuple(axis for axis in held.alone if axis not in after.alone)
         for name, after in zip(single, left, strict=True)
     }
-    return QuickCheck(**vars(held), lost=tuple((name, axes) for name, axes in costs.items() if axes))
+    return QuickCheck(
+        **vars(held), lost=tuple((name, axes) for name, axes in costs.items() if axes)
+    )

@@ -1,8 +1,9 @@
 """Slopes of the goals of improving a layout.
 
-A goal of directions is the least of the distances of all faces of the set of wrenches, each of which changes
-with the effectiveness matrix by the product of its normal and the forces at its foot. Least power changes by
-the product of the prices of a wrench and the forces that give it (the envelope theorem, both).
+A goal of directions is the least of the distances of all faces of the set of wrenches, each of
+which changes with the effectiveness matrix by the product of its normal and the forces at its foot.
+Least power changes by the product of the prices of a wrench and the forces that give it (the
+envelope theorem, both).
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along, singular_value
 from finlab.layout.effectiveness import moved_effectiveness
 
 KEPT, DRAWN = 60, 8
-"""Most faces that are followed, and random directions, both ways, that look for further ones in each look."""
+"""Most faces that are followed, and random directions, both ways, that look for further ones in
+each look."""
 FREE = 1e-3  # share of the largest effect on a face's distance up to which a force counts as free
 FIRST_WALKS = 4  # walks from face to face in the first look; in those that follow it is one
 ALIKE = 1.0 - 1e-5  # cosine between the normals of one face
@@ -63,8 +65,9 @@ class _Faces(NamedTuple):
     """Planar forces (K, n, 2) [N] that give a wrench on the face."""
 
     def foot_force(self) -> Array:
-        """Planar forces (K, n, 2) [N], of which those that the face leaves free may exceed their limits, that
-        give the wrench at the face's foot: the slope of its distance is as if its normal did not turn."""
+        """Planar forces (K, n, 2) [N], of which those that the face leaves free may exceed their
+        limits, that give the wrench at the face's foot: the slope of its distance is as if its
+        normal did not turn."""
         effect = np.linalg.norm(self.sets.pull(self.normal), axis=-1) * self.sets.radius
         free = effect <= FREE * effect.max(-1, keepdims=True)
         columns = (self.sets.effectiveness * free[..., None, None]).reshape(
@@ -108,7 +111,9 @@ class Directions:
         starts = self._drawn.standard_normal((robots, DRAWN if before else 2 * DRAWN, axes))
         if before is None:
             fixed = np.broadcast_to(np.eye(axes), (robots, axes, axes))
-            starts = np.concatenate([starts, fixed, singular_values(sets)[1].swapaxes(-1, -2)], axis=1)
+            starts = np.concatenate(
+                [starts, fixed, singular_values(sets)[1].swapaxes(-1, -2)], axis=1
+            )
         ends = np.concatenate([starts, -starts], axis=1).reshape(-1, axes)
         robot = np.repeat(np.arange(robots), len(ends) // robots)
         if before is not None:
@@ -129,11 +134,13 @@ class Directions:
         return Look(vector, float(distance[kept[0]]), faces)
 
     def slopes(self, look: Look) -> tuple[Array, Array]:
-        """Returns the goal about a vector as the least of K linear functions of the change, a share of the
-        bounds: values (K,) and slopes (K, D)."""
+        """Returns the goal about a vector as the least of K linear functions of the change, a share
+        of the bounds: values (K,) and slopes (K, D)."""
         faces = look.seen
         change = difference(self._sets(nudged(self._moves, look.vector)).effectiveness)
-        slope = np.einsum("kia,Diam,km->kD", faces.foot_force(), change, faces.normal, optimize=True)
+        slope = np.einsum(
+            "kia,Diam,km->kD", faces.foot_force(), change, faces.normal, optimize=True
+        )
         return faces.distance, slope
 
 
@@ -146,8 +153,8 @@ class Power:
         self._flow = flow
 
     def guess(self, vectors: Array) -> Array:
-        """Returns what vectors (P, D) promise (P,): minus squares of what is missing, and far behind of the
-        least shares of the largest forces."""
+        """Returns what vectors (P, D) promise (P,): minus squares of what is missing, and far
+        behind of the least shares of the largest forces."""
         full = self._moves.sets(vectors).full_effectiveness()
         wanted = np.nan_to_num(self._mission) / SCALE
         share = wanted @ np.linalg.pinv(full, rcond=RANK_TOLERANCE)
@@ -162,12 +169,14 @@ class Power:
         return Look(vector, -float(np.mean(costs)), answers)
 
     def slopes(self, look: Look) -> tuple[Array, Array]:
-        """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, of what is
-        missing."""
+        """Returns value (1,) and slopes (1, D), as for `Directions`; of a wrench out of reach, of
+        what is missing."""
         moves = self._moves
         total = np.zeros(len(look.vector))
         frames = moves.geometry(look.vector[None])[1][0]
-        change = difference(moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, look.vector))))
+        change = difference(
+            moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, look.vector)))
+        )
         for answer in look.seen:
             prices = answer.prices
             if not answer.reachable:

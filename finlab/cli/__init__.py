@@ -1,8 +1,9 @@
-"""The `finlab` command: verbs that parse, call one library function and print, and their pages of help.
+"""The `finlab` command: verbs that parse, call one library function and print, and their pages of
+help.
 
-`VERBS` says where each verb stands. A module imports the library only
-inside its functions, so that `finlab --help` stays fast and `finlab layout check` never loads torch. It
-writes its files before it prints, so that a reader that goes away (`finlab ... | head`) costs none of them.
+`VERBS` says where each verb stands. A module imports the library only inside its functions, so that
+`finlab --help` stays fast and `finlab layout check` never loads torch. It writes its files before
+it prints, so that a reader that goes away (`finlab ... | head`) costs none of them.
 """
 
 import io
@@ -29,10 +30,14 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "layout": ("finlab layout show A",),
     "layout check": ("finlab layout check my_robot.yaml", "finlab layout check A B my_robot.yaml"),
-    "layout show": ("finlab layout show A --lost front_right", "finlab layout show A --json card.json"),
+    "layout show": (
+        "finlab layout show A --lost front_right",
+        "finlab layout show A --json card.json",
+    ),
     "layout optimize": (
         "finlab layout optimize A --actuators front_right front_left -o better.yaml",
-        "finlab layout optimize bluerov2 --actuators front_left --goal worst_single_failure -o better.yaml",
+        "finlab layout optimize bluerov2 --actuators front_left --goal worst_single_failure -o "
+        "better.yaml",
     ),
     "layout convert": (
         "finlab layout convert robot.urdf my_robot.yaml",
@@ -75,12 +80,13 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "export": ("finlab export A -o my_robot", "finlab export bluerov2_heavy --c firmware"),
     "app": ("finlab app --layout A --port 8080",),
 }
-"""Examples of each verb, and of each group of them; those of an experiment are made of its options."""
+"""Examples of each verb, and of each group of them; those of an experiment are made of its
+options."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command, by the arguments after the program's name, those of this process by default; the exit
-    code, 0, or 2 after one plain sentence on stderr."""
+    """Run one command, by the arguments after the program's name, those of this process by default;
+    the exit code, 0, or 2 after one plain sentence on stderr."""
     return exit_code("finlab", lambda: _run(list(sys.argv[1:] if argv is None else argv)))
 
 
@@ -139,8 +145,8 @@ VERBS = {
     "export": "finlab.cli.robot_verbs:export",
     "app": "finlab.cli.app_verb:app",
 }
-"""Verb -> where its function stands, `module:function`; only that of the asked verb is imported. `eval` makes
-its verbs of the experiments that there are."""
+"""Verb -> where its function stands, `module:function`; only that of the asked verb is imported.
+`eval` makes its verbs of the experiments that there are."""
 GROUPS = {
     "layout": "Check, show and optimize layout files.",
     "data": "Generate what the paper's networks learn from.",
@@ -154,7 +160,8 @@ OTHER_NAMES = {"fit actuator": "The same as `fit thruster`, by its earlier name.
 
 
 def _ran(argv: list[str]) -> Any:
-    """What the verb returns that arguments name, which alone is imported: an exit code, None means 0."""
+    """What the verb returns that arguments name, which alone is imported: an exit code, None means
+    0."""
     name = argv[0] if argv else ""
     if name in VERBS or name in GROUPS:
         verb = _verb(name, argv)
@@ -193,7 +200,8 @@ def examples(argv: Sequence[str]) -> tuple[str, ...]:
         argv: the arguments after the program's name.
 
     Returns:
-        Lines for a shell, at least one; of a group's verb that has none of its own, those of the group.
+        Lines for a shell, at least one; of a group's verb that has none of its own, those of the
+        group.
     """
     words = [word for word in argv if not word.startswith("-")]
     if words[:1] == ["eval"] and len(words) > 1 and " ".join(words[:2]) not in EXAMPLES:

@@ -26,7 +26,8 @@ def app(
     """
     from finlab.assets import install, shipped
 
-    # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
+    # In a wheel it travels inside this package: an installation has no top-level package of so
+    # plain a name.
     if (home := str(shipped("webapp").parent)) not in sys.path:
         sys.path.insert(0, home)
     try:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 def verbs(argv: Sequence[str]) -> SubcommandApp:
     """All verbs of `finlab eval`, from the arguments after `finlab`.
 
-    Only the experiment that these name is imported, or all for `finlab eval --help`; the others have no
-    options here.
+    Only the experiment that these name is imported, or all for `finlab eval --help`; the others
+    have no options here.
     """
     from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 
@@ -71,8 +71,12 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         about = "file for a picture, .png, .svg or .pdf (needs matplotlib, extra plot)"
         files["plot"] = Annotated[Path | None, arg(metavar="FILE", help=about)]
     for name, kind in files.items():
-        shown[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
-    arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
+        shown[name] = inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind
+        )
+    arguments = (
+        inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
+    )
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
     verb.__annotations__ = {name: each.annotation for name, each in shown.items()}
@@ -80,7 +84,8 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
 
 
 def examples_of(name: str) -> tuple[str, ...]:
-    """Two lines for a shell: an experiment as the quick report runs it, and with its rows in a file.
+    """Two lines for a shell: an experiment as the quick report runs it, and with its rows in a
+    file.
 
     Args:
         name: the experiment, one of `EXPERIMENTS`; for another name those of `wrench`.
@@ -120,7 +125,9 @@ def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
         if words:
             return tuple(words)
     what = "names" if kind is str else "numbers"
-    raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}")
+    raise DataError(
+        f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}"
+    )
 
 
 def report(
@@ -158,7 +165,8 @@ def bench(
     json: JsonFile = None,
     cluster: Cluster = None,
 ) -> None:
-    """Measure allocation methods, yours or finlab's, on the same robots and wrenches: error, power, time.
+    """Measure allocation methods, yours or finlab's, on the same robots and wrenches: error, power,
+    time.
 
     Example: finlab bench my_method.py:allocate dual --quick
 

@@ -16,8 +16,8 @@ def fin(
     """Fit a fin to a load cell's measurements, and write it for layouts to name.
 
     Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P); A is half the stroke, phi the zero
-    direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis, z' up). Units may stand in
-    the header, `A [deg]`, as may `stroke` for whole strokes in place of A.
+    direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis, z' up). Units may
+    stand in the header, `A [deg]`, as may `stroke` for whole strokes in place of A.
 
     Args:
         data: CSV files of one fin.
@@ -43,14 +43,15 @@ def thruster(
     """Fit a thruster to its bench table.
 
     The table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
-    current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated. What is
-    printed goes into a layout. `finlab fit fin` is for fins. Of a workbook (.xlsx) all sheets are
-    read that hold a table.
+    current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated.
+    What is printed goes into a layout. `finlab fit fin` is for fins. Of a workbook (.xlsx) all
+    sheets are read that hold a table.
 
     Args:
         data: CSV files or workbooks of one thruster.
         output: the table of thrust.
-        voltage: which of several counts [V]; between two of them forces and powers are interpolated.
+        voltage: which of several counts [V]; between two of them forces and powers are
+        interpolated.
     """
     from finlab.errors import DataError
     from finlab.files.worker import in_worker
@@ -71,11 +72,13 @@ def interaction(
     samples: Annotated[Positional[Path], arg(metavar="SAMPLES.csv")],
     output: Annotated[Path | None, arg(metavar="LAYOUT2", aliases=["-o"])] = None,
 ) -> None:
-    """Fit the formula of jets to samples of one robot: what its actuators do to each other and to its hull.
+    """Fit the formula of jets to samples of one robot: what its actuators do to each other and to
+    its hull.
 
-    The file has a column for each number of a command, NAME.A, NAME.f, NAME.phi of a fin, NAME.force of a
-    thruster, NAME.angle and NAME.force of an azimuth, and the wrench Fx, Fy, Fz, Tx, Ty, Tz [N, N m], body
-    frame, measured with the robot held. Twenty samples at random commands do.
+    The file has a column for each number of a command, NAME.A, NAME.f, NAME.phi of a fin,
+    NAME.force of a thruster, NAME.angle and NAME.force of an azimuth, and the wrench Fx, Fy, Fz,
+    Tx, Ty, Tz [N, N m], body frame, measured with the robot held. Twenty samples at random commands
+    do.
 
     Args:
         layout: layout file or the name of a shipped layout.
@@ -91,7 +94,10 @@ def interaction(
 
     robot = open_robot(layout)[0]
     fit = fit_constants(in_worker(read_table, robot, samples))
-    print(f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets {fit.left:.3g}")
+    print(
+        f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets "
+        f"{fit.left:.3g}"
+    )
     print(f"interaction: {plain(fit.jets)}".replace("'", ""))
     if output is not None:
         save_layout(replace(robot, interaction=fit.jets), output)

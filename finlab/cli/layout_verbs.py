@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from finlab.analysis.authority import MotionAxis
 
 REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
-"""What else there is to say of a layout that is right: where functions stand, `module:function`, that give a
-sentence or None."""
+"""What else there is to say of a layout that is right: where functions stand, `module:function`,
+that give a sentence or None."""
 
 
 def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...")]) -> int:
@@ -29,7 +29,9 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
         layouts: files or names of shipped layouts.
     """
     if not layouts:
-        raise FinlabError("layout check: expected at least one file or name of a shipped layout, got none")
+        raise FinlabError(
+            "layout check: expected at least one file or name of a shipped layout, got none"
+        )
     n_bad = 0
     for text in layouts:
         try:
@@ -79,15 +81,17 @@ def convert_layout(
     """Make a layout of a file of others, or the other way round: URDF, SDF, PX4, ArduSub, a matrix.
 
     Args:
-        file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or layout.
+        file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or
+        layout.
         output: file to write; its end says the form.
         to: form of the output, where its end is not enough.
         fins: links of a robot description that are fins.
         thrusters: links that are thrusters although no plugin drives them.
-        origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
+        origin: where the layout's origin goes: the centre of gravity of all links, or the root
+        link's frame.
         force: least and most force [N] of every thruster, in place of the file's.
-        frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down (FRD);
-            what the file says, else FLU, by default.
+        frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down
+            (FRD); what the file says, else FLU, by default.
         rows: what the rows of a matrix without labels are, where they may be both.
         model: which model of a description of several; the first with thrusters by default.
     """
@@ -96,7 +100,10 @@ def convert_layout(
 
     exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
     layout, notes = in_worker(convert, file, output, to, exchange)
-    lines = [f"{output}: {layout.name} with {layout.counted}", *(f"- {printable(note)}" for note in notes)]
+    lines = [
+        f"{output}: {layout.name} with {layout.counted}",
+        *(f"- {printable(note)}" for note in notes),
+    ]
     print("\n".join(lines))
 
 
@@ -124,11 +131,11 @@ def optimize(
         output: layout file to write.
         goal: weakest_direction, mission_power or worst_single_failure.
         reach: how far each may go from where it is, either way along x, y and z [m].
-        turn: how far each may turn about the vertical, either way [deg]; all but fins with a mounting angle
-            also tilt.
+        turn: how far each may turn about the vertical, either way [deg]; all but fins with a
+            mounting angle also tilt.
         mirror: keep actuators that are each other's mirror image so.
-        axes: surge, sway, heave, roll, pitch, yaw: those whose directions count; all that there are actuators
-            enough for by default.
+        axes: surge, sway, heave, roll, pitch, yaw: those whose directions count; all that there are
+            actuators enough for by default.
         wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
         rounds: most rounds of the search.
         seed: same arguments and seed, same layout.
@@ -175,7 +182,10 @@ def optimize(
 
 def _improvement_text(improvement: Improvement, output: Path) -> str:
     """Where the actuators went, the card after it, and where the layout was written."""
-    lines = [f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}", ""]
+    lines = [
+        f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}",
+        "",
+    ]
     for name in improvement.moved:
         part = improvement.layout.part(name)
         place = "  ".join(f"{value:6.3f}" for value in part.position)

@@ -26,17 +26,19 @@ def log(
     plot: Annotated[Path | None, arg(metavar="FILE")] = None,
     json: shared_options.JsonFile = None,
 ) -> None:
-    """Say from a log of PX4 (.ulg), ArduSub (.bin) or ROS (a bag) why a thruster saturated, which axis was
-    lost, and what would have held it.
+    """Say from a log of PX4 (.ulg), ArduSub (.bin) or ROS (a bag) why a thruster saturated, which
+    axis was lost, and what would have held it.
 
     Args:
         file: log, or folder of a bag.
-        robot: layout file or name of a shipped layout; the robot of the log's own parameters by default.
-        scale: what a setpoint of 1 asks for on each axis [N, N m]; the autopilot's own rule by default.
+        robot: layout file or name of a shipped layout; the robot of the log's own parameters by
+        default.
+        scale: what a setpoint of 1 asks for on each axis [N, N m]; the autopilot's own rule by
+        default.
         demand: topic of a bag with the wrench, where there are several.
         outputs: topic of a bag with what actuators were sent, where there are several.
-        priority: for policy priority: a group of axes with commas between, most important first; the axis
-            that lost most by default.
+        priority: for policy priority: a group of axes with commas between, most important first;
+            the axis that lost most by default.
         improve: search for a better layout and replay on it.
         output: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
@@ -52,7 +54,9 @@ def log(
     check_picture(plot)
     known = None if robot is None else shared_options.open_robot(robot)[0]
     read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
-    groups = cast("list[list[Axis]]", [group.split(",") for group in priority])  # `judge` checks them
+    groups = cast(
+        "list[list[Axis]]", [group.split(",") for group in priority]
+    )  # `judge` checks them
     judged = judge(in_worker(read, file, known), priority=groups, improve=improve)
     if plot is not None:
         write_picture(lambda _: picture(judged), [], plot)

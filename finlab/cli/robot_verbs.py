@@ -41,18 +41,21 @@ def allocate(
         wrench: target in the body frame [N, N m].
         lost: name of an actuator that does not work.
         free: an axis that may take any wrench, such as Ty.
-        method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
+        method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or
+        ipopt.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
+        policy: for a wrench out of reach: closest, direction (same direction, scaled down) or
+        priority.
         axis_weights: for `closest`: weight of each axis of the error.
-        priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
+        priority: for `priority`: a group of axes with commas between, most important first, such as
+        Fz,Tz.
         weak: an actuator of less strength: share that is left of its limits, such as bow=0.5.
         torn: a fin or rudder that gives a share of its force at every command.
-        stuck: where one stays: the angle at which a fin or azimuth no longer turns [deg], or the force at
-            which a thruster hangs [N].
-        running: the command that one keeps whatever is asked: of a fin A,F,DEG [rad, Hz, deg], of an azimuth
-            DEG,N [deg, N], of a thruster N [N].
+        stuck: where one stays: the angle at which a fin or azimuth no longer turns [deg], or the
+            force at which a thruster hangs [N].
+        running: the command that one keeps whatever is asked: of a fin A,F,DEG [rad, Hz, deg], of
+            an azimuth DEG,N [deg, N], of a thruster N [N].
         bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
     """
@@ -70,7 +73,9 @@ def allocate(
     allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
-    result = allocator.allocate(wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed)
+    result = allocator.allocate(
+        wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed
+    )
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
@@ -90,26 +95,34 @@ def export(
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     flow: shared_options.Flow = None,
 ) -> None:
-    """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), the
-    layout graph file, or the allocator in C for a microcontroller.
+    """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums),
+    the layout graph file, or the allocator in C for a microcontroller.
 
     Args:
         output: folder to write the bundle to.
-        graph: file to write the graph of actuators to (JSON, node-link form), for networkx and learners.
-        c: folder to write the C99 sources of method dual for this robot to, with a self-test and examples.
+        graph: file to write the graph of actuators to (JSON, node-link form), for networkx and
+        learners.
+        c: folder to write the C99 sources of method dual for this robot to, with a self-test and
+        examples.
         zip: write one archive, DIR.zip, instead of a folder.
         lost: name of an actuator that does not work.
         method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
         checkpoint: trained checkpoint of mdn or paper, which travels; the shipped one by default.
     """
     if output is None and graph is None and c is None:
-        raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, --c DIR, or several")
+        raise FinlabError(
+            "nothing to write: expected -o DIR (bundle), --graph FILE, --c DIR, or several"
+        )
     if c is not None and method != "dual":
         raise FinlabError(f"method {method!r}: has no C sources; leave --method out, or --c")
     if c is None and flow is not None:
-        raise FinlabError("flow: only C sources are of one speed; give --c DIR, too, or leave --flow out")
+        raise FinlabError(
+            "flow: only C sources are of one speed; give --c DIR, too, or leave --flow out"
+        )
     if output is not None and output.suffix == ".json":
-        raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
+        raise FinlabError(
+            f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)"
+        )
     robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
     left = robot.without(gone) if gone else robot
     if graph is not None:
@@ -124,7 +137,10 @@ def export(
         write_c(files, c)
         print(f"{c}: {left.counted}, {len(files)} files; try: cc -std=c99 {c}/*.c -lm && ./a.out")
         if flow is None and left.by_flow:
-            print(f"{', '.join(left.by_flow)}: no force at rest; --flow says of which speed the files are")
+            print(
+                f"{', '.join(left.by_flow)}: no force at rest; --flow says of which speed the "
+                "files are"
+            )
     if output is None:
         return
     from finlab.allocation import Allocator

@@ -1,4 +1,5 @@
-"""Options that several verbs share: robots by name, counts, `--json [FILE]` and `--cluster ADDRESS`."""
+"""Options that several verbs share: robots by name, counts, `--json [FILE]` and `--cluster
+ADDRESS`."""
 
 from __future__ import annotations
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 
 JSON = "file for one JSON object; it is printed in place of the table where no file is named"
 LAYOUT = "layout file, bundle, or the name of a shipped layout"
-FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
+FLOW = (
+    "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
+)
 CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://desk:8786"
 EXECUTOR = "finlab.research.executor"
 """Where the workers of a cluster are asked; it is imported with an address alone."""
@@ -46,13 +49,15 @@ def with_json_file(argv: Sequence[str]) -> list[str]:
 
 
 def check_json_file(path: Path | None, option: str = "json") -> None:
-    """Refuse a file before the work, not after it. Raises DataError: it is in no folder, or is one."""
+    """Refuse a file before the work, not after it. Raises DataError: it is in no folder, or is
+    one."""
     if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
         raise DataError(f"{option}: expected a file in an existing folder, got {path}")
 
 
 def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
-    """Write one JSON object into a file and print a table, where they are given; or print the object."""
+    """Write one JSON object into a file and print a table, where they are given; or print the
+    object."""
     if path == STDOUT:
         print(json.dumps(value, allow_nan=False))
         return
@@ -65,9 +70,9 @@ def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
 
 
 def open_robot(text: str, lost: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
-    """The layout in a file, or the shipped one of that name, and the names of all actuators that do not work:
-    those that a bundle marks as lost and those named now, each once. Raises LayoutError: neither a readable
-    file nor a shipped layout."""
+    """The layout in a file, or the shipped one of that name, and the names of all actuators that do
+    not work: those that a bundle marks as lost and those named now, each once. Raises LayoutError:
+    neither a readable file nor a shipped layout."""
     from finlab.assets import shipped_layouts
     from finlab.layout.load import layout_and_lost
 
@@ -84,7 +89,9 @@ def check_positive(**counts: int | None) -> None:
     """Refuse counts, each under the name of its option. Raises CommandError: one is below 1."""
     for name, value in counts.items():
         if value is not None and value < 1:
-            raise CommandError(f"{name.replace('_', '-')}: expected a number of at least 1, got {value}")
+            raise CommandError(
+                f"{name.replace('_', '-')}: expected a number of at least 1, got {value}"
+            )
 
 
 def tell(words: str) -> None:
@@ -95,8 +102,8 @@ def tell(words: str) -> None:
 
 @contextmanager
 def mapping_on(cluster: str | None) -> Iterator[Any]:
-    """Yields what computes the parts of a piece of work, as `map` does: this process, or, with the address of
-    a scheduler, the workers of its cluster. Raises FinlabError: nobody answers there."""
+    """Yields what computes the parts of a piece of work, as `map` does: this process, or, with the
+    address of a scheduler, the workers of its cluster. Raises FinlabError: nobody answers there."""
     if cluster is None:
         yield map
         return

@@ -1,4 +1,5 @@
-"""`finlab simulate`: a robot swims a trajectory, actuators are lost on the way, a log is written."""
+"""`finlab simulate`: a robot swims a trajectory, actuators are lost on the way, a log is
+written."""
 
 from __future__ import annotations
 
@@ -28,17 +29,19 @@ class Options:
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")]
     """layout file, bundle, or the name of a shipped layout."""
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous"
-    """circle, lissajous, square, dive, straight, station, or a CSV file with the columns t, x, y, z."""
+    """circle, lissajous, square, dive, straight, station, or a CSV file with the columns t, x, y,
+    z."""
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """how many times larger the path is to be, in the same time; a torpedo needs speed."""
     controller: Annotated[str, arg(metavar="NAME")] = "tracking"
-    """tracking; or one of the paper's: waypoint, or velocity, which keeps speed and depth of the path, but no
-    course."""
+    """tracking; or one of the paper's: waypoint, or velocity, which keeps speed and depth of the
+    path, but no course."""
     excite: bool = False
-    """shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and attitude;
-    `finlab fit robot` learns the robot from the log."""
+    """shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
+    attitude; `finlab fit robot` learns the robot from the log."""
     lost: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = ()
-    """an actuator and when it is lost, such as front_left@30; from the start where no time is said."""
+    """an actuator and when it is lost, such as front_left@30; from the start where no time is
+    said."""
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE@SECONDS")] = ()
     """one that gives a share of its thrust from then on, such as front_left=0.5@30."""
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = ()
@@ -50,14 +53,16 @@ class Options:
     monitor: bool = False
     """let a FaultMonitor watch the robot and tell the allocator what it finds."""
     learn: bool = False
-    """every minute fit the actuators' strengths and directions to the last four minutes of the swim, and
-    allocate with them from then on; for methods that take any shaft, and fins of a law."""
+    """every minute fit the actuators' strengths and directions to the last four minutes of the
+    swim, and allocate with them from then on; for methods that take any shaft, and fins of a
+    law."""
     method: Annotated[str, arg(metavar="NAME")] = "dual"
     """dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt."""
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None
     """time for a shipped trajectory."""
     truth: Annotated[str | None, arg(metavar="LAYOUT")] = None
-    """the robot that really swims, a layout with the same actuators; the one that is believed by default."""
+    """the robot that really swims, a layout with the same actuators; the one that is believed by
+    default."""
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0)
     """velocity of the water in the world [m/s]."""
     noise: bool = True
@@ -78,8 +83,12 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
 
     if options.output is not None:
         make_folder(options.output)
-    tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
-    with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
+    tqdm.monitor_interval = (
+        0  # a process of one thread is copied to read files, without room on a disk
+    )
+    with tqdm(
+        desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr
+    ) as bar:
         from finlab.research.evaluation.plots import check_picture, write_picture
         from finlab.swim.vehicle.righting import righting_words
 
@@ -117,7 +126,8 @@ def _excitation(options: Options) -> ClosedLoop:
     robot, lost = open_robot(options.layout)
     if _faults(options) or options.monitor or options.learn or options.controller != "tracking":
         raise FinlabError(
-            "--excite: a robot is learned with the fins that it has, by a controller of its own; leave "
+            "--excite: a robot is learned with the fins that it has, by a controller of its own; "
+            "leave "
             "--controller, --lost, --torn, --stuck, --whole, --monitor and --learn out"
         )
     seconds = LONGEST_S if options.duration is None else options.duration
@@ -186,7 +196,9 @@ def summary(log: RunLog) -> str:
         f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
         f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
     )
-    speed = f"MAE of the speed {speed_error(log).mean():.4f} m/s   depth RMSE {row['depth_rmse']:.4f} m"
+    speed = (
+        f"MAE of the speed {speed_error(log).mean():.4f} m/s   depth RMSE {row['depth_rmse']:.4f} m"
+    )
     lines = [
         f"{log.layout} along {log.task} by {log.method}, {log.time[-1]:.0f} s"
         + (f", lost: {', '.join(lost)}" if lost else ""),
@@ -211,13 +223,15 @@ def excitation_summary(log: RunLog) -> str:
     tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())
     return (
         f"{log.layout} shaken on the spot, {log.time[-1]:.0f} s: at most "
-        f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of roll or "
+        f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of "
+        "roll or "
         f"pitch, {np.abs(log.motion[:, :3]).max():.2f} m/s"
     )
 
 
 def _learner(allocator: Allocator) -> OnlineFit:
-    """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
+    """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that
+    lean."""
     import numpy as np
 
     from finlab.swim.identification.fitted_robot import OnlineFit, leaned
@@ -241,5 +255,7 @@ def monitored(loop: ClosedLoop) -> str:
     words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
     for name, held in damage.stuck.items():
         turns = loop.layout.part(name).TURNS
-        words.append(f"{name} stuck at " + (f"{math.degrees(held):.0f} deg" if turns else f"{held:.3g} N"))
+        words.append(
+            f"{name} stuck at " + (f"{math.degrees(held):.0f} deg" if turns else f"{held:.3g} N")
+        )
     return ", ".join(words) or "all fins whole"

@@ -1,4 +1,5 @@
-"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: data, networks."""
+"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: data,
+networks."""
 
 from __future__ import annotations
 
@@ -63,13 +64,16 @@ def mdn(
 
     check_positive(minutes=minutes, steps=steps)
     seconds = None if minutes is None else 60.0 * minutes
-    _report(output, train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds, resume=resume))
+    _report(
+        output, train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds, resume=resume)
+    )
 
 
 def surrogate(options: OmitArgPrefixes[Paper]) -> None:
     """Train the paper's physics surrogate and write a checkpoint folder with it alone.
 
-    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate ...
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate
+    ...
     """
     from finlab.research.paper.training.train import Options, train_surrogate
 
@@ -82,7 +86,8 @@ def allocator(
 ) -> None:
     """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
 
-    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train allocator ...
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train allocator
+    ...
 
     Args:
         surrogate: checkpoint whose surrogate guides the training.
@@ -101,13 +106,14 @@ def interaction(
     minutes: _Count = None,
     resume: bool = False,
 ) -> None:
-    """Learn what actuators do to each other from forward data of many robots, for robots never seen.
+    """Learn what actuators do to each other from forward data of many robots, for robots never
+    seen.
 
     A layout names the network: interaction: {type: learned, path: FILE}.
 
     Args:
-        data: NPZ file of `finlab data interaction`, or a folder with a layout file and a CSV file of the same
-            name for each robot (docs/tutorials/tank.md).
+        data: NPZ file of `finlab data interaction`, or a folder with a layout file and a CSV file
+            of the same name for each robot (docs/tutorials/tank.md).
         output: folder for the network, log, curves and state.
         seed: of the first weights and the order of the data.
         steps: optimizer steps.
@@ -119,7 +125,10 @@ def interaction(
 
     check_positive(steps=steps, minutes=minutes)
     error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
-    print(f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise included")
+    print(
+        f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise "
+        "included"
+    )
 
 
 def _report(output: Path, made: TrainedWeights) -> None:
@@ -163,7 +172,11 @@ def generate(
     if not 0.0 <= varied_limits <= 1.0:
         raise CommandError(f"varied-limits: expected a share from 0 to 1, got {varied_limits:g}")
     table = (("path", str(Path(fin_model).resolve())),)
-    model = FinModelSpec("table", table) if fin_model.lower().endswith(".csv") else FinModelSpec(fin_model)
+    model = (
+        FinModelSpec("table", table)
+        if fin_model.lower().endswith(".csv")
+        else FinModelSpec(fin_model)
+    )
     with on_cluster(cluster):
         generate(output, DataSettings(layouts, commands, seed, varied_limits, model))
     print(f"{output}: {layouts} layouts with {commands} commands each, seed {seed}")
@@ -178,7 +191,8 @@ def interaction_data(
     actuators: tuple[Count, Count] = (4, 8),
     plant: Annotated[str | None, arg(metavar="FILE.py:NAME")] = None,
 ) -> None:
-    """Draw robots whose jets meet, and write commands with the wrenches that a plant says they cause.
+    """Draw robots whose jets meet, and write commands with the wrenches that a plant says they
+    cause.
 
     Args:
         output: the NPZ file.
@@ -187,8 +201,8 @@ def interaction_data(
         seed: of all draws.
         noise: standard deviation of the wrenches' noise, as a share of their size.
         actuators: least and most of a robot.
-        plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula of jets
-            when left out.
+        plant: function of a layout and commands (K, n, 3) that gives wrenches (K, 6); the formula
+            of jets when left out.
     """
     from finlab.fit.interaction.samples import write_samples
     from finlab.research.evaluation.method_specs import own_function

@@ -16,11 +16,20 @@ from finlab.errors import CommandError, DataError
 MAGIC = 41721.0
 """First number of a block; its version is the second."""
 CODES = (
-    *("", "no block of a robot", "a block of another version", "a number out of range", "a bad argument"),
+    *(
+        "",
+        "no block of a robot",
+        "a block of another version",
+        "a number out of range",
+        "a bad argument",
+    ),
 )
 
 
-_REFUSED = "the core cannot work with these numbers: it found {}; check the wrench and the previous command"
+_REFUSED = (
+    "the core cannot work with these numbers: it found {}; check the wrench and the previous "
+    "command"
+)
 
 
 class Found(NamedTuple):
@@ -39,7 +48,8 @@ class Found(NamedTuple):
     command: Array
     """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
     error: Array
-    """Distance (N,) of what the commands give from the aims, on the yardstick, by the laws' tables."""
+    """Distance (N,) of what the commands give from the aims, on the yardstick, by the laws'
+    tables."""
     ended: bool
     """Whether a search ended at its bound of steps."""
 
@@ -67,13 +77,15 @@ class Now(NamedTuple):
     lost: NDArray[np.bool_] | None = None
     """Which actuators (n,) do not work; None where all do."""
     free: NDArray[np.bool_] | None = None
-    """Which axes (6,) may take any wrench, beside those that the robot does not command; None for none."""
+    """Which axes (6,) may take any wrench, beside those that the robot does not command; None for
+    none."""
     calm: float = 0.0
     """What turning costs in a tick; see `DualSettings.calm`."""
     ticks: int = 1
     """How many ticks after `previous` the commands are for."""
     toward: Array | None = None
-    """Angles (n,) [rad] near which pods are to stand, NaN for others; None for nowhere else than before."""
+    """Angles (n,) [rad] near which pods are to stand, NaN for others; None for nowhere else than
+    before."""
 
 
 STILL = Now()
@@ -164,7 +176,8 @@ class Core:
             )
 
     def _ask_for(self, policy: Any, price: Array | None, now: Now) -> _Served | None:
-        """Writes into the question all but the wrench; what is returned is to be kept until the call ends."""
+        """Writes into the question all but the wrench; what is returned is to be kept until the
+        call ends."""
         served = None if policy is None else _served(policy)
         self._policy_at[0] = 0 if served is None else served.address
         self._price_at[0] = 0
@@ -195,7 +208,9 @@ class Core:
             self._free[:] = now.free
             self._free_at[0] = self._free_lies
 
-    def one(self, wrench: Array, policy: Any, price: Array | None = None, now: Now = STILL) -> Found:
+    def one(
+        self, wrench: Array, policy: Any, price: Array | None = None, now: Now = STILL
+    ) -> Found:
         """Answers one wrench.
 
         Args:
@@ -253,8 +268,8 @@ class Core:
         return Found(force, price, aim, value, within, command, error, code < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Returns commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep `previous` ones
-        (n, 3)."""
+        """Returns commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep
+        `previous` ones (n, 3)."""
         force, command = np.ascontiguousarray(force), np.empty((len(force), self._count, 3))
         before = None if previous is None else np.ascontiguousarray(previous)
         start = None if before is None else before.ctypes.data
@@ -264,7 +279,8 @@ class Core:
         return command
 
     def look(self, wrench: Array, inner: Array) -> tuple[Array, float]:
-        """What prices (6,) in the basis give: forces (n, 2), and the dual value [W] for a wrench (6,)."""
+        """What prices (6,) in the basis give: forces (n, 2), and the dual value [W] for a wrench
+        (6,)."""
         wrench = np.ascontiguousarray(wrench)
         inner = np.ascontiguousarray(inner)
         force = np.empty((self._count, 2))
@@ -272,8 +288,8 @@ class Core:
         return force, self._core.fl_look(self._at, self._area, *data)
 
     def worth(self, price: Array, now: Now = STILL) -> Worth:
-        """Returns what forces are worth at prices (N, 6) of the wrench [W/N, W/(N m)], of all that may be
-        given now. Raises CommandError: the core cannot work with these numbers."""
+        """Returns what forces are worth at prices (N, 6) of the wrench [W/N, W/(N m)], of all that
+        may be given now. Raises CommandError: the core cannot work with these numbers."""
         price = np.ascontiguousarray(price)
         worth = np.empty((len(price), self._count), struct("fl_actuator_worth"))
         with self._lock:
@@ -283,7 +299,11 @@ class Core:
         if error:
             raise CommandError(_REFUSED.format(CODES[error]))
         return Worth(
-            worth["price"], worth["price_back"], worth["conjugate"], worth["low"][:1], worth["high"][:1]
+            worth["price"],
+            worth["price_back"],
+            worth["conjugate"],
+            worth["low"][:1],
+            worth["high"][:1],
         )
 
 
@@ -295,14 +315,17 @@ def planes(count: int) -> Array:
     return block
 
 
-def reach(block: Array, own: Array, origin: Array, ray: Array, close: float) -> tuple[Array, Array, Array]:
-    """How far (R,) rays (R, 6) from points (R, 6) go in what R robots push, minus infinity where they miss
-    it: at most, and as `close`; normals (R, 6) of the planes that prove it, and forces (R, n, 2) there.
+def reach(
+    block: Array, own: Array, origin: Array, ray: Array, close: float
+) -> tuple[Array, Array, Array]:
+    """How far (R,) rays (R, 6) from points (R, 6) go in what R robots push, minus infinity where
+    they miss it: at most, and as `close`; normals (R, 6) of the planes that prove it, and forces
+    (R, n, 2) there.
 
     Args:
         block: of `planes`, and polygons behind: how many corners, then these.
-        own: of each actuator (R, n, 16) the place of its polygon, or 0 and radius, middle and half of a
-            sector, then the wrench (2, 6) per newton along its directions.
+        own: of each actuator (R, n, 16) the place of its polygon, or 0 and radius, middle and half
+            of a sector, then the wrench (2, 6) per newton along its directions.
     """
     core = library()
     count, n, _ = own.shape

@@ -1,4 +1,5 @@
-"""The structs of the core as numpy sees them; the loaded library says which fields it has (fl_fields.h)."""
+"""The structs of the core as numpy sees them; the loaded library says which fields it has
+(fl_fields.h)."""
 
 import re
 from functools import cache

@@ -1,4 +1,5 @@
-"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files here."""
+"""The compiled core as a ctypes library, loaded once. `hatch_build.py` compiles it from the C files
+here."""
 
 import ctypes
 import sys
@@ -8,7 +9,8 @@ from pathlib import Path
 from finlab.errors import FinlabError
 
 VERSION = 5
-"""What `fl_version()` of the C files returns; both rise together where a signature or a struct changes."""
+"""What `fl_version()` of the C files returns; both rise together where a signature or a struct
+changes."""
 SIGNATURES = {
     "fl_fields": "s",
     "fl_sizes": "ii",
@@ -24,8 +26,16 @@ SIGNATURES = {
     "fl_settle": "ippppippp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
-_TYPES = {"i": ctypes.c_int, "r": ctypes.c_double, "p": ctypes.c_void_p, "s": ctypes.c_char_p, "v": None}
-PATH = Path(__file__).with_name("libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so"))
+_TYPES = {
+    "i": ctypes.c_int,
+    "r": ctypes.c_double,
+    "p": ctypes.c_void_p,
+    "s": ctypes.c_char_p,
+    "v": None,
+}
+PATH = Path(__file__).with_name(
+    "libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+)
 
 
 @cache
@@ -49,6 +59,7 @@ def library() -> ctypes.PyDLL:
             return core
         problem = f"has version {version}, and this finlab needs {VERSION}"
     raise FinlabError(
-        f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source tree, "
+        f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source "
+        "tree, "
         "elsewhere install finlab again"
     )

@@ -27,16 +27,16 @@ class Beside(NamedTuple):
     jets: Array | None
     """Numbers for the core's formula of jets; None where `effect` says it."""
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
-    """For forces (n, 3), body frame, and `inflow`: the wrench (6,) beside them, and its derivatives (n, 3,
-    6)."""
+    """For forces (n, 3), body frame, and `inflow`: the wrench (6,) beside them, and its derivatives
+    (n, 3, 6)."""
 
 
 class Ended(NamedTuple):
     """What turns end with."""
 
     found: Found
-    """The dual's last answer by which the command got better, with the command; its force is that of the
-    command."""
+    """The dual's last answer by which the command got better, with the command; its force is that
+    of the command."""
     power: float
     """[W]."""
     worth: float
@@ -87,10 +87,10 @@ class Whole(Core):
         worth: float = 0.0,
         most_steps: float = math.inf,
     ) -> Ended:
-        """What turns from forces (n, 2) on, or in a tick from the command before, come to for a wrench (6,):
-        at most so many, none for the nearest forces that give it; the first begins at a `price` (6,) of
-        the wrench. An error counts `worth` [W] at least. No turn but the first is begun after `most_steps`
-        steps. Else as for `one`."""
+        """What turns from forces (n, 2) on, or in a tick from the command before, come to for a
+        wrench (6,): at most so many, none for the nearest forces that give it; the first begins at
+        a `price` (6,) of the wrench. An error counts `worth` [W] at least. No turn but the first is
+        begun after `most_steps` steps. Else as for `one`."""
         with self._turn:
             self._begin[0] = 0.0 if force is None else force
             self._turns = turns
@@ -121,4 +121,6 @@ class Whole(Core):
 
 def _at(address: int, shape: tuple[int, ...]) -> Array:
     """The numbers at an address."""
-    return np.ctypeslib.as_array((ctypes.c_double * math.prod(shape)).from_address(address)).reshape(shape)
+    return np.ctypeslib.as_array(
+        (ctypes.c_double * math.prod(shape)).from_address(address)
+    ).reshape(shape)

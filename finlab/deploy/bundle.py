@@ -1,10 +1,12 @@
-"""The bundle that a robot runs: the robot, the fins' physics, settings, a README and checksums; its graph.
+"""The bundle that a robot runs: the robot, the fins' physics, settings, a README and checksums; its
+graph.
 
-`finlab.load_layout` and `finlab.Allocator.from_bundle` read a bundle, so the robot runs the library itself.
-The same layout and settings give the same bytes, as a folder and as a zip archive. The layout graph file is
-the robot as the complete graph that the networks see, which `networkx.node_link_graph` opens: features of a
-fin with a horizontal shaft are the paper's ten (x_i in R^10: position, mounting angle, limits), those of
-other actuators have two of their own axes in place of the angle.
+`finlab.load_layout` and `finlab.Allocator.from_bundle` read a bundle, so the robot runs the library
+itself. The same layout and settings give the same bytes, as a folder and as a zip archive. The
+layout graph file is the robot as the complete graph that the networks see, which
+`networkx.node_link_graph` opens: features of a fin with a horizontal shaft are the paper's ten (x_i
+in R^10: position, mounting angle, limits), those of other actuators have two of their own axes in
+place of the angle.
 """
 
 import json
@@ -30,7 +32,15 @@ from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
 from finlab.interaction.learned import NETWORK_SUFFIX, WHAT
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.bundled_robot import Robot
-from finlab.layout.graph_file import POSITION_SCALE, SCALES, Data, Edge, Graph, Normalization, edges_of
+from finlab.layout.graph_file import (
+    POSITION_SCALE,
+    SCALES,
+    Data,
+    Edge,
+    Graph,
+    Normalization,
+    edges_of,
+)
 from finlab.layout.load import FORMAT as LAYOUT_FORMAT
 from finlab.layout.save import layout_to_dict, plain
 from finlab.physics.objective import yardstick
@@ -49,7 +59,11 @@ class Bundle:
         path = Path(folder)
         made = not path.exists()
         present = [file for file in path.rglob("*") if not file.is_dir()]
-        names = {file: file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)}
+        names = {
+            file: file.relative_to(path).as_posix()
+            for file in present
+            if not file.name.endswith(PART)
+        }
         try:
             # The checksums come last: what a kill leaves is refused.
             odd = (file for file, name in names.items() if bundle_files.largest(name) < 0)
@@ -63,7 +77,8 @@ class Bundle:
                 rmtree(path, ignore_errors=True)
 
     def write_zip(self, file: str | os.PathLike[str]) -> None:
-        """Write one zip archive, in place of an existing file; a `DataError` where it cannot be written."""
+        """Write one zip archive, in place of an existing file; a `DataError` where it cannot be
+        written."""
         write_whole(file, self.zip_bytes(), DataError)
 
     def zip_bytes(self) -> bytes:
@@ -72,13 +87,14 @@ class Bundle:
 
 
 def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
-    """Prepare what a robot runs: the robot, method (`dual`, `mdn` or `paper`) and settings of an allocator,
-    and the names of fins that do not work; networks that do not come with finlab travel. Raises LayoutError:
-    an unknown lost fin, or none left; AllocationError: the method cannot run from a bundle; DataError: a
-    force table cannot be read, or something is too large to travel."""
+    """Prepare what a robot runs: the robot, method (`dual`, `mdn` or `paper`) and settings of an
+    allocator, and the names of fins that do not work; networks that do not come with finlab travel.
+    Raises LayoutError: an unknown lost fin, or none left; AllocationError: the method cannot run
+    from a bundle; DataError: a force table cannot be read, or something is too large to travel."""
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
-            f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
+            f"method {allocator.method!r} cannot be exported; a bundle runs "
+            f"{' or '.join(METHODS_ON_BOARD)}"
         )
     layout = allocator.layout
     cases = self_tests(allocator, lost)
@@ -93,7 +109,8 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     }
     if sum(map(len, files.values())) > bundle_files.LARGEST_BUNDLE:
         raise DataError(
-            f"layout {layout.name!r}: its bundle would be larger than {bundle_files.LARGEST_BUNDLE:,} bytes"
+            f"layout {layout.name!r}: its bundle would be larger than "
+            f"{bundle_files.LARGEST_BUNDLE:,} bytes"
         )
     return Bundle({**files, bundle_files.CHECKSUMS: bundle_files.checksums(files)})
 
@@ -117,8 +134,9 @@ def _about(allocator: Allocator) -> bytes:
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
-    """A layout whose force tables, and the network of whose interaction, have the names that they have in a
-    bundle, and their contents by name; `DataError`: one cannot be read, or is too large to travel."""
+    """A layout whose force tables, and the network of whose interaction, have the names that they
+    have in a bundle, and their contents by name; `DataError`: one cannot be read, or is too large
+    to travel."""
     names = dict[str, str]()
     contents = dict[str, bytes]()
     own = layout.interaction
@@ -133,7 +151,9 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
 
 def renamed(layout: Layout, names: Mapping[str, str]) -> Layout:
     """A layout whose tables and network have other names, or paths, by those that they have."""
-    parts = tuple(part.reading(names[part.reads]) if part.reads else part for part in layout.actuators)
+    parts = tuple(
+        part.reading(names[part.reads]) if part.reads else part for part in layout.actuators
+    )
     own = layout.interaction
     if own is not None and own.reads is not None:
         own = own.reading(names[own.reads])
@@ -147,7 +167,9 @@ def _readme(allocator: Allocator, lost: tuple[str, ...]) -> str:
         version=finlab.__version__,
         wheel=NAME.replace("-", "_"),
         method=allocator.method,
-        networks="" if allocator.checkpoint is None else f" with checkpoint `{allocator.checkpoint}`",
+        networks=""
+        if allocator.checkpoint is None
+        else f" with checkpoint `{allocator.checkpoint}`",
         actuators=", ".join(allocator.layout.names),
         lost=list(lost),
     )
@@ -168,7 +190,11 @@ def features_of(part: Actuator) -> dict[str, float]:
 
 def graph_of(layout: Layout) -> Graph:
     """Returns a robot as a graph; tables of fins' forces that it names are kept by their paths."""
-    about = {key: value for key, value in layout_to_dict(layout).items() if key not in ("fins", "actuators")}
+    about = {
+        key: value
+        for key, value in layout_to_dict(layout).items()
+        if key not in ("fins", "actuators")
+    }
     parts = plain(layout.actuators)
     nodes = [
         {"id": part.pop("name"), **part, "features": features_of(own)}
@@ -191,12 +217,15 @@ def graph_of(layout: Layout) -> Graph:
 
 def graph_text(layout: Layout) -> str:
     """Returns the text of a robot's graph file; the same robot gives the same text."""
-    return json.dumps(to_builtins(graph_of(layout)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return (
+        json.dumps(to_builtins(graph_of(layout)), indent=1, allow_nan=False, ensure_ascii=False)
+        + "\n"
+    )
 
 
 def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a graph file; an existing file is replaced whole. Raises LayoutError: the name does not end in
-    `.json`, or the file cannot be written."""
+    """Writes a graph file; an existing file is replaced whole. Raises LayoutError: the name does
+    not end in `.json`, or the file cannot be written."""
     if Path(path).suffix.lower() != ".json":
         raise LayoutError("expected the name of a file that ends in .json", source=str(path))
     write_whole(path, graph_text(layout))

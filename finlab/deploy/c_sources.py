@@ -1,7 +1,7 @@
 """The robot's allocator as C99: the core, the robot's block of numbers, a self-test and examples.
 
-`robot.c` holds two blocks: the library's own in double precision, and one with few knots in its tables where
-FL_SINGLE is defined. The same layout gives the same bytes.
+`robot.c` holds two blocks: the library's own in double precision, and one with few knots in its
+tables where FL_SINGLE is defined. The same layout gives the same bytes.
 """
 
 import os
@@ -31,7 +31,8 @@ SAMPLES = 24
 ALONE = 3e-7
 """Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
 NOT_ABOARD = "jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c"
-"""Files of the core for robots with `interaction`, and for what a layout can do and prices prove."""
+"""Files of the core for robots with `interaction`, and for what a layout can do and prices
+prove."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -39,21 +40,25 @@ QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("priority", 3.0),
     ("closest", 0.6),
 )
-"""Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick before."""
+"""Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick
+before."""
 TEMPLATES = Path(__file__).with_name("c_files")
 
 
-def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = None) -> dict[str, bytes]:
-    """Returns files by name: the core, `robot.c` and `robot.h`, a self-test of so many questions, a README,
-    CMakeLists.txt, examples.
+def c_sources(
+    layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = None
+) -> dict[str, bytes]:
+    """Returns files by name: the core, `robot.c` and `robot.h`, a self-test of so many questions, a
+    README, CMakeLists.txt, examples.
 
-    The robot's block is that of one velocity (6,) relative to the water [m/s, rad/s], body frame: foils push
-    by it, propellers lose to it; None is a robot at rest. Raises AllocationError: the actuators act on each
-    other, which the core does not know; CommandError: `flow` is not six finite numbers; DataError: a force
-    table cannot be read."""
+    The robot's block is that of one velocity (6,) relative to the water [m/s, rad/s], body frame:
+    foils push by it, propellers lose to it; None is a robot at rest. Raises AllocationError: the
+    actuators act on each other, which the core does not know; CommandError: `flow` is not six
+    finite numbers; DataError: a force table cannot be read."""
     if layout.interaction is not None:
         raise AllocationError(
-            f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it without"
+            f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it "
+            "without"
         )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
@@ -83,22 +88,28 @@ def c_sources(layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = N
         single=4 * len(thin),
         law=4 * law,
         axes=", ".join(np.array(AXES)[layout.commanded]),
-        flow="at rest" if water is None else f"with ({', '.join(f'{v:g}' for v in water)}) m/s, rad/s",
+        flow="at rest"
+        if water is None
+        else f"with ({', '.join(f'{v:g}' for v in water)}) m/s, rad/s",
     )
     return {name: text.encode() for name, text in sorted(sources.items())}
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export are replaced. Raises
-    DataError: it has other C files, or cannot be written."""
+    """Writes the files into a folder, which is made; those of an earlier export are replaced.
+    Raises DataError: it has other C files, or cannot be written."""
     strangers = (own for own in Path(folder).glob("*.[ch]") if own.name not in files)
     write_folder(folder, files, strangers, "an export")
 
 
 def _sized(header: str, count: int) -> str:
-    """finlab.h for so many actuators, in single precision where a processor has no unit for double."""
+    """finlab.h for so many actuators, in single precision where a processor has no unit for
+    double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
-    single = "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define FL_SINGLE\n#endif\n\n"
+    single = (
+        "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define "
+        "FL_SINGLE\n#endif\n\n"
+    )
     return header.replace("#ifdef FL_SINGLE\n", f"{single}#ifdef FL_SINGLE\n", 1)
 
 
@@ -121,23 +132,34 @@ def _identifier(name: str) -> str:
 
 
 def _names(headers: str, name: str) -> str:
-    """fl_names.h, by which all functions of the core have the robot's name: two robots link into one
-    program, each with a core of its own size."""
+    """fl_names.h, by which all functions of the core have the robot's name: two robots link into
+    one program, each with a core of its own size."""
     functions = sorted(set(re.findall(r"\b(fl_[a-z_0-9]+)\(", headers)))
     lines = [f"#define {one} fl_{name}_{one.removeprefix('fl_')}" for one in functions]
     about = (
-        "/* Names of this core's functions in the linker: with the robot's name two robots link into one\n"
+        "/* Names of this core's functions in the linker: with the robot's name two robots link "
+        "into one\n"
         "   program. Your source says fl_answer_one. */"
     )
     return "\n".join([about, "#ifndef FL_NAMES_H", "#define FL_NAMES_H", *lines, "#endif", ""])
 
 
 def _robot(block: Array, thin: Array) -> str:
-    return (
-        '#include "robot.h"\n\n/* See fl_fields.h. */\nconst fl_real robot[] = {\n'
-        f"#ifdef FL_SINGLE\n{_block(thin, np.float32)}\n#else\n{_block(block, float)}\n#endif\n}};\n"
-        "const int robot_length = (int)(sizeof robot / sizeof *robot);\n"
-    )
+    lines = [
+        '#include "robot.h"',
+        "",
+        "/* See fl_fields.h. */",
+        "const fl_real robot[] = {",
+        "#ifdef FL_SINGLE",
+        _block(thin, np.float32),
+        "#else",
+        _block(block, float),
+        "#endif",
+        "};",
+        "const int robot_length = (int)(sizeof robot / sizeof *robot);",
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def _rows_of_commands(layout: Layout, prefix: str) -> str:
@@ -257,8 +279,8 @@ def _plain_source(layout: Layout, name: str) -> str:
 
 
 def _samples(layout: Layout, method: Dual, count: int) -> str:
-    """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to the
-    library, which has more ways around gaps."""
+    """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to
+    the library, which has more ways around gaps."""
     allocator = Allocator(layout)
     flow = method.plant.flow
     rng = np.random.default_rng(0)

@@ -58,7 +58,10 @@ def check(arguments: argparse.Namespace) -> int:
     if all(finding.good for finding in findings):
         print("this computer answers as the one that made the bundle")
         return 0
-    print("do not use this bundle here: its answers are wrong, or not those of the computer that made it")
+    print(
+        "do not use this bundle here: its answers are wrong, or not those of the computer that "
+        "made it"
+    )
     return 1
 
 
@@ -79,7 +82,8 @@ def allocate(arguments: argparse.Namespace) -> int:
 
 
 def serve(arguments: argparse.Namespace) -> int:
-    """Answer requests until they end or a signal asks to stop. Raises FinlabError: a stream is closed."""
+    """Answer requests until they end or a signal asks to stop. Raises FinlabError: a stream is
+    closed."""
     from finlab.deploy.transport import StandardStreams
 
     streams = StandardStreams()  # before the robot is loaded, so that no signal is missed
@@ -113,12 +117,16 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     program = "finlab-runtime"
     parser = _Parser(
-        program, description="Control allocation on board.", epilog=f"example: {program} check my_robot"
+        program,
+        description="Control allocation on board.",
+        epilog=f"example: {program} check my_robot",
     )
     parser.add_argument("--version", action="version", version=f"{program} {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
 
-    def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
+    def verb(
+        run: Callable[[argparse.Namespace], int], text: str, example: str
+    ) -> argparse.ArgumentParser:
         made: argparse.ArgumentParser = verbs.add_parser(
             run.__name__, help=text, description=text, epilog=f"example: {example}"
         )
@@ -127,9 +135,15 @@ def _parser() -> argparse.ArgumentParser:
         made.add_argument("bundle", metavar="BUNDLE", help=about)
         return made
 
-    verb(check, "Run the self-test; do this on the robot before first use.", f"{program} check my_robot")
+    verb(
+        check,
+        "Run the self-test; do this on the robot before first use.",
+        f"{program} check my_robot",
+    )
     one = verb(
-        allocate, "Commands for one target.", f"{program} allocate my_robot --wrench 1 0 0.5 0 0 0.1"
+        allocate,
+        "Commands for one target.",
+        f"{program} allocate my_robot --wrench 1 0 0.5 0 0 0.1",
     ).add_argument
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
     one("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
@@ -150,7 +164,11 @@ def _parser() -> argparse.ArgumentParser:
     silence = loop.add_mutually_exclusive_group().add_argument
     about = "silence before the fins rest, 1 s if not said"
     silence("--watchdog-s", type=_seconds, default=1.0, metavar="S", help=about)
-    silence("--no-watchdog", action="store_true", help="keep the last commands however long no target comes")
+    silence(
+        "--no-watchdog",
+        action="store_true",
+        help="keep the last commands however long no target comes",
+    )
     return parser
 
 

@@ -1,7 +1,8 @@
-"""A robot out of its bundle, and the check whether this computer answers as the desk did, and truly.
+"""A robot out of its bundle, and the check whether this computer answers as the desk did, and
+truly.
 
-To be asked on the robot before first use. Are the actuators' laws and tables the same here, do they confirm
-this computer's answers, and is there an answer to the extremes.
+To be asked on the robot before first use. Are the actuators' laws and tables the same here, do they
+confirm this computer's answers, and is there an answer to the extremes.
 """
 
 import os
@@ -30,10 +31,11 @@ from finlab.physics.objective import REACHED
 
 N_SELF_TEST = 4  # self-test wrenches in a bundle: enough to notice a wrong file, few enough to read
 SELF_TEST_TOLERANCE = 1e-6
-"""Allowed normalized error between the wrench of a self-test's command and what another machine computes for
-it; both are written with nine digits."""
+"""Allowed normalized error between the wrench of a self-test's command and what another machine
+computes for it; both are written with nine digits."""
 AS_GOOD = 1.5
-"""Largest error of own answers over that of the stored ones, where these do not reach their targets."""
+"""Largest error of own answers over that of the stored ones, where these do not reach their
+targets."""
 FAR = 10.0  # size of an extreme target in yardsticks: beyond the reach of any robot
 
 
@@ -51,7 +53,9 @@ class DeployedRobot:
         """All fins."""
         return self.allocator.layout
 
-    def allocate(self, wrench: ArrayLike, *, lost: Sequence[str] = (), **options: Any) -> Allocation:
+    def allocate(
+        self, wrench: ArrayLike, *, lost: Sequence[str] = (), **options: Any
+    ) -> Allocation:
         """Commands for a target (6,) [N, N m] in the body frame; arguments and errors as in
         `finlab.Allocator.allocate`. What the bundle names as lost stays lost, whatever `lost` adds.
         Raises DataError: the answer is no number, as a broken bundle gives it."""
@@ -65,18 +69,27 @@ class DeployedRobot:
         return answer
 
     def neutral(self, lost: Sequence[str] = (), now: Array | None = None) -> Array:
-        """Commands (n, 3) that push least, see `Actuator.neutral`, given the present ones (n, 3) if any."""
+        """Commands (n, 3) that push least, see `Actuator.neutral`, given the present ones (n, 3) if
+        any."""
         rows = [None] * self.layout.n if now is None else now
-        command = np.array([part.neutral(row) for part, row in zip(self.layout.actuators, rows, strict=True)])
+        command = np.array(
+            [part.neutral(row) for part, row in zip(self.layout.actuators, rows, strict=True)]
+        )
         command[[name in (*self.lost, *lost) for name in self.layout.names]] = np.nan
         return command
 
 
 def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
-    """The robot in a bundle, a folder or a zip archive. Raises FinlabError: it is none, was changed, or
-    cannot be run."""
-    if not is_bundle(path) and str(path).endswith((".json", ".yaml", ".yml")) and os.path.exists(path):
-        raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
+    """The robot in a bundle, a folder or a zip archive. Raises FinlabError: it is none, was
+    changed, or cannot be run."""
+    if (
+        not is_bundle(path)
+        and str(path).endswith((".json", ".yaml", ".yml"))
+        and os.path.exists(path)
+    ):
+        raise DataError(
+            f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it"
+        )
     robot = parse_robot(read_bundle_files(path), str(path))
     if robot.lost:  # what is left is prepared now, not at the first answer
         robot.allocator.allocate(np.zeros(6), lost=robot.lost)
@@ -84,13 +97,15 @@ def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
 
 
 def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
-    """The robot in the contents of a bundle's files; errors as in `load_robot`. Force tables are read from
-    the folder or archive `source` once they are needed."""
+    """The robot in the contents of a bundle's files; errors as in `load_robot`. Force tables are
+    read from the folder or archive `source` once they are needed."""
     check_bundle_files(files, source)
     robot = robot_of(files, source, parse_layout)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
     if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
-        raise DataError(f"{source}: was made with other networks than this finlab's; export it with this one")
+        raise DataError(
+            f"{source}: was made with other networks than this finlab's; export it with this one"
+        )
     return DeployedRobot(allocator, robot.lost, robot.self_test)
 
 
@@ -110,8 +125,8 @@ class Finding(NamedTuple):
 def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
     """Targets that can be reached, wrenches of random commands, with an allocator's answers.
 
-    They depend on the layout and the allocator alone. Raises LayoutError: an unknown lost actuator, or none
-    left; DataError: a fin's force table cannot be read."""
+    They depend on the layout and the allocator alone. Raises LayoutError: an unknown lost actuator,
+    or none left; DataError: a fin's force table cannot be read."""
     layout = allocator.layout
     plant = plant_of(layout.without(lost) if lost else layout)
     cases = []
@@ -128,8 +143,8 @@ def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
 
 
 def self_check(robot: DeployedRobot) -> list[Finding]:
-    """Ask what the bundle knows the answers of. Raises DataError: the bundle has no self-tests, or a force
-    table cannot be read."""
+    """Ask what the bundle knows the answers of. Raises DataError: the bundle has no self-tests, or
+    a force table cannot be read."""
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
     layout = robot.layout
@@ -147,14 +162,21 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
         missing = (stored - np.array(case.wrench)) * layout.commanded / scale
         allowed = max(allowed, AS_GOOD * float(np.linalg.norm(missing)))
     return [
-        Finding("wrench of the stored commands (err_norm)", float(np.max(differs)), SELF_TEST_TOLERANCE),
-        Finding("own answers, judged by the actuators' own laws (err_norm)", float(np.max(errors)), allowed),
+        Finding(
+            "wrench of the stored commands (err_norm)", float(np.max(differs)), SELF_TEST_TOLERANCE
+        ),
+        Finding(
+            "own answers, judged by the actuators' own laws (err_norm)",
+            float(np.max(errors)),
+            allowed,
+        ),
     ]
 
 
 def extremes(robot: DeployedRobot) -> Finding:
-    """Ask for each axis both ways, far out of reach, by the method's policies, with each actuator lost; the
-    value is how many of these have no answer, and the question names the first of them."""
+    """Ask for each axis both ways, far out of reach, by the method's policies, with each actuator
+    lost; the value is how many of these have no answer, and the question names the first of
+    them."""
     layout = robot.layout
     silent = []
     n = 0
@@ -169,7 +191,10 @@ def extremes(robot: DeployedRobot) -> Finding:
                 try:
                     robot.allocate(target, lost=lost, policy=policy)
                 except Exception as error:  # each is a finding
-                    what = f"{policy} {'+' if way > 0.0 else '-'}{AXES[i]}, {' '.join(lost) or 'none'} lost"
+                    what = (
+                        f"{policy} {'+' if way > 0.0 else '-'}{AXES[i]}, "
+                        f"{' '.join(lost) or 'none'} lost"
+                    )
                     silent.append(f"{what}: {type(error).__name__}: {error!s:.100}")
     first = f", first {silent[0]}" if silent else ""
     return Finding(f"extremes without an answer, of {n}{first}", float(len(silent)), 0.0)

@@ -1,23 +1,26 @@
-"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any more.
+"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any
+more.
 
-A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free` (names of
-axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at the next ticks, and
-`flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted. Each answer says in `status`
-what it is, and has the `id` of its request, a refused one's too:
+A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free`
+(names of axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at
+the next ticks, and `flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted.
+Each answer says in `status` what it is, and has the `id` of its request, a refused one's too:
 
-=========  ============================================================================================
-status     meaning
-=========  ============================================================================================
-`ok`       commands for the newest target
-`neutral`  no target for longer than the watchdog allows; the fins are commanded to rest
-`error`    the request was refused, which changes nothing, or could not be answered, and the line before is
+=========
+============================================================================================ status
+meaning =========
+============================================================================================ `ok`
+commands for the newest target `neutral`  no target for longer than the watchdog allows; the fins
+are commanded to rest `error`    the request was refused, which changes nothing, or could not be
+answered, and the line before is
            `neutral`; `error` holds one sentence and there are no commands
-=========  ============================================================================================
+=========
+============================================================================================
 
-From one answer to the next, commands change no faster than the drives' rates allow in a tick.
-Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
-the past; one that is older than the watchdog allows, as after a pause of the process, is dropped. However the
-service ends, a neutral command is the last that it sends.
+From one answer to the next, commands change no faster than the drives' rates allow in a tick. Only
+the newest request counts: those that waited behind it are skipped, since a robot wants the present,
+not the past; one that is older than the watchdog allows, as after a pause of the process, is
+dropped. However the service ends, a neutral command is the last that it sends.
 """
 
 import json
@@ -67,8 +70,8 @@ def parse_values(line: bytes) -> Any:
 
 
 def id_of(values: Any) -> Any:
-    """Returns the `id` in the values of a request, which may be refused; None where it has none. Raises
-    CommandError: it is too long to be sent back."""
+    """Returns the `id` in the values of a request, which may be refused; None where it has none.
+    Raises CommandError: it is too long to be sent back."""
     name = values.get("id") if isinstance(values, dict) else None
     if len(json.dumps(name)) > MAX_ID:
         raise CommandError(f"id: longer than {MAX_ID} characters")
@@ -79,7 +82,8 @@ class Server:
     """Answers requests until they end."""
 
     def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
-        """Takes the robot, and the longest silence before its fins rest [s]; without one they never do."""
+        """Takes the robot, and the longest silence before its fins rest [s]; without one they never
+        do."""
         self._robot = robot
         self._watchdog = watchdog
         self._sent: Allocation | Array | None = None  # the last answer, or commands of rest (n, 3)
@@ -87,8 +91,8 @@ class Server:
         self._lost: tuple[str, ...] = ()
 
     def run(self, transport: StandardStreams) -> None:
-        """Serve until the requests end or a signal asks to stop; then the fins rest. Raises Unsent: answers
-        are no longer taken."""
+        """Serve until the requests end or a signal asks to stop; then the fins rest. Raises Unsent:
+        answers are no longer taken."""
         try:
             self._loop(transport)
         except EOFError:
@@ -124,8 +128,8 @@ class Server:
         return now - since > (math.inf if self._watchdog is None else self._watchdog)
 
     def answers(self, line: bytes) -> list[dict[str, Any]]:
-        """The answer to one request, as plain values; where it is good and the solve failed, rest comes
-        first, and then the error."""
+        """The answer to one request, as plain values; where it is good and the solve failed, rest
+        comes first, and then the error."""
         name: Any = None
         fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
@@ -150,7 +154,9 @@ class Server:
             what = f"{type(error).__name__}, {place.name}, line {place.lineno}: {error!s:.200}"
             return [
                 self._rest(),
-                _error(name, f"the target could not be answered ({what}); the robot rests, ask again"),
+                _error(
+                    name, f"the target could not be answered ({what}); the robot rests, ask again"
+                ),
             ]
         self._lost = tuple(request.lost)
         self._sent = answer
@@ -165,8 +171,11 @@ class Server:
             self._sent_at = time.monotonic()
         return self._reply(None, "neutral", rest)
 
-    def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
-        """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""
+    def _reply(
+        self, name: Any, status: str, command: Array, forces: Array | None = None
+    ) -> dict[str, Any]:
+        """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not
+        told."""
         layout = self._robot.layout
         forces = plant_of(layout).body_forces(command) if forces is None else forces
         return {"id": name, "status": status, **command_record(layout, command, forces)}

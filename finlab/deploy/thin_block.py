@@ -1,7 +1,8 @@
 """A robot's block of numbers with few knots in its tables, for small boards in single precision.
 
-Forces follow from prices by the tables alone and commands are made exact on the law's grid: only that grid's
-error is in the wrench, and it stays below TOLERANCE. Errors of other tables cost power, by their squares.
+Forces follow from prices by the tables alone and commands are made exact on the law's grid: only
+that grid's error is in the wrench, and it stays below TOLERANCE. Errors of other tables cost power,
+by their squares.
 """
 
 from typing import NamedTuple
@@ -21,8 +22,8 @@ CELLS = 128
 POINTS = 64
 """Directions of a gauge at most."""
 TABLES = ("ahead", "back", "gauge", "law", "beat")
-"""Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a fin's
-beat or a foil's curve."""
+"""Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
+fin's beat or a foil's curve."""
 FIN = 2
 """`form` of a fin, FL_FIN."""
 
@@ -70,8 +71,8 @@ def _length(field: str, table: Array, is_fin: bool) -> int:
 def thinned(block: Array) -> Array:
     """Returns a block of the same robot for single precision.
 
-    Its tables have fewer knots. Its limits are numbers of single precision, none outside those of before but
-    for angles that turn freely.
+    Its tables have fewer knots. Its limits are numbers of single precision, none outside those of
+    before but for angles that turn freely.
     """
     actuators = actuators_of(block)
     tables: dict[int, Table] = {}
@@ -134,14 +135,15 @@ def _gauge(table: Array) -> Array:
 
 
 def _cubic(knot: Array, value: Array) -> CubicHermiteSpline:
-    """The cubic of the core between all knots but the first and last one, which give the slopes there."""
+    """The cubic of the core between all knots but the first and last one, which give the slopes
+    there."""
     rise = (value[2:] - value[:-2]).T / (knot[2:] - knot[:-2])
     return CubicHermiteSpline(knot[1:-1], value[1:-1], rise.T)
 
 
 def _grid(grid: Array, users: Record) -> Array:
-    """Fewer angles of foils, of those that the commands of the grid's users (m,) reach, or sizes of a fin; a
-    measured fin keeps its grid."""
+    """Fewer angles of foils, of those that the commands of the grid's users (m,) reach, or sizes of
+    a fin; a measured fin keeps its grid."""
     count = grid[:3].astype(int)
     axes = np.split(grid[7 : 7 + count.sum()], np.cumsum(count)[:-1])
     values = grid[7 + count.sum() :].reshape(*count, -1)
@@ -181,8 +183,8 @@ def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[A
 
 
 def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
-    """Which knots (K,) of a period, or of an axis where it is 0, say all values (K, c) nearly: more and more,
-    where most is missing."""
+    """Which knots (K,) of a period, or of an axis where it is 0, say all values (K, c) nearly: more
+    and more, where most is missing."""
     kept = np.arange(0, len(knot), max(len(knot) // 16, 1))
     ends = [0, 1, len(knot) - 2, len(knot) - 1]
     kept = kept if period else np.union1d(kept, ends)
@@ -202,7 +204,8 @@ def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
 
 
 def _sizes(knot: Array, value: Array, power: int) -> tuple[Array, Array]:
-    """As few of the knots (K,) of sizes (K, f, 1, 1) as do, and one beyond each end for the slope there."""
+    """As few of the knots (K,) of sizes (K, f, 1, 1) as do, and one beyond each end for the slope
+    there."""
     ends = np.array([1, -2])
     slope = (value[[2, -1]] - value[[0, -3]]).T / (knot[[2, -1]] - knot[[0, -3]])
     wanted = value[1:-1] ** power

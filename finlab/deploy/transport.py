@@ -1,4 +1,5 @@
-"""Transport of the server's lines over standard input and output, until they end or a signal asks to stop."""
+"""Transport of the server's lines over standard input and output, until they end or a signal asks
+to stop."""
 
 import fcntl
 import os
@@ -18,11 +19,13 @@ from finlab.errors import FinlabError
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """What ends the service; SIGHUP does not where it was ignored before, as `nohup` has it."""
 MAX_LINE = 65_536  # longest request that is read [bytes]
-PATIENCE = 1.0  # how long [s] a reader that takes nothing is waited for once the service has to stop
+PATIENCE = (
+    1.0  # how long [s] a reader that takes nothing is waited for once the service has to stop
+)
 CHUNK = 65_536  # bytes that are read at once
 LOOK_S = 0.02
-"""How often the reader looks whether something has come [s]; after a pause of the process, what had come by
-then is as old as the last look."""
+"""How often the reader looks whether something has come [s]; after a pause of the process, what had
+come by then is as old as the last look."""
 
 
 class Line(NamedTuple):
@@ -36,7 +39,9 @@ class Unsent(FinlabError):
     """An answer cannot be sent, and no later one either."""
 
     def __init__(self, reason: str) -> None:
-        super().__init__(f"standard output: {reason}; the neutral command was not sent, so rest the fins")
+        super().__init__(
+            f"standard output: {reason}; the neutral command was not sent, so rest the fins"
+        )
 
 
 class StandardStreams:
@@ -45,7 +50,9 @@ class StandardStreams:
     def __init__(self) -> None:
         """Notes signals from now on."""
         self._line: deque[Line] = deque(maxlen=1)
-        self._wake: SimpleQueue[None] = SimpleQueue()  # may be used in a signal's handler, as no lock may
+        self._wake: SimpleQueue[None] = (
+            SimpleQueue()
+        )  # may be used in a signal's handler, as no lock may
         self._stopped = self._ended = self._sending = False
         self._sink = -1
         signal.signal(signal.SIGALRM, self._late)
@@ -61,8 +68,8 @@ class StandardStreams:
         Thread(target=self._read, args=(source, time.monotonic()), daemon=True).start()
 
     def newest(self, timeout: float | None) -> Line | None:
-        """The newest request that waits; None after `timeout` seconds without one. EOFError: the requests
-        have ended, or a signal asks to stop."""
+        """The newest request that waits; None after `timeout` seconds without one. EOFError: the
+        requests have ended, or a signal asks to stop."""
         end = None if timeout is None else time.monotonic() + timeout
         while not (self._stopped or self._line or self._ended):
             try:
@@ -88,8 +95,8 @@ class StandardStreams:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
     def _read(self, source: int, looked: float) -> None:
-        """Read until the end. Bytes that are there at a look came after the look before, and a line has the
-        age of its first byte: none is ever taken for younger than it is."""
+        """Read until the end. Bytes that are there at a look came after the look before, and a line
+        has the age of its first byte: none is ever taken for younger than it is."""
         part = b""
         since = looked
         chunk = b"\n"
@@ -109,7 +116,9 @@ class StandardStreams:
             *lines, part = (part + (chunk or b"\n")).split(b"\n")
             part = part[: MAX_LINE + 1]  # enough to refuse it
             if places := [number for number, line in enumerate(lines) if line.strip()]:
-                self._line.append(Line(lines[places[-1]], since if begun and places[-1] == 0 else came))
+                self._line.append(
+                    Line(lines[places[-1]], since if begun and places[-1] == 0 else came)
+                )
                 self._call()
             if lines or not begun:
                 since = came

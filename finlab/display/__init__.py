@@ -53,8 +53,8 @@ def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[
 
 
 def html(blocks: Iterable[Block], picture: Callable[[], Figure]) -> str:
-    """Returns blocks as HTML and a picture as PNG inside it; without matplotlib, how to install it. Names in
-    blocks may come from a stranger: all text is escaped."""
+    """Returns blocks as HTML and a picture as PNG inside it; without matplotlib, how to install it.
+    Names in blocks may come from a stranger: all text is escaped."""
     return "".join([*map(_html, blocks), _image(picture)])
 
 

@@ -1,4 +1,5 @@
-"""Pictures of robots, forces, attainable sets, ranges and swims; matplotlib is imported when one is drawn."""
+"""Pictures of robots, forces, attainable sets, ranges and swims; matplotlib is imported when one is
+drawn."""
 
 from __future__ import annotations
 
@@ -24,8 +25,8 @@ SHARPNESS = {"box": 0.2}
 
 
 def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
-    """Returns a picture as the content of a file: png, svg or pdf, of `dpi` pixels per inch. Text in it is no
-    formula: it may be a stranger's. Raises ImportError: matplotlib is not installed."""
+    """Returns a picture as the content of a file: png, svg or pdf, of `dpi` pixels per inch. Text
+    in it is no formula: it may be a stranger's. Raises ImportError: matplotlib is not installed."""
     import matplotlib
 
     content = io.BytesIO()
@@ -35,8 +36,8 @@ def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
 
 
 def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
-    """Returns a robot (a `finlab.Layout`) in the body frame, with an arrow at each actuator: where it points,
-    or its force (n, 3) [N]."""
+    """Returns a robot (a `finlab.Layout`) in the body frame, with an arrow at each actuator: where
+    it points, or its force (n, 3) [N]."""
     place = layout.position
     arrow = np.array([part.direction for part in layout.actuators]) if forces is None else forces
     most = float(np.linalg.norm(arrow, axis=-1).max())
@@ -45,8 +46,12 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
     if hull is not None and hull.size_m is not None:
         sides = np.array(hull.size_m)
         center = np.array(hull.center_m)
-        around, up = np.meshgrid(np.linspace(-np.pi, np.pi, 33), np.linspace(-np.pi / 2, np.pi / 2, 17))
-        ball = np.stack([np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1)
+        around, up = np.meshgrid(
+            np.linspace(-np.pi, np.pi, 33), np.linspace(-np.pi / 2, np.pi / 2, 17)
+        )
+        ball = np.stack(
+            [np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1
+        )
         skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** SHARPNESS.get(hull.shape, 1.0)
         points.append(skin.reshape(-1, 3))
     size = max(float(np.ptp(np.concatenate(points), axis=0).max()), 1e-2)
@@ -67,14 +72,17 @@ def body_picture(title: str, unit: str, body: Any) -> Figure:
     corners = body.vertices.T
     faces = body.faces
     if len(faces):
-        axes.plot_trisurf(*corners, triangles=faces, color=COLORS[0], alpha=0.35, edgecolor="0.4", lw=0.3)
+        axes.plot_trisurf(
+            *corners, triangles=faces, color=COLORS[0], alpha=0.35, edgecolor="0.4", lw=0.3
+        )
     axes.plot(*corners[:, np.append(body.outline, body.outline[:1])], color=COLORS[0])
     axes.plot(*np.zeros((3, 1)), "k+")
     return figure
 
 
 def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, Array]) -> Figure:
-    """Returns a path (N, 3) beside its reference (N, 3), with marked places (3,) by their words [m]."""
+    """Returns a path (N, 3) beside its reference (N, 3), with marked places (3,) by their words
+    [m]."""
     figure, axes = _space(title, np.concatenate([reference, path]), "m")
     axes.plot(*reference.T, color="0.6", linewidth=3.0, label="reference")
     axes.plot(*path.T, color=COLORS[0], label="robot")
@@ -86,7 +94,8 @@ def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, 
 
 
 def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) -> Figure:
-    """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at NaN."""
+    """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at
+    NaN."""
     figure, axes = panels((6.0, 2.4), 1, 2)
     width = np.nan_to_num(high - low)
     low = np.nan_to_num(low)
@@ -99,7 +108,9 @@ def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) ->
     return figure
 
 
-def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+def panels(
+    size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any
+) -> tuple[Figure, Any]:
     """Returns a figure of this size [inches] and its panels (rows, columns), with grids; `how` goes
     to matplotlib's `subplots`."""
     from matplotlib.figure import Figure

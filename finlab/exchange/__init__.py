@@ -1,4 +1,5 @@
-"""Layouts in the forms of others: robot descriptions, parameters of autopilots, allocation matrices."""
+"""Layouts in the forms of others: robot descriptions, parameters of autopilots, allocation
+matrices."""
 
 from finlab.exchange.convert import FOREIGN as FOREIGN
 from finlab.exchange.convert import convert as convert

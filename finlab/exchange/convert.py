@@ -30,13 +30,20 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
 }
 """Forms beside layout files that are written: the text for a layout and the suffix of the file."""
 FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
-FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
+FORM_OF |= {
+    ".cpp": "ardusub",
+    ".csv": "matrix",
+    ".yaml": "layout",
+    ".yml": "layout",
+    ".json": "layout",
+}
 """What a suffix stands for where the user does not say."""
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 PROGRAMS = (".cpp", ".h", ".hpp", ".lua")
 PARAMETERS = (".params", ".parm", ".param")
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
-"""Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
+"""Suffixes of robot descriptions, and of what autopilots read; their content says what they
+hold."""
 UNKNOWN = (
     "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
     "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
@@ -46,40 +53,47 @@ UNKNOWN = (
 def convert(
     file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange
 ) -> tuple[Layout, list[str]]:
-    """Makes one file into another, and returns the layout that went through, and the exchange's notes.
+    """Makes one file into another, and returns the layout that went through, and the exchange's
+    notes.
 
-    `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
-    the suffix of the output when None. Raises FinlabError: a file cannot be read or written, or the end
-    of the output says no form."""
+    `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of
+    `WRITERS`, by the suffix of the output when None. Raises FinlabError: a file cannot be read or
+    written, or the end of the output says no form."""
     suffix = Path(output).suffix.lower()
     form = to or FORM_OF.get(suffix)
     if form is None:
-        raise CommandError(f"{output}: its end says no form; say --to {', '.join(['layout', *WRITERS])}")
+        raise CommandError(
+            f"{output}: its end says no form; say --to {', '.join(['layout', *WRITERS])}"
+        )
     layout = read_any(file, exchange)
     if form == "layout":
         save_layout(layout, output)
     else:
         if layout.interaction is not None:
-            exchange.note(f"What the actuators do to each other is left out: {form} has no place for it.")
+            exchange.note(
+                f"What the actuators do to each other is left out: {form} has no place for it."
+            )
         write_whole(output, WRITERS[form](layout, exchange, suffix))
     return layout, exchange.notes
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a file of any form; `exchange` says what to take where it is silent. Raises
-    FinlabError: it cannot be read, or holds no form that is known."""
+    """Returns the layout in a file of any form; `exchange` says what to take where it is silent.
+    Raises FinlabError: it cannot be read, or holds no form that is known."""
     path = Path(file)
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
-    text = read_text(path, MAX_BYTES, "a robot description, parameters, a matrix or a layout", LayoutError)
+    text = read_text(
+        path, MAX_BYTES, "a robot description, parameters, a matrix or a layout", LayoutError
+    )
     exchange.path = path.resolve()
     with under(source=file):
         return read_robot(text, path.name, exchange)
 
 
 def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in the text of a file of this name, of any form. Raises LayoutError: something in it
-    is wrong or missing, or it holds no form that is known."""
+    """Returns the layout in the text of a file of this name, of any form. Raises LayoutError:
+    something in it is wrong or missing, or it holds no form that is known."""
     path = Path(file)
     name = path.stem.strip()[:64].strip() or "robot"
     suffix = path.suffix.lower()
@@ -91,7 +105,9 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
             return layout
     data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
     parts = data.get("actuators") if isinstance(data, dict) else None
-    typed = isinstance(parts, list) and any(isinstance(part, dict) and "type" in part for part in parts)
+    typed = isinstance(parts, list) and any(
+        isinstance(part, dict) and "type" in part for part in parts
+    )
     if isinstance(data, dict) and (typed or {"format", "fins"} & set(data)):
         folder = exchange.path.parent if exchange.path else None
         return parse_layout(data, "", folder, may_open=folder is not None)
@@ -115,8 +131,12 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
             return motor_factors.of_motors(name, motor_factors.tabled(table), exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
     if suffix in PARAMETERS and (n := len(read_parameters(text, ""))):
-        names = "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name thrusters"
+        names = (
+            "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name thrusters"
+        )
         raise LayoutError(f"holds {n} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:
-        raise LayoutError("is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors")
+        raise LayoutError(
+            "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors"
+        )
     return None

@@ -1,10 +1,12 @@
-"""Layouts of robot descriptions: what plugins of simulators drive, links that the user names, and the body.
+"""Layouts of robot descriptions: what plugins of simulators drive, links that the user names, and
+the body.
 
-A thruster pushes at its joint, along the joint's axis; on a link that turns itself it is an azimuth. A fin's
-joint sits where its force acts, and its axis is the shaft. A plugin Thruster of gz-sim pushes in newtons, or
-by an angular velocity w with CT density D^4 w |w|. libuuv_thruster_ros_plugin (Plankton and DAVE have it,
-too) clamps its command, and converts it. Derivatives after Fossen are negative, and a body has their
-magnitudes; of a body what is not said stays unknown.
+A thruster pushes at its joint, along the joint's axis; on a link that turns itself it is an
+azimuth. A fin's joint sits where its force acts, and its axis is the shaft. A plugin Thruster of
+gz-sim pushes in newtons, or by an angular velocity w with CT density D^4 w |w|.
+libuuv_thruster_ros_plugin (Plankton and DAVE have it, too) clamps its command, and converts it.
+Derivatives after Fossen are negative, and a body has their magnitudes; of a body what is not said
+stays unknown.
 """
 
 import math
@@ -17,18 +19,28 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import TURN, Vector
 from finlab.errors import LayoutError
-from finlab.exchange.description import ADDED, TURNING, Description, Joint, number, parse_description, said
+from finlab.exchange.description import (
+    ADDED,
+    TURNING,
+    Description,
+    Joint,
+    number,
+    parse_description,
+    said,
+)
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
 from finlab.exchange.labels import listed, numbers_in
 from finlab.exchange.xml_models import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Body, Fin, Layout
 
 MAX_TILT = math.radians(5.0)
-"""Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for horizontal."""
+"""Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for
+horizontal."""
 MAX_LEAN = 0.02
 """Most that the thrust of an azimuth may lean out of the plane in which it turns [rad]."""
 OFF_AXIS = 0.01
-"""Most that the line of an azimuth's thrust may pass by its turning axis and count as through it [m]."""
+"""Most that the line of an azimuth's thrust may pass by its turning axis and count as through it
+[m]."""
 
 
 def read_description(text: str, name: str, exchange: Exchange) -> Layout:
@@ -45,33 +57,47 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
             raise LayoutError(
                 f"has no masses but in <include> {inside}, which is not opened: give its model.sdf"
             )
-        raise LayoutError("has no masses, so no centre of gravity; use --origin base if its origin is there")
+        raise LayoutError(
+            "has no masses, so no centre of gravity; use --origin base if its origin is there"
+        )
     start = robot.center if at_gravity else np.zeros(3)
     plugins = [each for each in robot.plugins if drives(each[1])][: MAX_ACTUATORS + 1]
     pushing = [(driven(robot, scope, plugin), plugin) for scope, plugin in plugins]
     pushing += [(_joint_of(robot, link), Element("plugin")) for link in exchange.thrusters]
-    parts: list[Actuator] = [_propeller(robot, joint, plugin, start, exchange) for joint, plugin in pushing]
+    parts: list[Actuator] = [
+        _propeller(robot, joint, plugin, start, exchange) for joint, plugin in pushing
+    ]
     parts += [_fin(_joint_of(robot, link), start, exchange) for link in exchange.fins]
     left = dict.fromkeys(
         plugin.get("filename", "") or plugin.get("name", "")
         for _, plugin in robot.plugins
-        if not (drives(plugin) or is_plugin(plugin, "Hydrodynamics") or UUV in plugin.get("filename", ""))
+        if not (
+            drives(plugin)
+            or is_plugin(plugin, "Hydrodynamics")
+            or UUV in plugin.get("filename", "")
+        )
     )
     if not parts:
         raise LayoutError(
-            "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins LINK...) or "
-            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {listed(left)}"
+            "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins "
+            "LINK...) or "
+            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: "
+            f"{listed(left)}"
         )
     if left:
         exchange.note(f"Plugins that are not read: {listed(left)}.")
     exchange.note(f"Model {robot.name} was read, x forward, y left, z up, in m, kg and N.")
-    place, body = ("centre of gravity", body_of(robot, exchange)) if at_gravity else ("base frame", None)
+    place, body = (
+        ("centre of gravity", body_of(robot, exchange)) if at_gravity else ("base frame", None)
+    )
     return Layout(robot.name, tuple(parts), f"Origin at the {place}.", body)
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
     if link not in robot.movers:
-        raise LayoutError(f"has no link {link!r:.60} that a joint moves; such links: {_moved(robot)}")
+        raise LayoutError(
+            f"has no link {link!r:.60} that a joint moves; such links: {_moved(robot)}"
+        )
     return robot.movers[link]
 
 
@@ -85,18 +111,24 @@ def _propeller(
 ) -> Actuator:
     """The thruster that a joint spins, or the azimuth where its mount turns, too."""
     place = joint.place - start
-    part = exchange.thruster(joint.child, place, joint.axis, force_of(plugin, joint.child, exchange))
+    part = exchange.thruster(
+        joint.child, place, joint.axis, force_of(plugin, joint.child, exchange)
+    )
     part = replace(part, dead_band=number(plugin, "deadband"))
     mount = robot.movers.get(joint.parent)
     if mount is None or mount.kind not in TURNING or not mount.ends[0] < mount.ends[1]:
         return part
     along = float(mount.axis @ joint.axis)
     if abs(along) > MAX_LEAN:
-        raise LayoutError(f"the thrust of {joint.child!r:.60} leans out of the plane in which it turns")
+        raise LayoutError(
+            f"the thrust of {joint.child!r:.60} leans out of the plane in which it turns"
+        )
     zero = (joint.axis - along * mount.axis) / math.sqrt(1.0 - along * along)
     arm = joint.place - mount.place
     if abs(arm @ np.cross(mount.axis, zero)) > OFF_AXIS:
-        exchange.note(f"{joint.child} sits off the axis about which it turns: its place at angle 0 is taken.")
+        exchange.note(
+            f"{joint.child} sits off the axis about which it turns: its place at angle 0 is taken."
+        )
     arc = mount.ends if mount.ends[1] - mount.ends[0] < TURN else (-math.pi, math.pi)
     # Where it sits along its thrust changes nothing, but for what turns with it.
     position = vector(place - (arm @ zero) * zero)
@@ -111,13 +143,18 @@ def _fin(joint: Joint, start: Array, exchange: Exchange) -> Fin:
     axis = joint.axis
     place = joint.place - start
     if abs(axis[2]) <= math.sin(MAX_TILT):
-        # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.
+        # A joint may turn about the same line the other way round; finlab's shafts point out of the
+        # hull.
         outward = axis if axis[:2] @ place[:2] >= 0 else -axis
         return Fin(joint.child, vector(place), math.atan2(outward[1], outward[0]))
-    exchange.note("Thrust of fins whose shaft is not horizontal is taken to point forward at direction 0.")
+    exchange.note(
+        "Thrust of fins whose shaft is not horizontal is taken to point forward at direction 0."
+    )
     ahead = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
     zero = ahead - (ahead @ axis) * axis
-    return Fin(joint.child, vector(place), shaft=vector(axis), zero=vector(zero / np.linalg.norm(zero)))
+    return Fin(
+        joint.child, vector(place), shaft=vector(axis), zero=vector(zero / np.linalg.norm(zero))
+    )
 
 
 MOST = 1000.0
@@ -156,13 +193,15 @@ def driven(robot: Description, scope: str, plugin: Element) -> Joint:
     if joint is None:
         inside = ", ".join(robot.included)[:200]
         where = f", or stands in what is included: {inside}" if inside else ""
-        raise LayoutError(f"a thruster's plugin names joint {name!r:.60}, which moves no link in it{where}")
+        raise LayoutError(
+            f"a thruster's plugin names joint {name!r:.60}, which moves no link in it{where}"
+        )
     return joint
 
 
 def force_of(plugin: Element, name: str, exchange: Exchange) -> tuple[float, float] | None:
-    """Returns least and most force [N] of a plugin; None where it has no limits. Raises LayoutError: a value
-    of it is no number."""
+    """Returns least and most force [N] of a plugin; None where it has no limits. Raises
+    LayoutError: a value of it is no number."""
     if UUV_THRUSTER in plugin.get("filename", ""):
         return _uuv_force(plugin, name, exchange)
     if not said(plugin, "min_thrust_cmd max_thrust_cmd"):
@@ -186,9 +225,13 @@ def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, f
         speeds = (scale * number(plugin, "clampMin"), scale * number(plugin, "clampMax"))
         gain = number(plugin, "thrust_efficiency", 1.0) * number(plugin, "conversion/rotorConstant")
         low, high = sorted(gain * speed * abs(speed) for speed in speeds)
-        exchange.note(f"uuv_thruster of {name}: clamps and conversion {kind} give {low:g} to {high:g} N.")
+        exchange.note(
+            f"uuv_thruster of {name}: clamps and conversion {kind} give {low:g} to {high:g} N."
+        )
     else:
-        exchange.note(f"uuv_thruster of {name}: no clamps, or conversion {kind!r:.40}, which is not read.")
+        exchange.note(
+            f"uuv_thruster of {name}: no clamps, or conversion {kind!r:.40}, which is not read."
+        )
     if said(plugin, "thrustMin") and said(plugin, "thrustMax"):
         low = max(low, number(plugin, "thrustMin"))
         high = min(high, number(plugin, "thrustMax"))
@@ -196,20 +239,25 @@ def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, f
 
 
 def body_of(robot: Description, exchange: Exchange) -> Body:
-    """Returns what the description says of the body at its centre of gravity. Raises LayoutError: a value is
-    no number, or out of bounds."""
+    """Returns what the description says of the body at its centre of gravity. Raises LayoutError: a
+    value is no number, or out of bounds."""
     known: Known = {}
     _keep(known, "added_mass", {axis: str(value) for axis, value in robot.added.items()}, exchange)
     water = [plugin for _, plugin in robot.plugins if is_plugin(plugin, "Hydrodynamics")]
     objects = [plugin for _, plugin in robot.plugins if UUV in plugin.get("filename", "")]
     models = [model for plugin in objects for model in plugin.findall("link/hydrodynamic_model")]
-    for read, plugins, what in ((_of_gz, water, "Hydrodynamics"), (_of_uuv, models, "hydrodynamic_model")):
+    for read, plugins, what in (
+        (_of_gz, water, "Hydrodynamics"),
+        (_of_uuv, models, "hydrodynamic_model"),
+    ):
         for plugin in plugins[:1]:
             read(plugin, known, exchange)
         if len(plugins) > 1:
             exchange.note(f"It has {len(plugins)} plugins with {what}: the first was read.")
     if water or objects:
-        exchange.note("Its buoyancy is not read: it is taken for the weight, at the centre of gravity.")
+        exchange.note(
+            "Its buoyancy is not read: it is taken for the weight, at the centre of gravity."
+        )
     moments: Vector | None = None
     if robot.inertia is None:
         exchange.note("A link with a mass has no inertia, so that of the body is unknown.")
@@ -218,7 +266,9 @@ def body_of(robot: Description, exchange: Exchange) -> Body:
         if np.abs(robot.inertia - np.diag(moments)).max() > 0.05 * max(moments):
             exchange.note("Products of inertia are left out.")
     values: dict[str, Any] = dict(known)
-    return Body(mass_kg=robot.mass, inertia_kgm2=moments if moments and min(moments) > 0 else None, **values)
+    return Body(
+        mass_kg=robot.mass, inertia_kgm2=moments if moments and min(moments) > 0 else None, **values
+    )
 
 
 def _keep(known: Known, field: str, tags: dict[str, str], exchange: Exchange) -> None:
@@ -227,7 +277,9 @@ def _keep(known: Known, field: str, tags: dict[str, str], exchange: Exchange) ->
     if len(tags) == 6 and values is not None:
         known[field] = tuple(np.abs(values).tolist())
         exchange.note(f"{field} was read from {', '.join(tags)}.")
-        wrong = [tag for tag, value in zip(tags, values, strict=True) if value > 0 and tag not in ADDED]
+        wrong = [
+            tag for tag, value in zip(tags, values, strict=True) if value > 0 and tag not in ADDED
+        ]
         if wrong:
             why = "against the sign of a derivative: the magnitude is taken"
             exchange.note(f"{', '.join(wrong)} > 0, {why}.")
@@ -245,7 +297,9 @@ def _of_gz(plugin: Element, known: Known, exchange: Exchange) -> None:
             _keep(known, field, values, exchange)
             read |= set(values)
     if len(read) == 2:
-        exchange.note("Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown.")
+        exchange.note(
+            "Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown."
+        )
     if others := dict.fromkeys(each.tag for each in plugin if each.tag not in read):
         exchange.note(f"Not read of Hydrodynamics: {', '.join(others)[:300]}.")
 
@@ -263,6 +317,8 @@ def _of_uuv(model: Element, known: Known, exchange: Exchange) -> None:
         tags = dict(zip(ADDED, words, strict=True)) if len(words) == 6 else {"all": " ".join(words)}
         _keep(known, field, tags if words else {}, exchange)
     if kind != "fossen":
-        exchange.note(f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown.")
+        exchange.note(
+            f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown."
+        )
     if said(model, "linear_damping_forward_speed"):
         exchange.note("linear_damping_forward_speed is not read.")

@@ -1,4 +1,5 @@
-"""Words of others for axes, frames, places and limits, and all places in plain values that they name."""
+"""Words of others for axes, frames, places and limits, and all places in plain values that they
+name."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,8 +18,13 @@ _FRAME_WORDS: dict[Frame, set[str]] = {
     "FLU": {"flu", "enu", "nwu", "rep103", "rep"},
     "FRD": {"frd", "ned", "sname", "fsd"},
 }
-_SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
-FRAME_KEYS = "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention "
+_SIDES: dict[Frame, set[str]] = {
+    "FLU": {"left", "port", "up"},
+    "FRD": {"right", "starboard", "down"},
+}
+FRAME_KEYS = (
+    "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention "
+)
 FRAME_KEYS += "frameid"
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
@@ -32,16 +38,24 @@ _AXES: dict[str, Axis] = {word: axis for axis in AXES for word in _AXIS_WORDS[ax
 NAME = "name thruster joint thrustername jointname motor actuator id label"
 NAMES = "names thrusters thrusternames joints jointnames motors actuators"
 COUNT = "count n num number nthrusters numthrusters numberofthrusters thrustercount"
-POSITION = "position positions pos xyz location locations place placement leverarm r coordinates origin"
+POSITION = (
+    "position positions pos xyz location locations place placement leverarm r coordinates origin"
+)
 DIRECTION = "direction directions dir axis axes forcedirection forcedirections thrustdirection "
 DIRECTION += "thrustdirections thrustaxis thrustvector unitvector vector"
 ANGLES = "rpy euler eulerangles rollpitchyaw"
 UNCLEAR = "orientation orientations attitude rotation"
 ROWS_OF = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
 CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
-PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
-LEAST = "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
-MOST = "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
+PAIR = (
+    "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
+)
+LEAST = (
+    "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
+)
+MOST = (
+    "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
+)
 LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
 ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
@@ -64,8 +78,9 @@ def axis_of(label: object) -> Axis | None:
 def lookup(
     values: Mapping[str, Any], words: str, units: Mapping[str, float] | None = None
 ) -> tuple[str, Any, float]:
-    """Returns the first key of a mapping that is one of some words, its value and the size of its unit, which
-    may end the key (`position_mm`) or stand behind it in brackets; an empty key where there is none."""
+    """Returns the first key of a mapping that is one of some words, its value and the size of its
+    unit, which may end the key (`position_mm`) or stand behind it in brackets; an empty key where
+    there is none."""
     known = words.split()
     for key, value in values.items():
         label = str(key)[:100]
@@ -84,12 +99,14 @@ def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     """Returns the keys of thrusters that are not read, with commas between."""
     keys = dict.fromkeys(str(key) for row in rows for key in row)
     units = {**LENGTHS, **FORCES, **TURNS}
-    return ", ".join(key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0])[:300]
+    return ", ".join(
+        key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0]
+    )[:300]
 
 
 def frame_in(text: str) -> Frame | None:
-    """Returns the frame that a text names by words such as NED, FLU, `y right`; None where it names none, or
-    a left-handed one."""
+    """Returns the frame that a text names by words such as NED, FLU, `y right`; None where it names
+    none, or a left-handed one."""
     words = set(re.findall(r"[a-z]+(?:103)?", text[:2000].lower()))
     for known in (_FRAME_WORDS, _SIDES):
         named: list[Frame] = [frame for frame, of_it in known.items() if words & of_it]
@@ -98,25 +115,31 @@ def frame_in(text: str) -> Frame | None:
     return None
 
 
-def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> tuple[Frame | None, str]:
-    """Returns the frame that mappings, the innermost first, or else comments name, and where it says so.
-    Raises LayoutError: a frame is named by a word that is not known."""
+def frame_said(
+    scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]
+) -> tuple[Frame | None, str]:
+    """Returns the frame that mappings, the innermost first, or else comments name, and where it
+    says so. Raises LayoutError: a frame is named by a word that is not known."""
     for key, value, _ in (lookup(scope, FRAME_KEYS) for scope in scopes):
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
         if frame := frame_in(text):
             return frame, f"{key} {text}"
         if key and plain(key) != "frameid":
             words = "FLU, ENU or REP-103 (y left, z up), or FRD, NED or SNAME (y right, z down)"
-            raise LayoutError(f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key)
+            raise LayoutError(
+                f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key
+            )
     for comment in comments:
-        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (frame := frame_in(comment)):
+        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (
+            frame := frame_in(comment)
+        ):
             return frame, "its comment"
     return None, ""
 
 
 class Node(NamedTuple):
-    """A value in plain values, the keys that lead to it, and the mappings around it with their paths, the
-    innermost first; a mapping itself is the first."""
+    """A value in plain values, the keys that lead to it, and the mappings around it with their
+    paths, the innermost first; a mapping itself is the first."""
 
     path: Path
     value: Any
@@ -134,8 +157,8 @@ class Node(NamedTuple):
 
 
 def nodes(data: Any) -> Iterator[Node]:
-    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists.
-    Raises LayoutError: there are too many."""
+    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in
+    lists. Raises LayoutError: there are too many."""
     waiting: list[Node] = [Node((), data, ())]
     count = 0
     while waiting:
@@ -149,7 +172,9 @@ def nodes(data: Any) -> Iterator[Node]:
             inner = value.items()
             node = Node(path, value, scopes)
         elif isinstance(value, list):
-            inner = ((f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list))
+            inner = (
+                (f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list)
+            )
         yield node
         waiting += [Node((*path, key), each, scopes) for key, each in [*inner][::-1]]
 
@@ -158,7 +183,11 @@ def unread(data: Any, used: set[Path]) -> str:
     """Returns the keys of values that lie below none that were used, with commas between."""
     values = (node for node in nodes(data) if not isinstance(node.value, Mapping))
     named = [node for node in values if not (node.path and node.path[-1].startswith("["))]
-    left = [node.words for node in named if not any(node.path[:i] in used for i in range(len(node.path) + 1))]
+    left = [
+        node.words
+        for node in named
+        if not any(node.path[:i] in used for i in range(len(node.path) + 1))
+    ]
     return listed(left) if left else ""
 
 
@@ -169,8 +198,8 @@ def listed(names: Iterable[str]) -> str:
 
 
 def numbers_in(values: Any) -> Array | None:
-    """Returns nested numbers, or text that stands for them, as an array of their shape; None where some are
-    no numbers, or as large as 1e9."""
+    """Returns nested numbers, or text that stands for them, as an array of their shape; None where
+    some are no numbers, or as large as 1e9."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

@@ -20,7 +20,9 @@ PLACES = {"px", "posx", "dx", "ax", "nx", "ux", *labels.POSITION.split()}
 """Columns by which a table of places is known."""
 MAX_ROWS = 1000
 """Most rows and columns that are read; a robot has up to 64 actuators."""
-ENDS = {word: "least" for word in labels.LEAST.split()} | {word: "most" for word in labels.MOST.split()}
+ENDS = {word: "least" for word in labels.LEAST.split()} | {
+    word: "most" for word in labels.MOST.split()
+}
 
 
 class Table(NamedTuple):
@@ -38,11 +40,15 @@ class Table(NamedTuple):
 
 
 def table_of(text: str) -> Table:
-    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that begin with
-    # or // are comments. Raises LayoutError: it is no table."""
+    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that
+    begin with # or // are comments. Raises LayoutError: it is no table."""
     if text.count("\n") > 20 * MAX_ROWS:
-        raise LayoutError(f"holds {text.count(chr(10)):,} lines, expected a table of up to {MAX_ROWS} rows")
-    lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip(" \t,;")]
+        raise LayoutError(
+            f"holds {text.count(chr(10)):,} lines, expected a table of up to {MAX_ROWS} rows"
+        )
+    lines = [
+        (i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip(" \t,;")
+    ]
     comments = [line for _, line in lines if line.startswith(("#", "//"))]
     lines = [(i, line) for i, line in lines if not line.startswith(("#", "//"))]
     if not 0 < len(lines) <= MAX_ROWS:
@@ -53,24 +59,32 @@ def table_of(text: str) -> Table:
     except csv.Error as error:
         raise LayoutError(f"is no table: {error}") from None
     if len(cells) != len(lines) or max(map(len, cells)) > MAX_ROWS:
-        raise LayoutError(f"has a cell with line ends inside, or a row of more than {MAX_ROWS} cells")
+        raise LayoutError(
+            f"has a cell with line ends inside, or a row of more than {MAX_ROWS} cells"
+        )
     rows = [(i, [cell.strip() for cell in row]) for (i, _), row in zip(lines, cells, strict=True)]
     for _, row in rows:
         while len(row) > 1 and not row[-1]:
             row.pop()
     head = rows[0][1]
-    named = not any(map(is_number, head)) or plain(head[0]) in ("axis", "axes", "dof", "row") or not head[0]
+    named = (
+        not any(map(is_number, head))
+        or plain(head[0]) in ("axis", "axes", "dof", "row")
+        or not head[0]
+    )
     return Table(head, rows[1:], comments) if named else Table([], rows, comments)
 
 
 def plain_of(table: Table) -> dict[str, Any]:
-    """Returns a table as plain values: a matrix, or a mapping for each thruster. Raises LayoutError: a row
-    has another length, or a cell that is no number; the row is named."""
+    """Returns a table as plain values: a matrix, or a mapping for each thruster. Raises
+    LayoutError: a row has another length, or a cell that is no number; the row is named."""
     header = table.header
     rows = table.rows
     columns = {plain(cell) for cell in header}
     if measured := MEASURED & {cell.removesuffix("us") for cell in columns}:
-        raise LayoutError(f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them")
+        raise LayoutError(
+            f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them"
+        )
     width = len(header or rows[0][1]) if rows else 0
     named = {"names": header} if header else {}
     if sum(axis_of(row[1][0]) is not None for row in rows) > 1:
@@ -81,8 +95,8 @@ def plain_of(table: Table) -> dict[str, Any]:
 
 
 def records_of(table: Table) -> list[dict[str, Any]]:
-    """Returns each row by the names of its columns; the first that has none is the thruster's name. Raises
-    LayoutError: a row has another length, or no number where one is needed."""
+    """Returns each row by the names of its columns; the first that has none is the thruster's name.
+    Raises LayoutError: a row has another length, or no number where one is needed."""
     records = []
     for line, row in table.rows:
         if len(row) != len(table.header):

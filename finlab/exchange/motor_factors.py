@@ -1,8 +1,10 @@
-"""Motor factors of ArduSub, roll, pitch, yaw, throttle, forward and lateral: frames, calls and tables.
+"""Motor factors of ArduSub, roll, pitch, yaw, throttle, forward and lateral: frames, calls and
+tables.
 
-Factors hold directions of forces and signs of torques, no lengths and no newtons. Forward, right and up are
-positive, and so are roll to the right, pitch up and yaw clockwise seen from above (ArduSub,
-`AP_Motors6DOF::setup_motors`, commit of 2026). Calls are in C++ and Lua, with simple arithmetic.
+Factors hold directions of forces and signs of torques, no lengths and no newtons. Forward, right
+and up are positive, and so are roll to the right, pitch up and yaw clockwise seen from above
+(ArduSub, `AP_Motors6DOF::setup_motors`, commit of 2026). Calls are in C++ and Lua, with simple
+arithmetic.
 """
 
 import ast
@@ -41,14 +43,17 @@ _FRAMES = {
     "SIMPLEROV_5": f"{_SIMPLE} {_TWO}, 0 0 0 0 0 1",
 }
 FRAMES: dict[str, Array] = {
-    name: np.array([row.split() for row in rows.split(",")], np.float64) for name, rows in _FRAMES.items()
+    name: np.array([row.split() for row in rows.split(",")], np.float64)
+    for name, rows in _FRAMES.items()
 }
 """Name of a frame -> factors (n, 6), in the order of FRAME_CONFIG."""
 ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
 ORDER = [AXES.index(axis) for axis in ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")]
 """Columns of factors in the order of a wrench."""
-OF_ARDUPILOT = re.compile(r"^[ \t\d]{0,20}(?:FRAME_C(?:ONFIG|LASS)|MOT_\w+|SYSID_THISMAV)\b", re.MULTILINE)
+OF_ARDUPILOT = re.compile(
+    r"^[ \t\d]{0,20}(?:FRAME_C(?:ONFIG|LASS)|MOT_\w+|SYSID_THISMAV)\b", re.MULTILINE
+)
 """A line by which parameters of ArduPilot are known."""
 WEAK = 0.1
 """Torques about an axis are none where they stay below this share of those about another one."""
@@ -65,11 +70,23 @@ _NAMES |= {"rad": math.radians, "abs": abs, "fabsf": abs, "M_PI": math.pi, "PI":
 _NAMES |= {"M_PI_2": math.pi / 2, "M_PI_4": math.pi / 4}
 _NAMES |= {"M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
 _ALLOWED = (
-    *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.UAdd),
+    *(
+        ast.Expression,
+        ast.BinOp,
+        ast.UnaryOp,
+        ast.Add,
+        ast.Sub,
+        ast.Mult,
+        ast.Div,
+        ast.USub,
+        ast.UAdd,
+    ),
     *(ast.Constant, ast.Name, ast.Load, ast.Call),
 )
 """What an expression may be made of."""
-_WRITTEN = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b|std::|math\.")
+_WRITTEN = re.compile(
+    r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b|std::|math\."
+)
 _DEFINED = re.compile(
     r"^[ \t]*(?:#[ \t]*define[ \t]+(\w+)[ \t]+(?!\()"
     r"|(?:(?:static|const|constexpr|local|float|double)[ \t]+)+(\w+)[ \t]*=[ \t]*)([^;\n]{1,200})",
@@ -80,25 +97,30 @@ MotorRow = tuple[str, list[float]]
 
 
 def of_motors(name: str, rows: list[MotorRow], exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of motors and their factors. Raises LayoutError: there is none, one
-    of them twice, or one that gives no force."""
+    """Returns the layout, called `name`, of motors and their factors. Raises LayoutError: there is
+    none, one of them twice, or one that gives no force."""
     names = [motor for motor, _ in rows]
     if not rows:
         raise LayoutError("has no rows of factors, a motor and its six factors in each")
     for i, motor in enumerate(names):
         if motor in names[:i]:
             raise LayoutError(f"adds a motor twice, {motor}; keep the lines of one frame")
-    exchange.note(f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`.")
+    exchange.note(
+        f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`."
+    )
     columns = (np.array([factors for _, factors in rows]) * SIGNS)[:, ORDER]
     columns[:, 3:] *= ARM * np.linalg.norm(columns[:, :3], axis=1, keepdims=True)
-    return Layout(name, tuple(exchange.of_column(*each, None) for each in zip(names, columns, strict=True)))
+    return Layout(
+        name, tuple(exchange.of_column(*each, None) for each in zip(names, columns, strict=True))
+    )
 
 
 def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
     """Returns the layout, called `name`, of the frame in a list of parameters.
 
-    MOT_n_DIRECTION -1 turns a motor the other way for the same output, so that it pushes as its frame says.
-    Raises LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a value is no number."""
+    MOT_n_DIRECTION -1 turns a motor the other way for the same output, so that it pushes as its
+    frame says. Raises LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a
+    value is no number."""
     values = read_parameters(text, "FRAME_ MOT_1 MOT_2 MOT_3 MOT_4 MOT_5 MOT_6 MOT_7 MOT_8")
     config = values.get("FRAME_CONFIG")
     frames = [*FRAMES]
@@ -107,7 +129,10 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
         lacks = "no FRAME_CONFIG, by which ArduSub names the motors of a robot"
         raise LayoutError(f"holds {len(values)} parameters of ArduPilot{other}, but {lacks}")
     if config not in range(len(frames)):
-        why = "a frame of one's own, which parameters do not hold; give the script (.lua) or source with its"
+        why = (
+            "a frame of one's own, which parameters do not hold; give the script (.lua) or source "
+            "with its"
+        )
         known = f"finlab knows 0 to 6: {', '.join(frames)}"
         raise LayoutError(f"is {config:g}, {why} motors; {known}", "FRAME_CONFIG")
     frame = frames[int(config)]
@@ -118,15 +143,16 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
             raise LayoutError(f"is {sign:g}, expected 1 or -1", f"MOT_{i}_DIRECTION")
     if turned := ", ".join(str(i) for i, sign in signs.items() if sign < 0):
         exchange.note(
-            f"MOT_n_DIRECTION reverses the outputs of motors {turned}, so that they push as the frame says: "
+            f"MOT_n_DIRECTION reverses the outputs of motors {turned}, so that they push as the "
+            "frame says: "
             "forces of the layout are those of the frame."
         )
     return of_motors(name, [(f"motor{i}", [*FRAMES[frame][i - 1]]) for i in signs], exchange)
 
 
 def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
-    """Returns the names of a layout's thrusters and their factors (n, 6), the largest of each kind 1. Raises
-    LayoutError: there is no thruster."""
+    """Returns the names of a layout's thrusters and their factors (n, 6), the largest of each kind
+    1. Raises LayoutError: there is no thruster."""
     kept = exchange.thrusters_of(layout, "A table of factors", "limits", "lengths")
     full = np.maximum(kept.upper, -kept.lower)[:, :1]
     factors = (own_effectiveness(kept)[:, 0] * full)[:, np.argsort(ORDER)] * SIGNS
@@ -152,8 +178,8 @@ def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
 
 
 def called(text: str) -> list[MotorRow]:
-    """Returns the motors of calls of `add_motor_raw_6dof` in C++ or Lua, which may go over several lines.
-    Raises LayoutError: a call does not parse; its line is named."""
+    """Returns the motors of calls of `add_motor_raw_6dof` in C++ or Lua, which may go over several
+    lines. Raises LayoutError: a call does not parse; its line is named."""
     lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
     code = _without_comments(text, lua)
     rows = list[MotorRow]()
@@ -172,7 +198,9 @@ def called(text: str) -> list[MotorRow]:
         if len(rows) == MAX_ACTUATORS:
             raise LayoutError(f"line {line}: adds more than {MAX_ACTUATORS} motors")
         if not lua and (cell := next(filter(_WHOLE.search, cells[1:7]), None)):
-            raise LayoutError(f"line {line}: {cell.strip()!r:.60} divides whole numbers, which C++ rounds")
+            raise LayoutError(
+                f"line {line}: {cell.strip()!r:.60} divides whole numbers, which C++ rounds"
+            )
         try:
             factors = [value_of(cell, constants) for cell in cells[1:7]]
         except ValueError as error:
@@ -194,7 +222,8 @@ def _without_comments(code: str, lua: bool) -> str:
 
 
 def _arguments(text: str) -> list[str]:
-    """What stands between a bracket and the one that closes it, parted by commas; none where none does."""
+    """What stands between a bracket and the one that closes it, parted by commas; none where none
+    does."""
     depth = 0
     cells = [""]
     for letter in text:
@@ -207,8 +236,8 @@ def _arguments(text: str) -> list[str]:
 
 
 def tabled(table: Table) -> list[MotorRow]:
-    """Returns the motors in a table whose header names `FACTORS` in any order. Raises LayoutError: a row does
-    not parse; it is named."""
+    """Returns the motors in a table whose header names `FACTORS` in any order. Raises LayoutError:
+    a row does not parse; it is named."""
     rows = []
     for i, record in enumerate(records_of(table), 1):
         name = str(lookup(record, labels.NAME)[1] or i)
@@ -221,8 +250,9 @@ def tabled(table: Table) -> list[MotorRow]:
 
 
 def value_of(text: str, constants: Mapping[str, float]) -> float:
-    """Returns the value of numbers, constants, + - * /, brackets and functions such as `cosf(radians(45))`.
-    ValueError: it is something else, or not finite; the message names what is not known."""
+    """Returns the value of numbers, constants, + - * /, brackets and functions such as
+    `cosf(radians(45))`. ValueError: it is something else, or not finite; the message names what is
+    not known."""
     what = f"{text.strip()!r:.60}"
     names = {**_NAMES, **constants}
     try:
@@ -244,10 +274,13 @@ def value_of(text: str, constants: Mapping[str, float]) -> float:
 
 
 def constants_in(text: str) -> dict[str, float]:
-    """Returns the constants that a program of C++ or Lua defines once, by name; others are left out."""
+    """Returns the constants that a program of C++ or Lua defines once, by name; others are left
+    out."""
     values: dict[str, float] = {}
     twice: set[str] = set()
-    for define, declared, value in islice(map(re.Match.groups, _DEFINED.finditer(text)), MOST_CONSTANTS):
+    for define, declared, value in islice(
+        map(re.Match.groups, _DEFINED.finditer(text)), MOST_CONSTANTS
+    ):
         name = define or declared
         twice |= {name} & values.keys()
         with suppress(ValueError):

@@ -26,12 +26,14 @@ def read_plain(
 ) -> Layout:
     """Returns the layout, called `name`, of the thrusters in plain values.
 
-    `comments` of the file may name the frame; a `table` has rows that nothing but their labels names. Raises
-    LayoutError: none are there, or several times, or they may be read in two ways."""
+    `comments` of the file may name the frame; a `table` has rows that nothing but their labels
+    names. Raises LayoutError: none are there, or several times, or they may be read in two ways."""
     held = found_in(data, exchange, table)
     if len(held.rows) > MAX_ACTUATORS:
         what = "columns" if held.axes else "thrusters"
-        raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {len(held.rows)}", held.node.words)
+        raise LayoutError(
+            f"expected up to {MAX_ACTUATORS} {what}, got {len(held.rows)}", held.node.words
+        )
     frd = _frd(held, exchange, comments)
     used = {held.node.path}
     parts = (_of_matrix if held.axes else _of_places)(held, data, frd, used, exchange)
@@ -42,7 +44,9 @@ def read_plain(
         exchange.note(f"Not read of each thruster: {left}.")
     if keys := unread(data, used):
         exchange.note(f"Not read: {keys}.")
-    return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in held.axes or not held.axes))
+    return Layout(
+        name, parts, axes=tuple(axis for axis in AXES if axis in held.axes or not held.axes)
+    )
 
 
 def _frd(held: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
@@ -53,7 +57,9 @@ def _frd(held: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
     elif exchange.frame is None and frame:
         exchange.note(f"Its frame is {FRAMES[frame]} ({where}).")
     elif exchange.frame is None:
-        exchange.note(f"It names no frame: {FRAMES['FLU']} (FLU) is taken; --frame FRD for the other.")
+        exchange.note(
+            f"It names no frame: {FRAMES['FLU']} (FLU) is taken; --frame FRD for the other."
+        )
     return (exchange.frame or frame) == "FRD"
 
 
@@ -93,7 +99,9 @@ def _direction(key: str, row: Row, exchange: Exchange) -> Array:
         axis_key, value, size = lookup(row, labels.ANGLES, TURNS)
         turn = _three(value, f"{key}.{axis_key}") * size
         if np.abs(turn).max() > 2 * np.pi:
-            raise LayoutError("is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}")
+            raise LayoutError(
+                "is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}"
+            )
         exchange.note(f"{axis_key} turns the axis x of a thruster, along which it pushes.")
         axis = Rotation.from_euler("xyz", turn).apply([1.0, 0.0, 0.0])
     length = float(np.linalg.norm(axis))
@@ -123,7 +131,9 @@ def _of_matrix(
         exchange.note(f"It has no row {missing}: 0 is taken there, and not commanded (`axes`).")
     ends = _ends(held, data, used, exchange)
     if not any(ends) and not per_newton:
-        exchange.note("It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST).")
+        exchange.note(
+            "It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST)."
+        )
         ends = [(-1.0, 1.0)] * len(ends)
     columns = columns * (TO_FRD if frd else 1.0)
     names = [_name(key, row) for key, row in held.rows.items()]
@@ -144,7 +154,11 @@ def _ends(held: Found, data: Any, used: set[Path], exchange: Exchange) -> list[E
         if isinstance(each.value, Mapping):
             key, named, _ = lookup(each.value, labels.NAME)
             named = named if key else each.key
-            if isinstance(named, str) and named in keys and (pair := _limits_in(each.value, 1, exchange)[0]):
+            if (
+                isinstance(named, str)
+                and named in keys
+                and (pair := _limits_in(each.value, 1, exchange)[0])
+            ):
                 known[named] = pair
                 used.add(each.path)
     if known and (without := ", ".join(key for key in keys if key not in known)):
@@ -153,8 +167,8 @@ def _ends(held: Found, data: Any, used: set[Path], exchange: Exchange) -> list[E
 
 
 def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Ends | None]:
-    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid. One pair,
-    or one number of each, is for all. A most alone is for both ways."""
+    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid.
+    One pair, or one number of each, is for all. A most alone is for both ways."""
     key, pair, size = lookup(values, labels.PAIR, FORCES)
     ends = numbers_in(pair)
     if key and pair is not None:
@@ -169,7 +183,9 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
     most = numbers_in(high)
     least = numbers_in(low if low is not None else high)
     if most is None or least is None or not {most.size, least.size} <= {1, n}:
-        raise LayoutError(f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}")
+        raise LayoutError(
+            f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}"
+        )
     if low is None:
         exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
         least = -least
@@ -180,8 +196,8 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
 
 
 def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML. Raises
-    LayoutError: there is no thruster."""
+    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML.
+    Raises LayoutError: there is no thruster."""
     kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
     rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
     names = list(kept.names)
@@ -190,6 +206,10 @@ def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
     if suffix != ".csv":
         head = {"frame": exchange.frame or "FLU", "unit": "N", "names": names, "limits": limits}
         return yaml_text({**head, "matrix": matrix})
-    table = {"axis": names, **matrix, **dict(zip(("least", "most"), zip(*limits, strict=True), strict=True))}
+    table = {
+        "axis": names,
+        **matrix,
+        **dict(zip(("least", "most"), zip(*limits, strict=True), strict=True)),
+    }
     lines = [",".join(map(str, [key, *row])) for key, row in table.items()]
     return "\n".join([f"# frame: {exchange.frame or 'FLU'}", *lines]) + "\n"

@@ -1,4 +1,5 @@
-"""Thrusters in plain values, a mapping for each: by place and direction, or by the wrench of its command."""
+"""Thrusters in plain values, a mapping for each: by place and direction, or by the wrench of its
+command."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,17 @@ from finlab.files.csv_table import LENGTHS, TURNS
 
 UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""
-WORDS = {*"tam tcm allocation allocator alloc mixer mixing mix effectiveness".split()}  # noqa: SIM905
+WORDS = {
+    "tam",
+    "tcm",
+    "allocation",
+    "allocator",
+    "alloc",
+    "mixer",
+    "mixing",
+    "mix",
+    "effectiveness",
+}
 """Words of a key that holds an allocation matrix."""
 NEAR = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
 """Words that may stand with `matrix` in such a key."""
@@ -31,8 +42,8 @@ Row = dict[str, Any]
 class Found(NamedTuple):
     """Thrusters at one place of the values, each by name, as the file has it.
 
-    Thrusters without places and directions have wrenches (axes, n); `order` is how a note says that their
-    matrix was read."""
+    Thrusters without places and directions have wrenches (axes, n); `order` is how a note says that
+    their matrix was read."""
 
     node: Node
     rows: dict[str, Row]
@@ -44,8 +55,8 @@ class Found(NamedTuple):
 def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
     """Returns the thrusters in plain values, or in a `table` whose six rows nothing names.
 
-    Places and directions go before a matrix, since they tell more. Raises LayoutError: none are there, or
-    several times, or they may be read in two ways."""
+    Places and directions go before a matrix, since they tell more. Raises LayoutError: none are
+    there, or several times, or they may be read in two ways."""
     placed = [each for node in nodes(data) if (each := _placed(node, exchange))]
     every = placed or [each for node in nodes(data) if (each := _wrenches(node, exchange, table))]
     if len(every) > 1:
@@ -55,10 +66,15 @@ def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
     if every:
         return every[0]
     shaped = [(each.words, numbers_in(each.value)) for each in nodes(data) if each.path]
-    lists = [f"{words} {array.shape}" for words, array in shaped if array is not None and array.size > 5]
-    seen = f"; its lists of numbers, {', '.join(lists[:8])}, have no key that says so" if lists else ""
+    lists = [
+        f"{words} {array.shape}" for words, array in shaped if array is not None and array.size > 5
+    ]
+    seen = (
+        f"; its lists of numbers, {', '.join(lists[:8])}, have no key that says so" if lists else ""
+    )
     raise LayoutError(
-        "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as `tam` or "
+        "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as "
+        "`tam` or "
         f"`allocation_matrix`, or a position and a direction of each thruster{seen}"
     )
 
@@ -75,7 +91,8 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
     """Thrusters by place and direction: mappings below a node, or lists of all in one."""
     rows = {key: _joined(row) for key, row in _held(node.value).items()}
     says = {
-        key: (_short(lookup(row, labels.POSITION, LENGTHS)[1]), _points(row)) for key, row in rows.items()
+        key: (_short(lookup(row, labels.POSITION, LENGTHS)[1]), _points(row))
+        for key, row in rows.items()
     }
     if not any(map(all, says.values())):
         lists = _lists(node, exchange)
@@ -83,18 +100,23 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
     for key, (place, points) in says.items():
         if place != points:
             lacks = "direction" if place else "position"
-            raise LayoutError(f"has no {lacks}, and others beside it have one", f"{node.words}.{key}")
+            raise LayoutError(
+                f"has no {lacks}, and others beside it have one", f"{node.words}.{key}"
+            )
     return Found(node, {key: row for key, row in rows.items() if all(says[key])})
 
 
 def _joined(row: Mapping[str, Any]) -> Row:
-    """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction, unless it has
-    torques or angles: a wrench is for others to read."""
+    """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction,
+    unless it has torques or angles: a wrench is for others to read."""
     joined = {**row}
     short = {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
     if any(axis_of(key) in ("Tx", "Ty", "Tz") for key in short):
         return joined
-    for what, starts in (("position", ("", "p", "pos")), ("direction", ("d", "a", "n", "u", "dir", "f"))):
+    for what, starts in (
+        ("position", ("", "p", "pos")),
+        ("direction", ("d", "a", "n", "u", "dir", "f")),
+    ):
         for start in starts:
             if {f"{start}x", f"{start}y"} <= set(short):
                 joined.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
@@ -104,17 +126,23 @@ def _joined(row: Mapping[str, Any]) -> Row:
 def _short(value: Any) -> bool:
     """Whether a value may be a vector of one thruster."""
     return isinstance(value, Mapping | str) or (
-        isinstance(value, list) and len(value) < 6 and not any(isinstance(each, list) for each in value)
+        isinstance(value, list)
+        and len(value) < 6
+        and not any(isinstance(each, list) for each in value)
     )
 
 
 def _points(row: Row) -> bool:
-    """Whether a mapping says where its thruster points; an error where that may be angles as well."""
-    points = any(_short(lookup(row, words, TURNS)[1]) for words in (labels.DIRECTION, labels.ANGLES))
+    """Whether a mapping says where its thruster points; an error where that may be angles as
+    well."""
+    points = any(
+        _short(lookup(row, words, TURNS)[1]) for words in (labels.DIRECTION, labels.ANGLES)
+    )
     key, value, _ = lookup(row, labels.UNCLEAR)
     if key and not points and _short(value) and lookup(row, labels.POSITION, LENGTHS)[0]:
         raise LayoutError(
-            "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians", key
+            "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians",
+            key,
         )
     return points
 
@@ -132,36 +160,47 @@ def _lists(node: Node, exchange: Exchange) -> dict[str, Row]:
     what = f"{node.words}.{key}"
     names, count = (lookup(value, words)[1] for words in (labels.NAMES, labels.COUNT))
     if at.size != axes.size:
-        raise LayoutError(f"holds {at.size} numbers, and {key} {axes.size}", f"{node.words}.{place_key}")
+        raise LayoutError(
+            f"holds {at.size} numbers, and {key} {axes.size}", f"{node.words}.{place_key}"
+        )
     if axes.ndim == 1 and n != (len(names) if isinstance(names, list) else count):
         raise LayoutError(
-            f"holds {axes.size} numbers without a shape; write a list of 3 for each, or count: {n}", what
+            f"holds {axes.size} numbers without a shape; write a list of 3 for each, or count: {n}",
+            what,
         )
     by_row = axes.shape == (n, 3)
     if axes.ndim == 1 or n == 3:
         fit = [is_unit(axes.reshape(n, 3).T), is_unit(axes.reshape(3, n))]
         if fit[0] == fit[1] and not exchange.rows:
             raise LayoutError(
-                "may stand thruster by thruster, or all x before all y; say --rows thrusters or --rows axes",
+                "may stand thruster by thruster, or all x before all y; say --rows thrusters or "
+                "--rows axes",
                 what,
             )
         by_row = exchange.rows == "thrusters" if exchange.rows else fit[0]
-        exchange.note(f"{what} is read {'thruster by thruster' if by_row else 'all x, all y, all z'}.")
-    axes, at = (each.reshape(n, 3) if by_row else each.reshape(3, n).T for each in (axes, at * size))
+        exchange.note(
+            f"{what} is read {'thruster by thruster' if by_row else 'all x, all y, all z'}."
+        )
+    axes, at = (
+        each.reshape(n, 3) if by_row else each.reshape(3, n).T for each in (axes, at * size)
+    )
     rows = zip(_names(node, n), at.tolist(), axes.tolist(), strict=True)
     return {name: {"position": place, "direction": axis} for name, place, axis in rows}
 
 
 def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
-    around = [re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])]
+    around = [
+        re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])
+    ]
     words = {word.lower() for word in around[-1]}
     known = bool(words & WORDS) or ("matrix" in words and words <= {*NEAR.split()})
     return known and not {word.lower() for each in around for word in each} & {*OTHER.split()}
 
 
 def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
-    """Thrusters by their wrenches: a mapping for each, or a matrix whose key or rows say that it is one."""
+    """Thrusters by their wrenches: a mapping for each, or a matrix whose key or rows say that it is
+    one."""
     value = node.value
     sure = is_allocation(node)
     names = list[str]()
@@ -169,7 +208,11 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
     if held and len(held) == len(value):
         return _of_records(node, held)
     if isinstance(value, Mapping):
-        rows = {axis: row for key, row in value.items() if (axis := axis_of(key)) and isinstance(row, list)}
+        rows = {
+            axis: row
+            for key, row in value.items()
+            if (axis := axis_of(key)) and isinstance(row, list)
+        }
         if len(rows) > 1 and (sure or len({plain(key) for key in value} & CLEAR) > 1):
             matrix = _array([*rows.values()], node)
             named = {name: Row() for name in _names(node, matrix.shape[1])}
@@ -191,7 +234,9 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
 def _array(rows: Sequence[Any], node: Node) -> Array:
     array = numbers_in(rows)
     if array is None or array.ndim != 2:
-        raise LayoutError("is no matrix: its rows differ in length, or hold what is no number", node.words)
+        raise LayoutError(
+            "is no matrix: its rows differ in length, or hold what is no number", node.words
+        )
     return array
 
 
@@ -206,7 +251,8 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | No
     keys = {plain(key) for key in first.values()}
     if {"x", "y"} <= keys and not keys & (CLEAR | {"k", "m", "n"}):
         raise LayoutError(
-            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its wrench, or its "
+            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its "
+            "wrench, or its "
             "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
@@ -233,7 +279,8 @@ def _unfolded(array: Array, node: Node) -> Array:
     """A matrix in one list, row by row, of as many columns as there are names, or as is said."""
     for _, scope in node.scopes:
         names, n, rows = (
-            lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}", "rows")
+            lookup(scope, words)[1]
+            for words in (labels.NAMES, f"cols columns {labels.COUNT}", "rows")
         )
         n = len(names) if isinstance(names, list) else n
         fits = isinstance(n, int) and n > 0 and array.size % n == 0
@@ -241,7 +288,8 @@ def _unfolded(array: Array, node: Node) -> Array:
             return array.reshape(-1, n)
     shapes = ", ".join(f"{k} rows of {array.size // k}" for k in range(2, 7) if array.size % k == 0)
     raise LayoutError(
-        f"is {array.size} numbers in one list, which may be {shapes or 'of any shape'}; write a list "
+        f"is {array.size} numbers in one list, which may be {shapes or 'of any shape'}; write a "
+        "list "
         "per axis, or the names of the thrusters beside it",
         node.words,
     )
@@ -249,8 +297,12 @@ def _unfolded(array: Array, node: Node) -> Array:
 
 def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, table: bool) -> Found:
     """A matrix whose rows have no labels of their own; keys beside it may name the axes."""
-    said = next((value for _, scope in node.scopes if (value := lookup(scope, labels.ROWS_OF)[1])), None)
-    axes = tuple(axis for each in said if (axis := axis_of(each))) if isinstance(said, list) else AXES
+    said = next(
+        (value for _, scope in node.scopes if (value := lookup(scope, labels.ROWS_OF)[1])), None
+    )
+    axes = (
+        tuple(axis for each in said if (axis := axis_of(each))) if isinstance(said, list) else AXES
+    )
     if isinstance(said, list) and len({*axes}) < len(said):
         raise LayoutError(f"names its rows {said!r:.80}, expected such as Fx, Fy, Tz", node.words)
     by_axes = len(array) == len(axes) and not names
@@ -267,8 +319,10 @@ def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, ta
         unit = by_axes and (is_unit(array[:3]) or not table), is_unit(array[:, :3].T)
         if unit[0] == unit[1] and (table or not by_axes):
             raise LayoutError(
-                f"is {len(array)} rows of 6 numbers without labels, which may be axes, a row per thruster "
-                "(--rows axes, --rows thrusters), or the inverse; label them Fx, Fy, Fz, Tx, Ty, Tz",
+                f"is {len(array)} rows of 6 numbers without labels, which may be axes, a row per "
+                "thruster "
+                "(--rows axes, --rows thrusters), or the inverse; label them Fx, Fy, Fz, Tx, Ty, "
+                "Tz",
                 node.words,
             )
         across = unit[1] and not unit[0]

@@ -1,4 +1,5 @@
-"""XML of strangers, read in linear time and without entities, and which model in it is the robot."""
+"""XML of strangers, read in linear time and without entities, and which model in it is the
+robot."""
 
 from collections.abc import Callable
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -13,15 +14,17 @@ MAX_DEPTH, MAX_ELEMENTS = 100, 200_000
 Drives = Callable[[Element], bool]
 """Whether a plugin drives a thruster."""
 Named = dict[str, tuple[str, Element]]
-"""Links, joints, frames and models inside by `link arm::NAME` and so on, with the scope `arm::` of names."""
+"""Links, joints, frames and models inside by `link arm::NAME` and so on, with the scope `arm::` of
+names."""
 
 
 def root_of(text: str) -> Element:
-    """Returns the outermost element; a prefix such as `gz:` is a part of a name and needs no declaration.
+    """Returns the outermost element; a prefix such as `gz:` is a part of a name and needs no
+    declaration.
 
-    Entities could pull in other files or grow without bound, and robot descriptions have no use for them; as
-    the text is UTF-8 whatever its first line says, no other encoding can hide them. Raises LayoutError: it is
-    no XML, too deep or too large, or declares a DOCTYPE."""
+    Entities could pull in other files or grow without bound, and robot descriptions have no use for
+    them; as the text is UTF-8 whatever its first line says, no other encoding can hide them. Raises
+    LayoutError: it is no XML, too deep or too large, or declares a DOCTYPE."""
     builder = TreeBuilder()
     parser = expat.ParserCreate()
     opened = [0, 0]
@@ -29,7 +32,9 @@ def root_of(text: str) -> Element:
     def start(tag: str, attributes: dict[str, str]) -> None:
         opened[:] = opened[0] + 1, opened[1] + 1
         if opened[0] > MAX_DEPTH or opened[1] > MAX_ELEMENTS:
-            raise LayoutError(f"holds over {MAX_ELEMENTS:,} elements of XML, or is deeper than {MAX_DEPTH}")
+            raise LayoutError(
+                f"holds over {MAX_ELEMENTS:,} elements of XML, or is deeper than {MAX_DEPTH}"
+            )
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -60,8 +65,9 @@ def is_xacro(root: Element) -> bool:
 
 
 def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
-    """Returns the model that is the robot: the one that the exchange names, or the first with thrusters.
-    Raises LayoutError: there is no model, none of that name, or the robot is included from another file."""
+    """Returns the model that is the robot: the one that the exchange names, or the first with
+    thrusters. Raises LayoutError: there is no model, none of that name, or the robot is included
+    from another file."""
     alone = root.tag in ("robot", "model")
     wanted = {*exchange.fins, *exchange.thrusters}
     models = [root] if alone else [*root.findall("model"), *root.findall("world/model")]
@@ -72,9 +78,15 @@ def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
         return models[names.index(exchange.model)]
     pushed = [model for model in models if any(map(drives, model.iter("plugin")))]
     robots = [
-        each for each in models if each in pushed or wanted & {link.get("name") for link in each.iter("link")}
+        each
+        for each in models
+        if each in pushed or wanted & {link.get("name") for link in each.iter("link")}
     ]
-    included = [] if alone or robots or wanted else [*root.findall("include"), *root.findall("world/include")]
+    included = (
+        []
+        if alone or robots or wanted
+        else [*root.findall("include"), *root.findall("world/include")]
+    )
     if included:
         likely = [each for each in included if any(map(drives, each.iter("plugin")))] or included
         places = ", ".join(f"<include> {_include_name(each)}" for each in likely)[:300]
@@ -92,16 +104,18 @@ def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
 
 
 def parts_of(top: Element) -> tuple[Named, list[tuple[str, Element]], list[str]]:
-    """Returns the parts of a model and of those inside it, its plugins with their scopes, and the names of
-    what is included, which is not read. Raises LayoutError: one has no name, or is placed by a frame of its
-    own."""
+    """Returns the parts of a model and of those inside it, its plugins with their scopes, and the
+    names of what is included, which is not read. Raises LayoutError: one has no name, or is placed
+    by a frame of its own."""
     named = Named()
     plugins = list[tuple[str, Element]]()
     included = list[str]()
     waiting = [("", top)]
     while waiting:
         scope, model = waiting.pop()
-        for part in (part for tag in ("link", "joint", "frame", "model") for part in model.findall(tag)):
+        for part in (
+            part for tag in ("link", "joint", "frame", "model") for part in model.findall(tag)
+        ):
             name = f"{scope}{part.get('name') or ''}"
             if name == scope or part.get("placement_frame"):
                 raise LayoutError(f"has a <{part.tag}> without a name, or with a placement_frame")

@@ -1,7 +1,9 @@
-"""YAML and JSON text to plain values: mappings, lists, text, true, false, null, and the numbers of JSON.
+"""YAML and JSON text to plain values: mappings, lists, text, true, false, null, and the numbers of
+JSON.
 
-The text may come from a stranger. Nothing in it runs code, expands, drops a key, or takes more than linear
-time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a date or a yes is text here.
+The text may come from a stranger. Nothing in it runs code, expands, drops a key, or takes more than
+linear time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a date or a yes
+is text here.
 """
 
 import json
@@ -24,12 +26,14 @@ _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def parse_json(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON, or holds
-    a key twice or a number that is not finite; the message calls the document `source`."""
+    """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON,
+    or holds a key twice or a number that is not finite; the message calls the document `source`."""
     numbers: Any = dict.fromkeys(("parse_float", "parse_constant", "parse_int"), _number)
     try:
         values = json.loads(content, object_pairs_hook=_once, **numbers)
-        if _ESCAPED_SURROGATE.search(content):  # half of a pair is no character, and cannot be written
+        if _ESCAPED_SURROGATE.search(
+            content
+        ):  # half of a pair is no character, and cannot be written
             json.dumps(values, ensure_ascii=False).encode()
         return values
     except json.JSONDecodeError as problem:
@@ -41,8 +45,9 @@ def parse_json(content: str, source: str, error: type[FinlabError] = DataError) 
 
 
 def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of one YAML document; aliases and tags are refused. Raises FinlabError of the kind
-    `error`: it is no YAML, or holds what is refused; the message calls the document `source`."""
+    """Returns the values of one YAML document; aliases and tags are refused. Raises FinlabError of
+    the kind `error`: it is no YAML, or holds what is refused; the message calls the document
+    `source`."""
     import yaml  # a robot's computer reads JSON and may lack PyYAML
 
     try:
@@ -60,7 +65,12 @@ def yaml_text(values: Any) -> str:
     """Returns the text of plain values, in their order."""
     import yaml
 
-    style: Any = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None, "width": 110}
+    style: Any = {
+        "sort_keys": False,
+        "allow_unicode": True,
+        "default_flow_style": None,
+        "width": 110,
+    }
     return str(yaml.safe_dump(values, **style))
 
 
@@ -93,23 +103,34 @@ def _document(content: str) -> Any:
     for count, event in enumerate(yaml.parse(content, Loader=loader)):
         line = event.start_mark.line + 1 if event.start_mark else 0
         if count > MAX_EVENTS:
-            raise ValueError(f"line {line}: has more than {MAX_EVENTS} entries, too many to be read")
+            raise ValueError(
+                f"line {line}: has more than {MAX_EVENTS} entries, too many to be read"
+            )
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
-            raise ValueError(f"line {line}: anchors and aliases (&, *) are not allowed; write the value out")
+            raise ValueError(
+                f"line {line}: anchors and aliases (&, *) are not allowed; write the value out"
+            )
         if getattr(event, "tag", None):
             raise ValueError(f"line {line}: tags (!) are not allowed; write plain keys and values")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
+            event, yaml.CollectionEndEvent
+        )
         if depth > MAX_DEPTH:
-            raise ValueError(f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep to be read")
+            raise ValueError(
+                f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep to be read"
+            )
         n_documents += isinstance(event, yaml.DocumentStartEvent)
         if n_documents > 1:
-            raise ValueError(f"is not valid YAML: line {line}: a second document begins, expected one")
+            raise ValueError(
+                f"is not valid YAML: line {line}: a second document begins, expected one"
+            )
     node = yaml.compose(content, loader)
     return None if node is None else _value(node)
 
 
 def _value(node: Any) -> Any:
-    """The value of a YAML node: plain scalars are numbers and words of JSON or text, a key stands once."""
+    """The value of a YAML node: plain scalars are numbers and words of JSON or text, a key stands
+    once."""
     if node.id == "sequence":
         return [_value(each) for each in node.value]
     if node.id == "mapping":

@@ -17,7 +17,8 @@ LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 1e-3}
 TURNS = {"rad": 1.0, "deg": pi / 180.0, "degrees": pi / 180.0, "°": pi / 180.0}
 FORCES = {"n": 1.0, "kn": 1e3, "kgf": 9.80665, "lbf": 4.4482216}
 _BENCH = {
-    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kg kgs kg-f kilograms": FORCES["kgf"],
+    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3,
+    "kg kgs kg-f kilograms": FORCES["kgf"],
     "lb lbs lbsf lb-f pounds": FORCES["lbf"], "ozf oz": 0.278014, "watts volts amps": 1.0,
     "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
     "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,
@@ -37,8 +38,8 @@ class CsvTable:
     """A CSV file whose header has been read."""
 
     def __init__(self, content: bytes, source: str, gaps: bool = False) -> None:
-        """Takes a file's content, what errors call it, and whether cells may be empty. Raises DataError: it
-        is no text."""
+        """Takes a file's content, what errors call it, and whether cells may be empty. Raises
+        DataError: it is no text."""
         self.source = source
         self._gaps = gaps
         lines = decoded(content, source, "CSV text").splitlines()
@@ -55,10 +56,13 @@ class CsvTable:
     def numbers(self, places: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns the columns at some places (rows, len(places)), and the line of each row (rows,).
 
-        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN. Raises
-        DataError: there is no row, or a row or a cell is wrong; the sentence names line and column."""
+        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN.
+        Raises DataError: there is no row, or a row or a cell is wrong; the sentence names line and
+        column."""
         every = enumerate(self._rows, self._first)
-        rows = [(line, row) for line, row in every if row.strip(" ,;\t") and not row.startswith("#")]
+        rows = [
+            (line, row) for line, row in every if row.strip(" ,;\t") and not row.startswith("#")
+        ]
         if not rows:
             raise DataError(f"{self.source}: has no rows below its header")
         numbers = self._plain([row for _, row in rows], places)
@@ -69,10 +73,14 @@ class CsvTable:
     def _plain(self, rows: Sequence[str], places: Sequence[int]) -> Array | None:
         """The numbers of rows without quotes, gaps and faults, several times as fast; else None."""
         separators = len(self.header) - 1
-        if any('"' in row or "_" in row or row.count(self._delimiter) != separators for row in rows):
+        if any(
+            '"' in row or "_" in row or row.count(self._delimiter) != separators for row in rows
+        ):
             return None
         with suppress(ValueError):
-            numbers = np.loadtxt(rows, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2)
+            numbers = np.loadtxt(
+                rows, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2
+            )
             return numbers if np.isfinite(numbers).all() else None
         return None
 
@@ -81,7 +89,9 @@ class CsvTable:
         cells = self._cells(row, where)
         if len(cells) != len(self.header):
             raise DataError(f"{where} has {len(cells)} values, the header has {len(self.header)}")
-        return [self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places]
+        return [
+            self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places
+        ]
 
     def _cells(self, row: str, where: str) -> list[str]:
         try:
@@ -97,7 +107,8 @@ class CsvTable:
         value = number_in(cell)
         if value is None or not math.isfinite(value):
             raise DataError(
-                f"{where} holds {cell!r:.40}, which is not {'a number' if value is None else 'finite'}"
+                f"{where} holds {cell!r:.40}, which is not "
+                f"{'a number' if value is None else 'finite'}"
             )
         return value
 

@@ -1,5 +1,5 @@
-"""Files opened in one way: a regular file, within a size, and one sentence where it is not; zip archives and
-NPZ files, unpacked in memory: what is declared is checked, what is read is counted.
+"""Files opened in one way: a regular file, within a size, and one sentence where it is not; zip
+archives and NPZ files, unpacked in memory: what is declared is checked, what is read is counted.
 """
 
 import io
@@ -26,13 +26,18 @@ PART = 1 << 20
 
 
 def read_file(
-    path: Name, most: int, what: str, error: type[FinlabError] = DataError, *, head: int | None = None
+    path: Name,
+    most: int,
+    what: str,
+    error: type[FinlabError] = DataError,
+    *,
+    head: int | None = None,
 ) -> bytes:
     """Returns the content of a regular file of up to `most` bytes, or of these its first `head`.
 
-    A pipe, a socket and a device are refused without waiting for them. Raises FinlabError of the kind
-    `error`: the file is missing, not regular, too large or not readable; the sentence says `what` is
-    expected, such as "a layout file"."""
+    A pipe, a socket and a device are refused without waiting for them. Raises FinlabError of the
+    kind `error`: the file is missing, not regular, too large or not readable; the sentence says
+    `what` is expected, such as "a layout file"."""
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             about = os.fstat(file.fileno())
@@ -40,7 +45,9 @@ def read_file(
                 raise error.at(str(path), f"is a folder, expected {what}")
             if not stat.S_ISREG(about.st_mode):
                 raise error.at(str(path), f"is not a regular file, expected {what}")
-            content = _read(file, most if head is None else head - 1) if about.st_size <= most else None
+            content = (
+                _read(file, most if head is None else head - 1) if about.st_size <= most else None
+            )
     except FileNotFoundError:
         raise error.at(str(path), f"no such file, expected {what}") from None
     except IsADirectoryError:
@@ -54,8 +61,9 @@ def read_file(
 
 
 def _read(file: BinaryIO, most: int) -> bytes:
-    """The content, or its first `most` + 1 bytes: a file may grow while it is read, and some report no size
-    at all. A single `read` of that many would take the memory of the largest file for a small one."""
+    """The content, or its first `most` + 1 bytes: a file may grow while it is read, and some report
+    no size at all. A single `read` of that many would take the memory of the largest file for a
+    small one."""
     content = BytesIO()
     while part := file.read(min(PART, most + 1 - content.tell())):
         content.write(part)
@@ -63,13 +71,14 @@ def _read(file: BinaryIO, most: int) -> bytes:
 
 
 def read_text(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> str:
-    """Returns the text of a regular file; arguments and errors as in `read_file`, and it must be text."""
+    """Returns the text of a regular file; arguments and errors as in `read_file`, and it must be
+    text."""
     return decoded(read_file(path, most, what, error), str(path), what, error)
 
 
 def decoded(content: bytes, source: str, what: str, error: type[FinlabError] = DataError) -> str:
-    """Returns UTF-8 text, without a byte order mark. Raises FinlabError of the kind `error`: the bytes are no
-    UTF-8 text; the message calls them `source`."""
+    """Returns UTF-8 text, without a byte order mark. Raises FinlabError of the kind `error`: the
+    bytes are no UTF-8 text; the message calls them `source`."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -108,9 +117,10 @@ def unpacked(
 ) -> dict[str, bytes]:
     """Returns files in a zip archive by name.
 
-    `largest` says the largest size [bytes] of the file of a name, None for one that is passed over, and may
-    raise; `most` is that of all of them together. Raises FinlabError of the kind `error`, whose sentence
-    calls the archive `source`: it is damaged, holds a name twice, or a file is too large."""
+    `largest` says the largest size [bytes] of the file of a name, None for one that is passed over,
+    and may raise; `most` is that of all of them together. Raises FinlabError of the kind `error`,
+    whose sentence calls the archive `source`: it is damaged, holds a name twice, or a file is too
+    large."""
     files: dict[str, bytes] = {}
     if content.count(_ENTRY) > MOST_FILES:  # before a list of them is made
         raise error.at(source, f"holds more than {MOST_FILES} files; pack it again")
@@ -149,12 +159,14 @@ def packed(files: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -> dict[str, AnyArray]:
+def read_arrays(
+    path: Name, names: Iterable[str] | None, most: int, what: str
+) -> dict[str, AnyArray]:
     """Returns arrays of an NPZ file by name, those of some names or, for None, all.
 
-    `most` is the largest size of the file, and of all arrays that are wanted together [bytes]. Raises
-    DataError: the file cannot be read, is damaged or too large, or lacks an array; the sentence says `what`
-    is expected, such as "a swim log"."""
+    `most` is the largest size of the file, and of all arrays that are wanted together [bytes].
+    Raises DataError: the file cannot be read, is damaged or too large, or lacks an array; the
+    sentence says `what` is expected, such as "a swim log"."""
 
     def largest(member: str) -> int | None:
         name = member.removesuffix(".npy")
@@ -169,7 +181,8 @@ def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -
 
 
 def json_of(array: AnyArray, source: str) -> Any:
-    """Returns the values in an array that holds JSON as text, or as bytes; a `DataError` where it is none."""
+    """Returns the values in an array that holds JSON as text, or as bytes; a `DataError` where it
+    is none."""
     try:
         text = array.tobytes().decode() if array.dtype.kind == "u" else str(array)
     except ValueError:
@@ -177,11 +190,15 @@ def json_of(array: AnyArray, source: str) -> Any:
     return parse_json(text, source)
 
 
-def check_shapes(arrays: Mapping[str, AnyArray], shapes: Mapping[str, tuple[int, ...]], source: str) -> None:
+def check_shapes(
+    arrays: Mapping[str, AnyArray], shapes: Mapping[str, tuple[int, ...]], source: str
+) -> None:
     """Raises a `DataError` unless arrays of these names hold numbers, and have these shapes."""
     for name, shape in shapes.items():
         if arrays[name].shape != shape or arrays[name].dtype.kind not in "biuf":
-            raise DataError(f"{source}: {name}: expected numbers of shape {shape}, got {arrays[name].shape}")
+            raise DataError(
+                f"{source}: {name}: expected numbers of shape {shape}, got {arrays[name].shape}"
+            )
 
 
 def _array(content: bytes, name: str, source: str) -> AnyArray:

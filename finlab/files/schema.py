@@ -1,7 +1,9 @@
-"""Plain values checked against types, with one sentence for whatever does not fit, and the place of it.
+"""Plain values checked against types, with one sentence for whatever does not fit, and the place of
+it.
 
-The annotations of a frozen dataclass say what its fields may be. One declaration serves three: construction
-in code is checked by it, files are read by it, and the published JSON Schemas are made of it.
+The annotations of a frozen dataclass say what its fields may be. One declaration serves three:
+construction in code is checked by it, files are read by it, and the published JSON Schemas are made
+of it.
 """
 
 import re
@@ -32,13 +34,18 @@ def shown(value: Any) -> str:
 
 
 def checked(
-    values: Any, kind: type[Kind], error: type[FinlabError] = LayoutError, source: str = "", key: str = ""
+    values: Any,
+    kind: type[Kind],
+    error: type[FinlabError] = LayoutError,
+    source: str = "",
+    key: str = "",
 ) -> Kind:
-    """Returns plain values, such as those of a file, in a type: a `msgspec.Struct`, or any that msgspec
-    knows.
+    """Returns plain values, such as those of a file, in a type: a `msgspec.Struct`, or any that
+    msgspec knows.
 
-    Arrays count as lists. Raises FinlabError of the kind `error`: the sentence says where, by the `source` of
-    all, unless its reader adds that, and the `key` of these in it, what was expected, and what was got."""
+    Arrays count as lists. Raises FinlabError of the kind `error`: the sentence says where, by the
+    `source` of all, unless its reader adds that, and the `key` of these in it, what was expected,
+    and what was got."""
     try:
         values = msgspec.to_builtins(values, enc_hook=_plain)
         return msgspec.convert(values, kind)
@@ -83,15 +90,26 @@ def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
         return f"expected text on one line, without spaces around it, got {shown(value)}", ""
     least = getattr(known, "ge", None)
     most = getattr(known, "le", None)
-    if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (least, most):
+    if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (
+        least,
+        most,
+    ):
         return f"must lie within {least:g} .. {most:g}, got {shown(value)}", ""
     if parts := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):
-        return f"expected a number of {_BOUNDS[parts[1]]} {float(parts[2]):g}, got {shown(value)}", ""
+        return (
+            f"expected a number of {_BOUNDS[parts[1]]} {float(parts[2]):g}, got {shown(value)}",
+            "",
+        )
     if parts := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
-        wanted = " or ".join(_TYPES.get(name, name) for name in parts[1].split(" | ") if name != "null")
+        wanted = " or ".join(
+            _TYPES.get(name, name) for name in parts[1].split(" | ") if name != "null"
+        )
         return f"expected {wanted}, got {shown(value)}", ""
     if choices := _choices(known):
-        return f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}", ""
+        return (
+            f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}",
+            "",
+        )
     return f"{said[:1].lower()}{said[1:]}, got {shown(value)}", ""
 
 
@@ -118,19 +136,30 @@ def _step_into(known: Any, name: str, index: str) -> Any:
 
 
 def _one(known: Any, value: Any) -> Any:
-    """A type without what describes it, without null, and of several structures the one that is meant."""
+    """A type without what describes it, without null, and of several structures the one that is
+    meant."""
     if isinstance(known, inspect.Metadata):
         return _one(known.type, value)
     if isinstance(known, inspect.UnionType):
-        kinds = [_one(kind, value) for kind in known.types if not isinstance(kind, inspect.NoneType)]
-        tag = value.get(getattr(kinds[0], "tag_field", None)) if isinstance(value, Mapping) else None
+        kinds = [
+            _one(kind, value) for kind in known.types if not isinstance(kind, inspect.NoneType)
+        ]
+        tag = (
+            value.get(getattr(kinds[0], "tag_field", None)) if isinstance(value, Mapping) else None
+        )
         meant = [kind for kind in kinds if tag is not None and getattr(kind, "tag", None) == tag]
-        return meant[0] if meant else kinds[0] if len(kinds) == 1 else inspect.UnionType(tuple(kinds))
+        return (
+            meant[0] if meant else kinds[0] if len(kinds) == 1 else inspect.UnionType(tuple(kinds))
+        )
     return known
 
 
 def _keys(known: Any) -> list[str]:
-    return [field.encode_name for field in known.fields] if isinstance(known, inspect.StructType) else []
+    return (
+        [field.encode_name for field in known.fields]
+        if isinstance(known, inspect.StructType)
+        else []
+    )
 
 
 def _choices(known: Any) -> list[str]:
@@ -146,9 +175,9 @@ Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
 
 
 class Checked:
-    """Base of frozen dataclasses that are checked on construction, by their annotations. Raises LayoutError:
-    a value is none of its type, or out of bounds; the message names the argument. A reader of files puts the
-    key in its place: see `file_key`."""
+    """Base of frozen dataclasses that are checked on construction, by their annotations. Raises
+    LayoutError: a value is none of its type, or out of bounds; the message names the argument. A
+    reader of files puts the key in its place: see `file_key`."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     KEYS: ClassVar[Mapping[str, str]] = {}
@@ -186,7 +215,8 @@ class Part(ABC):
     @classmethod
     @abstractmethod
     def file_form(cls) -> Any:
-        """Returns the form of the part: a `msgspec.Struct` whose `stands_for` is this class, or several."""
+        """Returns the form of the part: a `msgspec.Struct` whose `stands_for` is this class, or
+        several."""
 
     @classmethod
     @abstractmethod
@@ -214,7 +244,11 @@ def _plain_fields(cls: Any) -> tuple[list[str], Any]:
 def _holds_checked(kind: Any) -> bool:
     """Whether a type is, or contains, one that is checked on its own."""
     parts = get_args(kind)
-    return any(map(_holds_checked, parts)) if parts else isinstance(kind, type) and issubclass(kind, Checked)
+    return (
+        any(map(_holds_checked, parts))
+        if parts
+        else isinstance(kind, type) and issubclass(kind, Checked)
+    )
 
 
 def form(
@@ -234,11 +268,12 @@ def form(
         keys: fields -> keys in the file; `cls.KEYS` when None.
         called: what the part is called in a schema; the dataclass's name when empty.
         required: fields that the file must have although they have a default.
-        optional: those of `kinds` that the file may leave out, beside the fields that have a default.
-        tag: a key and its value, by which the part is known among others in the same place; the key `type`
-            where the class has a `type` when None.
-        kinds: types of fields that are different in the file, and of those that are there alone; None for
-            a field that no file has.
+        optional: those of `kinds` that the file may leave out, beside the fields that have a
+        default.
+        tag: a key and its value, by which the part is known among others in the same place; the key
+            `type` where the class has a `type` when None.
+        kinds: types of fields that are different in the file, and of those that are there alone;
+            None for a field that no file has.
     """
     annotated = get_type_hints(cls, include_extras=True)
     hints = {**{field.name: annotated[field.name] for field in fields(cls)}, **kinds}
@@ -269,4 +304,6 @@ def form(
 
 def given(part: Any) -> dict[str, Any]:
     """Returns the fields of a part of a file that are there."""
-    return {name: value for name in part.__struct_fields__ if (value := getattr(part, name)) is not None}
+    return {
+        name: value for name in part.__struct_fields__ if (value := getattr(part, name)) is not None
+    }

@@ -37,10 +37,11 @@ ALIKE = 0.01
 
 
 def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
-    """Returns the sheets of a workbook that hold a table, by name, and the names of those that do not.
+    """Returns the sheets of a workbook that hold a table, by name, and the names of those that do
+    not.
 
-    A table begins at a row that `is_header`; of formulas the values count that were saved with them. Raises
-    DataError: the workbook cannot be read, is too large, or openpyxl is missing."""
+    A table begins at a row that `is_header`; of formulas the values count that were saved with
+    them. Raises DataError: the workbook cannot be read, is too large, or openpyxl is missing."""
     content = read_file(path, MOST_PACKED, "a workbook (.xlsx)")
     try:
         import openpyxl
@@ -50,12 +51,16 @@ def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[
             "pip install 'finlab-marine[bench]', or save the sheet as CSV"
         ) from None
     most = MOST_UNPACKED
-    unpacked(content, str(path), lambda name: most if name.endswith((".xml", ".rels")) else None, most)
+    unpacked(
+        content, str(path), lambda name: most if name.endswith((".xml", ".rels")) else None, most
+    )
     tables: dict[str, CsvTable | None] = {}
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
         if len(book.worksheets) > MOST_SHEETS:
-            raise DataError(f"{path}: has {len(book.worksheets)} sheets, expected at most {MOST_SHEETS}")
+            raise DataError(
+                f"{path}: has {len(book.worksheets)} sheets, expected at most {MOST_SHEETS}"
+            )
         for sheet in book.worksheets:
             tables[sheet.title] = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
     except DAMAGED as problem:
@@ -93,8 +98,8 @@ def _words(row: Sequence[object]) -> list[str]:
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that a fit reads, in SI, (n,) each, and headers by name; the names of those whose header names
-    no unit; and where each of n rows stands, file and line."""
+    """Columns that a fit reads, in SI, (n,) each, and headers by name; the names of those whose
+    header names no unit; and where each of n rows stands, file and line."""
 
     values: dict[str, Array]
     headers: dict[str, str]
@@ -110,10 +115,13 @@ class Header(NamedTuple):
     unit: str
 
 
-def named_column(header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS) -> Header:
-    """Returns what a header cell stands for: `A [deg]`, `amplitude_deg`, `Force (Kg f)`,
-    `Fx`; "" for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
-    `stroke` is the angle from end to end, twice the amplitude. Raises DataError: the unit is not known."""
+def named_column(
+    header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS
+) -> Header:
+    """Returns what a header cell stands for: `A [deg]`, `amplitude_deg`, `Force (Kg f)`, `Fx`; ""
+    for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
+    `stroke` is the angle from end to end, twice the amplitude. Raises DataError: the unit is not
+    known."""
     behind = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
     short = " ".join(header[:MOST_BLANKS].split())[:LONGEST]
     parts = re.fullmatch(rf"(.+?) ?(?:[\[(](.*)[\])]|_({behind}))?", short, flags=re.IGNORECASE)
@@ -123,7 +131,9 @@ def named_column(header: str, names: Mapping[str, str], units: Mapping[str, floa
         return Header("", 1.0, "")
     unit = re.sub(r"[\s.*·]", "", (parts[2] or parts[3] or "")).lower()
     if unit and unit not in units:
-        raise DataError(f"column {short}: unit {unit!r:.20} is not known, expected {', '.join(units)}")
+        raise DataError(
+            f"column {short}: unit {unit!r:.20} is not known, expected {', '.join(units)}"
+        )
     return Header(name, (0.5 if word.lower() == "stroke" else 1.0) * units.get(unit, 1.0), unit)
 
 
@@ -137,11 +147,11 @@ def read_columns(
 ) -> Columns:
     """Returns the columns of a CSV file, or of a table, that have a name.
 
-    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken. Names
-    are what words in the header stand for, as `named_column` takes them, with its units; a file without those
-    `needed` is refused, of `a|b` one is enough, with what the error says is `expected`. With `gaps` cells of
-    a file may be empty, which makes them NaN. Raises DataError: the file cannot be read, or lacks a
-    column."""
+    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is
+    taken. Names are what words in the header stand for, as `named_column` takes them, with its
+    units; a file without those `needed` is refused, of `a|b` one is enough, with what the error
+    says is `expected`. With `gaps` cells of a file may be empty, which makes them NaN. Raises
+    DataError: the file cannot be read, or lacks a column."""
     what = "a CSV file of measurements"
     table = file if isinstance(file, CsvTable) else read_table(file, MAX_BYTES, what, gaps)
     path = table.source
@@ -154,7 +164,9 @@ def read_columns(
         if not set(name.split("|")) & {named[i].name for i in used}:
             missing = name.replace("|", " or ")
             header = ", ".join(table.header)
-            raise DataError(f"{path}: column {missing} is missing, found {header:.200}; expected {expected}")
+            raise DataError(
+                f"{path}: column {missing} is missing, found {header:.200}; expected {expected}"
+            )
     numbers, lines = table.numbers(used)
     values: dict[str, Array] = {}
     first: dict[str, int] = {}
@@ -164,7 +176,9 @@ def read_columns(
         if name not in values:
             values[name] = own
             first[name] = i
-        elif not np.allclose(own, values[name], rtol=0.0, atol=ALIKE * np.abs(own).max(), equal_nan=True):
+        elif not np.allclose(
+            own, values[name], rtol=0.0, atol=ALIKE * np.abs(own).max(), equal_nan=True
+        ):
             pair = f"{table.header[first[name]]:.40} and {table.header[i]:.40}"
             raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")
     headers = {name: table.header[i] for name, i in first.items()}
@@ -178,8 +192,8 @@ def command_columns(layout: Layout) -> list[list[str]]:
 
 
 def commands_in(values: Mapping[str, Array], layout: Layout) -> Array:
-    """Returns the commands (N, n, 3) of N rows of such columns, in the units of the actuators' numbers: NaN
-    where an actuator has none, 0 for a number that it does not have."""
+    """Returns the commands (N, n, 3) of N rows of such columns, in the units of the actuators'
+    numbers: NaN where an actuator has none, 0 for a number that it does not have."""
     columns = command_columns(layout)
     command = np.zeros((len(values[columns[0][0]]), layout.n, 3))
     for i, own in enumerate(columns):
@@ -189,6 +203,7 @@ def commands_in(values: Mapping[str, Array], layout: Layout) -> Array:
 
 
 def together(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Returns the columns (n,) that all tables have, one table's rows after the other's, by name."""
+    """Returns the columns (n,) that all tables have, one table's rows after the other's, by
+    name."""
     shared = [name for name in tables[0] if all(name in table for table in tables)]
     return {name: np.concatenate([table[name] for table in tables]) for name in shared}

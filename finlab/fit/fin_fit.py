@@ -26,19 +26,21 @@ OUTLIER = 5.0
 BAND = 1.96
 """Standard deviations of a band that holds 95 % of a normal distribution."""
 GOOD_ERROR, GOOD_BAND = 0.05, 0.85
-"""Mean uncertainty of a force over the largest one up to which a fit is trusted, and least share of samples
-left out that must lie within their band."""
+"""Mean uncertainty of a force over the largest one up to which a fit is trusted, and least share of
+samples left out that must lie within their band."""
 ROUND = (0.01, 0.05)
 """Steps of amplitude [rad] and frequency [Hz] to whose next multiple a table goes."""
 COVERED = 0.75 * TURN
 """Zero directions from which a table goes all round; fewer make a table of their arc."""
 GRID = (13, 13, 18)
-"""Amplitudes, frequencies and zero directions of the table, from rest to the largest that was measured."""
+"""Amplitudes, frequencies and zero directions of the table, from rest to the largest that was
+measured."""
 
 
 @dataclass(frozen=True)
 class FinFit:
-    """A fin's forces as Gaussian processes, one for each axis of the frame that turns with the fin."""
+    """A fin's forces as Gaussian processes, one for each axis of the frame that turns with the
+    fin."""
 
     measurements: Measurements
     outliers: tuple[str, ...]
@@ -46,7 +48,8 @@ class FinFit:
     components: tuple[Component, ...]
     """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
     power: Component | None
-    """Root of the power over its largest, where it was measured: power grows faster than force does."""
+    """Root of the power over its largest, where it was measured: power grows faster than force
+    does."""
     deflection: float
     """Angle from the zero direction to the thrust's mean direction [rad]."""
     largest: float
@@ -57,10 +60,13 @@ class FinFit:
     """What was filled in or left out, a sentence each."""
 
     def predict(self, command: Array) -> tuple[Array, Array]:
-        """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
+        """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands
+        (..., 3)."""
         inputs = self.measurements.scaled(command)
         predicted = np.array([component.predict(inputs) for component in self.components])
-        thrust, unsure = self.largest * predicted.transpose(1, 0, 2).reshape(2, 3, *command.shape[:-1])
+        thrust, unsure = self.largest * predicted.transpose(1, 0, 2).reshape(
+            2, 3, *command.shape[:-1]
+        )
         angle = command[..., 2] + self.deflection
         cos = np.cos(angle)
         sin = np.sin(angle)
@@ -79,12 +85,14 @@ class FinFit:
         return np.asarray(self.largest_power * root.reshape(command.shape[:-1]) ** 2)
 
     def error(self) -> float:
-        """Returns the cross-validated error: root mean square over the samples, each predicted from all
-        others, of the force's error over the largest force, the noise of the samples included."""
+        """Returns the cross-validated error: root mean square over the samples, each predicted from
+        all others, of the force's error over the largest force, the noise of the samples
+        included."""
         return float(np.sqrt(np.mean(sum(component.left_out**2 for component in self.components))))
 
     def noise(self) -> float:
-        """Returns the noise of a sample over the largest force, root mean square over samples and axes."""
+        """Returns the noise of a sample over the largest force, root mean square over samples and
+        axes."""
         return float(np.sqrt(np.mean(sum(component.variance for component in self.components))))
 
     def coverage(self) -> float:
@@ -93,7 +101,8 @@ class FinFit:
         return float(np.mean(inside))
 
     def uncertainty(self, command: Array) -> Array:
-        """Returns the standard deviation (...) of the force at commands (..., 3) over the largest force."""
+        """Returns the standard deviation (...) of the force at commands (..., 3) over the largest
+        force."""
         return np.asarray(np.linalg.norm(self.predict(command)[1], axis=-1) / self.largest)
 
     @cached_property
@@ -104,15 +113,16 @@ class FinFit:
         n = len(self.measurements)
         clauses = {
             f"forces are uncertain by {usual:.0%} of the largest one": usual > GOOD_ERROR,
-            f"only {self.coverage():.0%} of the samples lie in their 95 % band": self.coverage() < GOOD_BAND,
+            f"only {self.coverage():.0%} of the samples lie in their 95 % band": self.coverage()
+            < GOOD_BAND,
             f"{lost} of {lost + n} samples contradict the others": lost > 0.1 * (lost + n),
             f"{n} samples are few, 300 are a good number": n < 3 * MIN_SAMPLES,
         }
         return tuple(clause for clause, holds in clauses.items() if holds)
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
-        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers; zero
-        directions go all round, or over the arc where samples are."""
+        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round
+        numbers; zero directions go all round, or over the arc where samples are."""
         ends = np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND
         ends = np.minimum(ends, (MAX_AMPLITUDE, MAX_FREQUENCY))
         axes = [np.linspace(0.0, most, count) for most, count in zip(ends, shape, strict=False)]
@@ -129,10 +139,10 @@ def fit_fin(
 ) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
 
-    The linear algebra runs on one thread: on matrices of this size several wait for each other. The seed
-    draws the samples that are kept where there are more than `MOST_SAMPLES`; `progress` is called before each
-    step, and what it raises ends the fit. Raises DataError: fewer than `MIN_SAMPLES` are of a fin that
-    beats."""
+    The linear algebra runs on one thread: on matrices of this size several wait for each other. The
+    seed draws the samples that are kept where there are more than `MOST_SAMPLES`; `progress` is
+    called before each step, and what it raises ends the fit. Raises DataError: fewer than
+    `MIN_SAMPLES` are of a fin that beats."""
     notes = list(measurements.notes)
     rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
     if rest.any():
@@ -141,28 +151,34 @@ def fit_fin(
     n = len(measurements)
     if n < MIN_SAMPLES:
         raise DataError(
-            f"{n} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are a good number"
+            f"{n} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are a good "
+            "number"
         )
     if n > MOST_SAMPLES:
         notes.append(f"{MOST_SAMPLES} of {n} samples, drawn at random, are used")
-        measurements = measurements.without(np.random.default_rng(seed).permutation(n) >= MOST_SAMPLES)
+        measurements = measurements.without(
+            np.random.default_rng(seed).permutation(n) >= MOST_SAMPLES
+        )
     with threadpool_limits(limits=1, user_api="blas"):
         bad = _outliers(measurements, progress)
-        if not measurements.force[~bad].any():  # a fin that hardly ever pushes: what it gives is no outlier
+        if not measurements.force[
+            ~bad
+        ].any():  # a fin that hardly ever pushes: what it gives is no outlier
             bad[:] = False
         outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
         if outliers:
             shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
             notes.append(
-                f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}"
+                f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: "
+                f"{shown}"
             )
             measurements = measurements.without(bad)
         return _fitted(measurements, outliers, tuple(notes), progress)
 
 
 def _outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
-    """Which samples (n,) lie far off a fit to the others, in which such samples count for little: a wrong
-    unit, a bump of the rig, a cell that slipped."""
+    """Which samples (n,) lie far off a fit to the others, in which such samples count for little: a
+    wrong unit, a bump of the rig, a cell that slipped."""
     turned, _ = measurements.thrust()
     sizes = np.linalg.norm(measurements.force, axis=-1)
     values = turned / (float(np.quantile(sizes, 0.98)) or float(sizes.max()))
@@ -175,7 +191,10 @@ def _outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArra
 
 
 def _fitted(
-    measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...], tell: Callable[[str], None]
+    measurements: Measurements,
+    outliers: tuple[str, ...],
+    notes: tuple[str, ...],
+    tell: Callable[[str], None],
 ) -> FinFit:
     turned, deflection = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
@@ -192,11 +211,14 @@ def _fitted(
         tell("fitting power")
         largest_power = float(measurements.power.max())
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
-    return FinFit(measurements, outliers, tuple(parts), power, deflection, largest, largest_power, notes)
+    return FinFit(
+        measurements, outliers, tuple(parts), power, deflection, largest, largest_power, notes
+    )
 
 
 def fin_csv(fit: FinFit) -> str:
-    """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a grid."""
+    """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a
+    grid."""
     command = fit.grid(GRID).reshape(-1, 3)
     force, deviation = fit.predict(command)
     power = fit.predict_power(command)
@@ -206,26 +228,30 @@ def fin_csv(fit: FinFit) -> str:
 
 
 def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
-    """Writes a fitted fin to a CSV file that a layout names: `model: {type: table, path: FILE}`. Raises
-    DataError: the file cannot be written, or is not called .csv."""
+    """Writes a fitted fin to a CSV file that a layout names: `model: {type: table, path: FILE}`.
+    Raises DataError: the file cannot be written, or is not called .csv."""
     check_table_path(path)
     write_whole(path, fin_csv(fit), DataError)
 
 
 def check_table_path(path: str | os.PathLike[str]) -> None:
-    """Raises DataError for a name that no layout takes for a table, before a fit, which takes seconds."""
+    """Raises DataError for a name that no layout takes for a table, before a fit, which takes
+    seconds."""
     if Path(path).suffix.lower() != ".csv":
         raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
 
 
 def summary(fit: FinFit) -> tuple[str, ...]:
-    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if
+    so."""
     amplitude, frequency = fit.measurements.reach
     return (
         *((f"{DOUBT}: {'; '.join(fit.doubts)}",) if fit.doubts else ()),
-        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, frequencies up to "
+        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, "
+        "frequencies up to "
         f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
-        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample {fit.noise():.1%}; "
+        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample "
+        f"{fit.noise():.1%}; "
         f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
         f"thrust leans {float(np.degrees(fit.deflection)):+.1f} deg off the zero direction",
         *fit.notes,

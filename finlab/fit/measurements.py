@@ -30,7 +30,8 @@ SAME_DIRECTION = 0.05
 
 @dataclass(frozen=True)
 class Measurements:
-    """Samples of one fin in its own frame (x' shaft, y' horizontal thrust axis, z' up), cycle means."""
+    """Samples of one fin in its own frame (x' shaft, y' horizontal thrust axis, z' up), cycle
+    means."""
 
     command: Array
     """Half amplitude [rad], frequency [Hz], zero direction [rad], (n, 3)."""
@@ -43,7 +44,8 @@ class Measurements:
     notes: tuple[str, ...]
     """What was filled in or left out, a sentence each."""
     turned: bool = True
-    """Whether several zero directions were measured; if not, the fin counts as the same all round."""
+    """Whether several zero directions were measured; if not, the fin counts as the same all
+    round."""
 
     def __len__(self) -> int:
         return len(self.command)
@@ -54,8 +56,8 @@ class Measurements:
         return float(self.command[:, 0].max()), float(self.command[:, 1].max())
 
     def scaled(self, command: Array) -> Array:
-        """Returns commands (..., 3) as inputs (m, 3) of a fit: over the reach, and all in one direction where
-        only one was measured."""
+        """Returns commands (..., 3) as inputs (m, 3) of a fit: over the reach, and all in one
+        direction where only one was measured."""
         inputs = command.reshape(-1, 3).copy()
         inputs[:, :2] /= self.reach
         if not self.turned:
@@ -63,8 +65,8 @@ class Measurements:
         return inputs
 
     def thrust(self) -> tuple[Array, float]:
-        """Returns the forces along the thrust's mean direction, across it and along the shaft (n, 3) [N], and
-        the angle [rad] from the zero direction to that direction."""
+        """Returns the forces along the thrust's mean direction, across it and along the shaft (n,
+        3) [N], and the angle [rad] from the zero direction to that direction."""
         force = self.force
         phi = self.command[:, 2]
         planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
@@ -77,17 +79,22 @@ class Measurements:
         keep = ~places
         power = None if self.power is None else self.power[keep]
         named = tuple(np.array(self.places)[keep].tolist())
-        return replace(self, command=self.command[keep], force=self.force[keep], power=power, places=named)
+        return replace(
+            self, command=self.command[keep], force=self.force[keep], power=power, places=named
+        )
 
 
 def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
-    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`), else
-    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P. Raises DataError: a
-    file is missing, too large, lacks a column or holds what no fin can do; or there are too few samples, or
-    only one amplitude or frequency."""
-    read = [read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order") for path in paths]
+    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`),
+    else they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P. Raises
+    DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there
+    are too few samples, or only one amplitude or frequency."""
+    read = [
+        read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order")
+        for path in paths
+    ]
     if not read:
         raise DataError("expected at least one CSV file of measurements, got none")
     for file, path in zip(read, paths, strict=True):
@@ -96,16 +103,24 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
 
 
 def _check_units(values: dict[str, Array], source: str) -> None:
-    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units."""
+    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other
+    units."""
     for name, what, most, unit, hint in (
-        ("A", "half amplitudes", MAX_AMPLITUDE, "rad", "`A [deg]`, and call whole strokes `stroke`"),
+        (
+            "A",
+            "half amplitudes",
+            MAX_AMPLITUDE,
+            "rad",
+            "`A [deg]`, and call whole strokes `stroke`",
+        ),
         ("f", "frequencies", MAX_FREQUENCY, "Hz", "`f [rpm]`"),
     ):
         low = float(values[name].min())
         high = float(values[name].max())
         if high > most + 1e-9 or low < 0.0:
             raise DataError(
-                f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; name "
+                f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; "
+                "name "
                 f"another unit in the header, {hint}"
             )
 
@@ -115,12 +130,15 @@ def _checked(read: list[Columns], source: str) -> Measurements:
     places = tuple(place for file in read for place in file.places)
     notes = list[str]()
     if (n := len(places)) < MIN_SAMPLES:
-        raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
+        raise DataError(
+            f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
+        )
     columns = together([file.values for file in read])
     for name, unit in (("A", "rad"), ("f", "Hz")):
         if np.ptp(columns[name]) < SAME:
             raise DataError(
-                f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, expected several; "
+                f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, "
+                "expected several; "
                 "a fin's force cannot be determined from one amplitude or one frequency"
             )
     phi, turned = _directions(columns, source, notes)
@@ -135,7 +153,9 @@ def _checked(read: list[Columns], source: str) -> Measurements:
     for name in ("Fx", "Fy", "Fz", "P"):
         if name in columns and columns[name][0] and np.ptp(columns[name]) == 0.0:
             value = f"{columns[name][0]:.4g}"
-            raise DataError(f"{source}: column {name} is {value} throughout; is the sensor connected?")
+            raise DataError(
+                f"{source}: column {name} is {value} throughout; is the sensor connected?"
+            )
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         least = f"{power.min():.4g} W, expected the mean power that drives the fin"
         raise DataError(f"{source}: column P has {least}")
@@ -151,5 +171,7 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
         return phi, True
     said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
-    notes.append(f"{said}: the other directions are filled by symmetry, as a fin that is the same all round")
+    notes.append(
+        f"{said}: the other directions are filled by symmetry, as a fin that is the same all round"
+    )
     return np.zeros(len(columns["A"])) if phi is None else phi, False

@@ -1,4 +1,5 @@
-"""Benches of one thruster in still water, from CSV files and workbooks: force and power over its command.
+"""Benches of one thruster in still water, from CSV files and workbooks: force and power over its
+command.
 
 At several voltages it is known which rows are of one voltage, and what lies between two of them.
 """
@@ -17,7 +18,8 @@ from finlab.errors import DataError
 from finlab.fit.columns import Columns, named_column, read_columns, sheets, together
 
 _WORDS = {
-    "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal servo_signal "
+    "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal "
+    "servo_signal "
     "esc esc_signal esc_pwm esc_input",
     "rpm": "rpm speed motor_speed",
     "input": "input command throttle esc_throttle motor_throttle duty duty_cycle",
@@ -38,8 +40,8 @@ NEEDED = ("|".join(COMMANDS), "force", "power|voltage", "power|current")
 TAKEN = {"PWM": "us", "force": "N", "power": "W", "voltage": "V", "current": "A", "torque": "N m"}
 """Units of columns that name none."""
 UNSIGNED, PUSHES = 0.03, 0.1
-"""Shares of the largest force: up to which a thruster rests, and from which on one pushes on either side of
-the neutral command."""
+"""Shares of the largest force: up to which a thruster rests, and from which on one pushes on either
+side of the neutral command."""
 MIN_COMMANDS = 5
 """Fewest different commands."""
 NEGATIVE = 0.02
@@ -49,13 +51,16 @@ Rows = Mapping[str, Array]
 NEAR = 0.05
 """Share by which voltages of one supply may differ."""
 WITHIN = 0.3
-"""Share of the commands at a voltage within those at a higher one, from which on the two are two tables."""
+"""Share of the commands at a voltage within those at a higher one, from which on the two are two
+tables."""
 
 
 def by_voltage(rows: Rows, command: Array) -> list[Rows]:
-    """Returns the rows of one table, apart where it was measured at several voltages, commands (n,).
+    """Returns the rows of one table, apart where it was measured at several voltages, commands
+    (n,).
 
-    A supply that sags under load is one: there commands of a lower voltage lie beyond those of a higher one.
+    A supply that sags under load is one: there commands of a lower voltage lie beyond those of a
+    higher one.
     """
     volts = np.abs(rows["voltage"])
     parts = _levels(volts)
@@ -69,13 +74,18 @@ def by_voltage(rows: Rows, command: Array) -> list[Rows]:
     return [{name: values[np.sort(table)] for name, values in rows.items()} for table in tables]
 
 
-def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tuple[Rows, tuple[str, ...]]:
-    """Returns the rows of one voltage [V], None where there is only one, and notes on what was done.
+def at_voltage(
+    tables: Sequence[Rows], voltage: float | None, source: str
+) -> tuple[Rows, tuple[str, ...]]:
+    """Returns the rows of one voltage [V], None where there is only one, and notes on what was
+    done.
 
-    Each table is of one voltage, by its middle in column `voltage`; without that column of any. Raises
-    DataError: there are several and none is named, or that one does not lie among them; `source` has the
-    names of the files."""
-    known = np.array([np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables])
+    Each table is of one voltage, by its middle in column `voltage`; without that column of any.
+    Raises DataError: there are several and none is named, or that one does not lie among them;
+    `source` has the names of the files."""
+    known = np.array(
+        [np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables]
+    )
     groups = _levels(known)
     if np.isnan(known).any() and (voltage is not None or len(groups) > 1):
         raise DataError(f"{source}: does not tell at which voltage all rows were measured")
@@ -88,7 +98,9 @@ def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tu
         return within[0], ()
     near = int(np.argmin(np.abs(levels - voltage)))
     if abs(voltage - levels[near]) <= 0.5 * NEAR * levels[near]:
-        return within[near], (f"{named}: the rows at {levels[near]:.4g} V are taken",) * (len(groups) > 1)
+        return within[near], (f"{named}: the rows at {levels[near]:.4g} V are taken",) * (
+            len(groups) > 1
+        )
     if not levels[0] < voltage < levels[-1]:
         raise DataError(f"{source}: {named}, which tells nothing of {voltage:g} V")
     upper = int(np.searchsorted(levels, voltage))
@@ -142,13 +154,16 @@ class Bench:
 def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> Bench:
     """Returns the rows of all files together.
 
-    Paths are those of CSV files, and of workbooks (.xlsx) with a table in a sheet. Of several voltages the
-    one named counts [V]; between two of them forces are interpolated. Raises DataError: a file is missing,
-    lacks a column or holds what no thruster does, or there are several voltages and none is named."""
+    Paths are those of CSV files, and of workbooks (.xlsx) with a table in a sheet. Of several
+    voltages the one named counts [V]; between two of them forces are interpolated. Raises
+    DataError: a file is missing, lacks a column or holds what no thruster does, or there are
+    several voltages and none is named."""
     read = [_tables(Path(path)) for path in paths]
     files = [table for tables, _ in read for table in tables]
     source = ", ".join(str(path) for path in paths)
-    kind, *others = [name for name in COMMANDS if all(name in file.values for file in files)] or [""]
+    kind, *others = [name for name in COMMANDS if all(name in file.values for file in files)] or [
+        ""
+    ]
     if not kind:
         raise DataError(f"{source}: no command stands in all files, expected {EXPECTED}")
     notes = [note for _, said in read for note in said]
@@ -168,13 +183,17 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
         return [_renamed(read_columns(path, NAMES, NEEDED, EXPECTED))], ()
     held, other = sheets(path, _is_header)
     if not held:
-        raise DataError(f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}")
+        raise DataError(
+            f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}"
+        )
     tables = []
     for title, table in held.items():
         columns = _renamed(read_columns(table, NAMES, NEEDED, EXPECTED))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
-            columns.values["voltage"] = np.full(len(columns.places), float(volts[1].replace(",", ".")))
+            columns.values["voltage"] = np.full(
+                len(columns.places), float(volts[1].replace(",", "."))
+            )
         tables.append(columns)
     return tables, (f"no table in sheet {', '.join(other):.200}",) if other else ()
 
@@ -217,7 +236,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
 
 
 def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
-    """Rows whose forces have signs: where they are sizes alone, those below the neutral command push back."""
+    """Rows whose forces have signs: where they are sizes alone, those below the neutral command
+    push back."""
     command = rows["command"]
     force = rows["force"]
     size = np.abs(force)
@@ -240,7 +260,9 @@ def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Be
     force = values["force"]
     power = values["power"]
     if not force.any() or not power.any():
-        raise DataError(f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?")
+        raise DataError(
+            f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?"
+        )
     count = len(np.unique(command))
     if count < MIN_COMMANDS:
         raise DataError(f"{source}: {count} different commands, expected at least {MIN_COMMANDS}")

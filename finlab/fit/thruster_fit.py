@@ -1,7 +1,8 @@
-"""A thruster from its bench table, rising force and convex power over the command, and the file of it.
+"""A thruster from its bench table, rising force and convex power over the command, and the file of
+it.
 
-Rows of one command are averaged, and neighbours where there are very many. How sure the force is, the table's
-own rows tell (`finlab.physics.table_error`).
+Rows of one command are averaged, and neighbours where there are very many. How sure the force is,
+the table's own rows tell (`finlab.physics.table_error`).
 """
 
 import json
@@ -20,7 +21,8 @@ from finlab.fit.thruster_bench import Bench
 NO_FORCE = 0.002
 """Share of the largest force up to which a command counts as at rest, or ..."""
 NEAR_REST, MANY = 0.05, 8
-"""... the scatter of forces below this share of the largest one, where that many commands have such."""
+"""... the scatter of forces below this share of the largest one, where that many commands have
+such."""
 LEVEL = 0.05
 """Share of the largest value that is added to each value, whose inverse is its weight."""
 NOT_CONVEX = 0.1
@@ -54,8 +56,8 @@ class ThrusterFit:
 
 
 def fit_thruster(bench: Bench) -> ThrusterFit:
-    """Returns the thruster that explains the rows. Raises DataError: the force falls with the command, is
-    nowhere near 0, or takes a power that is not convex."""
+    """Returns the thruster that explains the rows. Raises DataError: the force falls with the
+    command, is nowhere near 0, or takes a power that is not convex."""
     try:
         return _fitted(bench)
     except (DataError, LayoutError) as error:
@@ -88,7 +90,11 @@ def _fitted(bench: Bench) -> ThrusterFit:
     rows = np.array([[float(f"{value:.{n}g}") for value in column] for column, n in columns]).T
     nearest = (*rows[rows[:, 1] < 0.0][-1:], *rows[rows[:, 1] > 0.0][:1])
     still = rows[rows[:, 1] == 0.0, 0]
-    arm = 0.0 if bench.torque is None else float(bench.torque @ bench.force / (bench.force @ bench.force))
+    arm = (
+        0.0
+        if bench.torque is None
+        else float(bench.torque @ bench.force / (bench.force @ bench.force))
+    )
     return ThrusterFit(
         table=PowerTable(tuple(map(tuple, rows.tolist())), bench.unit),
         still=(float(still[0]), float(still[-1])) if len(still) else None,
@@ -99,8 +105,8 @@ def _fitted(bench: Bench) -> ThrusterFit:
 
 
 def _convex(size: Array, watts: Array, idle: float) -> Array:
-    """The powers (k,) [W] of the convex curve from `idle` at rest on that is nearest to powers (k,) of forces
-    (k,) [N], relative to their size. Raises DataError: no convex curve is near."""
+    """The powers (k,) [W] of the convex curve from `idle` at rest on that is nearest to powers (k,)
+    of forces (k,) [N], relative to their size. Raises DataError: no convex curve is near."""
     bends = np.concatenate([[0.0], np.unique(size)[:-1]])
     beyond = np.maximum(size[:, None] - bends, 0.0)
     order = np.argsort(size, kind="stable")
@@ -111,19 +117,25 @@ def _convex(size: Array, watts: Array, idle: float) -> Array:
     curve = idle + beyond @ rise
     missed = np.sqrt(np.mean((curve - watts) ** 2))
     if missed > NOT_CONVEX * watts.max():
-        why = f"misses it by {missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
-        raise DataError(f"the power does not grow ever faster with the force: the nearest such curve {why}")
+        why = (
+            f"misses it by {missed:.3g} W of {watts.max():.4g} W; are force and power of the same "
+            "rows?"
+        )
+        raise DataError(
+            f"the power does not grow ever faster with the force: the nearest such curve {why}"
+        )
     return np.asarray(curve)
 
 
 def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
-    """The side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N]. Raises
-    DataError: forces lie far off their rising means, or none is near 0."""
+    """The side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N].
+    Raises DataError: forces lie far off their rising means, or none is near 0."""
     largest = float(np.abs(force).max())
     if force[-1] <= force[0]:
         raise DataError(
             f"the force falls with the command, from {force[0]:.4g} N at {command[0]:g} {unit} to "
-            f"{force[-1]:.4g} N at {command[-1]:g}; give the forces, or the commands, the other sign"
+            f"{force[-1]:.4g} N at {command[-1]:g}; give the forces, or the commands, the other "
+            "sign"
         )
     near = np.abs(rising) < NEAR_REST * largest
     noise = float(np.sqrt(np.mean((force - rising)[near] ** 2))) if near.sum() >= MANY else 0.0
@@ -131,15 +143,18 @@ def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
     if side.min() * side.max() > 0.0:
         first = int(np.argmin(np.abs(force)))
         raise DataError(
-            f"no force is near 0, the least is {force[first]:.4g} N at {command[first]:g} {unit}; add the "
+            f"no force is near 0, the least is {force[first]:.4g} N at {command[first]:g} {unit}; "
+            "add the "
             "command that stops the thruster"
         )
     away = np.abs(force - rising)
     if away.max() > FALL * largest:
         k = int(np.argmax(away))
         raise DataError(
-            f"the force falls with the command about {command[k]:g} {unit}: {force[k]:.4g} N there, expected "
-            f"about {rising[k]:.4g} N by the rows beside it; leave out wrong rows, and what lies beyond the "
+            f"the force falls with the command about {command[k]:g} {unit}: {force[k]:.4g} N "
+            "there, expected "
+            f"about {rising[k]:.4g} N by the rows beside it; leave out wrong rows, and what lies "
+            "beyond the "
             "largest force"
         )
     return side
@@ -160,7 +175,8 @@ def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
 
 
 def thruster_csv(fit: ThrusterFit, path: Path) -> str:
-    """Returns the file's text: lines that begin with # and say what the fit found, a header, the rows."""
+    """Returns the file's text: lines that begin with # and say what the fit found, a header, the
+    rows."""
     return table_text((*summary(fit), *layout_lines(fit, path)), COLUMNS, fit.table.rows, 12)
 
 

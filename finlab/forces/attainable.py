@@ -1,4 +1,5 @@
-"""The forces, or torques, that a layout can give, as a body to be drawn: a convex hull of wrenches."""
+"""The forces, or torques, that a layout can give, as a body to be drawn: a convex hull of
+wrenches."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
@@ -24,15 +25,16 @@ Kind = Literal["force", "torque"]
 
 MAX_ROUNDS = 8
 SPECK = 1e-5
-"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
+"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more
+exact."""
 TOLERANCE = 0.01
 """Gap at which no more directions are added, as a share of the farthest vertex."""
 
 
 @dataclass(frozen=True, eq=False)
 class AttainableSet:
-    """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
-    Every vertex is attained, of wide arcs and forces of a flow by convex hulls."""
+    """A convex polytope of forces or torques that can be had with all else at zero, body frame [N]
+    or [N m]. Every vertex is attained, of wide arcs and forces of a flow by convex hulls."""
 
     kind: Kind
     vertices: Array
@@ -106,7 +108,9 @@ def _body(points: Array, kind: Kind) -> AttainableSet:
     faces = np.where(backward[:, None], faces[:, ::-1], faces)
     planes = np.unique(np.round(hull.equations, 9), axis=0)
     none = np.zeros(0, dtype=np.intp)
-    return AttainableSet(kind, points[corners], place[faces], none, 3, planes[:, :3].copy(), -planes[:, 3])
+    return AttainableSet(
+        kind, points[corners], place[faces], none, 3, planes[:, :3].copy(), -planes[:, 3]
+    )
 
 
 def attainable_set(
@@ -117,18 +121,19 @@ def attainable_set(
     tolerance: float = TOLERANCE,
     flow: ArrayLike | None = None,
 ) -> AttainableSet:
-    """Returns what forces or torques (by `kind`) the actuators can give with all else at zero; those in
-    `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s, rad/s], body frame,
-    None at rest. A `LayoutError` at an unknown name.
+    """Returns what forces or torques (by `kind`) the actuators can give with all else at zero;
+    those in `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s,
+    rad/s], body frame, None at rest. A `LayoutError` at an unknown name.
 
-    Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
-    still lies further than `tolerance`, a share of the farthest vertex, inside the plane that touches the
-    set, its normal is sent out too.
+    Directions are sent out from the origin. In each, the farthest attainable point is a vertex;
+    where a face still lies further than `tolerance`, a share of the farthest vertex, inside the
+    plane that touches the set, its normal is sent out too.
     """
     support = _support(force_sets(layout, lost, flow), kind)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
-    # Flat robots have flat sets: directions are spread over a cube that has been scaled as the set is.
+    # Flat robots have flat sets: directions are spread over a cube that has been scaled as the set
+    # is.
     scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
     spread = np.array(list(product((-1.0, 0.0, 1.0), repeat=3))) * scale
     spread = spread[spread.any(axis=-1)]
@@ -147,8 +152,8 @@ def attainable_set(
 
 
 def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Array]]:
-    """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,): by the
-    solver, in each convex part; those near the origin are the origin."""
+    """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,): by
+    the solver, in each convex part; those near the origin are the origin."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
     parts = convex_parts(sets)
     speck = SPECK * float(sets.radius.sum())

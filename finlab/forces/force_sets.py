@@ -1,13 +1,14 @@
-"""Convex sets of what each actuator can push, in a plane of its own, and how these add up to a wrench.
+"""Convex sets of what each actuator can push, in a plane of its own, and how these add up to a
+wrench.
 
-A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its largest
-thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn is not convex: here
-it stands for its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has
-cut it in two. All else is a polygon: the line of a thruster, the convex hull of what a fin pushes that pushes
-harder in some directions than in others, and that of what the flow gives, such as the lift and drag of a foil
-between its limits. Dead bands, and the tiny thrust that a fin cannot go below, are left out; an azimuth that
-cannot stop has the polygon around what is left, one that pushes either way within an arc that around both
-parts.
+A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its
+largest thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn
+is not convex: here it stands for its convex hull, the disc cut off along the chord between the
+stops, unless `convex_parts` has cut it in two. All else is a polygon: the line of a thruster, the
+convex hull of what a fin pushes that pushes harder in some directions than in others, and that of
+what the flow gives, such as the lift and drag of a foil between its limits. Dead bands, and the
+tiny thrust that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon
+around what is left, one that pushes either way within an arc that around both parts.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -33,7 +34,8 @@ from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
 LEVER = 0.2
-"""Length [m] that makes torques comparable to forces: about the distance of a fin from the centre."""
+"""Length [m] that makes torques comparable to forces: about the distance of a fin from the
+centre."""
 SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 """What a wrench is divided by, entry by entry."""
 HALF_TURN_TOLERANCE = 1e-9
@@ -41,16 +43,19 @@ HALF_TURN_TOLERANCE = 1e-9
 ALONG = 193
 """Forces of an actuator along its limits, or its rim, of which a polygon is made."""
 UNEVEN, BOUNDARY, SIDES = 193, 48, 24
-"""Sides of the polygon of an uneven fin, of an azimuth and of forces of the flow: they lie inside by at most
+"""Sides of the polygon of an uneven fin, of an azimuth and of forces of the flow: they lie inside
+by at most
 0.01 %, 0.2 % and 1 % of its width."""
 THINNEST = 1e-3
 """Share of a set's length below which it has no width."""
 MAX_CUT = 3
-"""Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts each time."""
+"""Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts
+each time."""
 
 
 class ForceSets(NamedTuple):
-    """R robots of n actuators each, in m coordinates of a wrench. One with radius 0 is not there."""
+    """R robots of n actuators each, in m coordinates of a wrench. One with radius 0 is not
+    there."""
 
     effectiveness: Array
     """Scaled wrench per newton (R, n, 2, m) along both axes of each actuator's plane."""
@@ -59,8 +64,8 @@ class ForceSets(NamedTuple):
     middle: Array
     """Middle of the arc of force directions (R, n) [rad]."""
     half: Array
-    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for an actuator of one command,
-    such as a foil, whatever its polygon."""
+    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for an actuator of one
+    command, such as a foil, whatever its polygon."""
     place: Array
     """Where in the block the polygon (R, n) is; 0 for a sector."""
     block: Array
@@ -88,7 +93,8 @@ class ForceSets(NamedTuple):
         return self.take(np.tile(np.arange(len(self.radius)), times))
 
     def pull(self, normal: Array) -> Array:
-        """Returns the dot products (R, n, 2) of each one's columns with the direction `normal` (R, m)."""
+        """Returns the dot products (R, n, 2) of each one's columns with the direction `normal` (R,
+        m)."""
         rows, n = self.radius.shape
         return (self.effectiveness.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
 
@@ -104,41 +110,47 @@ class ForceSets(NamedTuple):
         return np.where(size > 0.0, size, 1.0)
 
     def reach(self, origin: Array, ray: Array, close: float) -> tuple[Array, Array, Array]:
-        """Returns how far (R,) rays (R, m) from points (R, m) go within all wrenches, minus infinity where
-        they meet none: never less than that, and the planar forces (R, n, 2) found are off the end by at most
-        twice `close`, in the strongest actuator's wrench; and the normal (R, m) of the plane that proves
-        it."""
+        """Returns how far (R,) rays (R, m) from points (R, m) go within all wrenches, minus
+        infinity where they meet none: never less than that, and the planar forces (R, n, 2) found
+        are off the end by at most twice `close`, in the strongest actuator's wrench; and the normal
+        (R, m) of the plane that proves it."""
         rows, n, _, m = self.effectiveness.shape
         own = np.zeros((rows, n, 16))
         unit = self.unit
         ends = np.zeros((2, rows, 6))
         own[..., :4] = np.stack([self.place, self.radius, self.middle, self.half], axis=-1)
-        own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = self.effectiveness / unit[:, None, None, None]
+        own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = (
+            self.effectiveness / unit[:, None, None, None]
+        )
         ends[..., :m] = origin / unit[:, None], ray
         size, normal, force = reach(self.block, own, ends[0], ends[1], close)
         return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
-        """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar forces (R,
-        n, 2) that reach it; where a sector is wider than half a turn, those of its hull."""
+        """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar
+        forces (R, n, 2) that reach it; where a sector is wider than half a turn, those of its
+        hull."""
         size, _, force = self.reach(np.zeros_like(normal), normal, np.inf)
         return size * (normal * normal).sum(-1), force
 
     def full_effectiveness(self) -> Array:
-        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane;
-        one that pushes along a line has zeros for the other."""
+        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its
+        plane; one that pushes along a line has zeros for the other."""
         full = self.effectiveness * self.radius[..., None, None]
         fixed = self.half == 0.0
         if fixed.any():
             only = np.stack([np.cos(self.middle), np.sin(self.middle)], axis=-1)
-            both = np.stack([(only[..., None] * full).sum(-2), np.zeros_like(full[..., 0, :])], axis=-2)
+            both = np.stack(
+                [(only[..., None] * full).sum(-2), np.zeros_like(full[..., 0, :])], axis=-2
+            )
             full = np.where(fixed[..., None, None], both, full)
         rows, n = self.radius.shape
         return full.reshape(rows, 2 * n, -1)
 
 
 class Shape(NamedTuple):
-    """What one actuator can push, in a plane spanned by two directions; fields as in `ForceSets`."""
+    """What one actuator can push, in a plane spanned by two directions; fields as in
+    `ForceSets`."""
 
     directions: Array
     """Both axes of the plane (2, 3), by the actuator's own axes."""
@@ -146,8 +158,8 @@ class Shape(NamedTuple):
     middle: float
     half: float
     polygons: tuple[Array, ...] = ()
-    """Corners (K, 2) [N] of a polygon and, where its arc is wide, of those of the upper and the lower half of
-    it; none for a sector."""
+    """Corners (K, 2) [N] of a polygon and, where its arc is wide, of those of the upper and the
+    lower half of it; none for a sector."""
 
     @property
     def axes(self) -> int:
@@ -162,10 +174,12 @@ class Shape(NamedTuple):
         return self.half <= 0.5 * math.pi and back >= -THINNEST * self.radius
 
 
-def force_sets(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
-    """Returns what the actuators of one robot can push along the axes that it commands; nothing counts along
-    the others. Those in `lost` push nothing, and the body moves through the water with `flow` (6,) [m/s,
-    rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
+def force_sets(
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
+) -> ForceSets:
+    """Returns what the actuators of one robot can push along the axes that it commands; nothing
+    counts along the others. Those in `lost` push nothing, and the body moves through the water with
+    `flow` (6,) [m/s, rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
     gone = layout.indices(tuple(lost), "lost")
     sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
     sets.lose(0, list(gone))
@@ -229,9 +243,15 @@ def _shape(response: Response, is_fin: bool) -> Shape:
         gauge = np.ones(1) if response.gauge is None else response.gauge
         around = TURN / len(gauge) * np.arange(len(gauge) + 1)
         arcs = (-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)
-        rims = [middle + half * np.linspace(*arc, ALONG) for arc in arcs[: 3 if _is_wide(half) else 1]]
-        sizes = [largest * np.interp(rim % TURN, around, np.append(gauge, gauge[0])) for rim in rims]
-        ends = [np.append(_points(*rim), [[0.0, 0.0]], axis=0) for rim in zip(rims, sizes, strict=True)]
+        rims = [
+            middle + half * np.linspace(*arc, ALONG) for arc in arcs[: 3 if _is_wide(half) else 1]
+        ]
+        sizes = [
+            largest * np.interp(rim % TURN, around, np.append(gauge, gauge[0])) for rim in rims
+        ]
+        ends = [
+            np.append(_points(*rim), [[0.0, 0.0]], axis=0) for rim in zip(rims, sizes, strict=True)
+        ]
         hulls = [_polygon(directions, points, half, UNEVEN) for points in ends]
         return hulls[0]._replace(
             radius=largest * float(gauge.max()),
@@ -254,7 +274,8 @@ def _points(angle: Array, size: Array) -> Array:
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon that fills the convex hull of forces (S, 2) [N]; two of them where it has no width."""
+    """A polygon that fills the convex hull of forces (S, 2) [N]; two of them where it has no
+    width."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
@@ -280,14 +301,15 @@ def _is_wide(half: Any) -> Any:
 
 
 def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
-    """Returns the places of working actuators whose arcs are wider than half a turn and no full circle."""
+    """Returns the places of working actuators whose arcs are wider than half a turn and no full
+    circle."""
     return np.flatnonzero(_is_wide(sets.half[0]) & (sets.radius > 0.0).any(axis=0))
 
 
 def convex_parts(sets: ForceSets) -> ForceSets:
-    """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the other.
-    Wide sectors are cut along their middle, of the first `MAX_CUT` both halves are kept, in all combinations;
-    further ones stay what they are, with their hulls."""
+    """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the
+    other. Wide sectors are cut along their middle, of the first `MAX_CUT` both halves are kept, in
+    all combinations; further ones stay what they are, with their hulls."""
     cut = wide_arcs(sets)[:MAX_CUT]
     signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
     signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))

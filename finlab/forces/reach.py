@@ -1,5 +1,5 @@
-"""The largest wrench in a given direction with nothing beside it, or with the other axes as they are, and the
-weakest direction of all."""
+"""The largest wrench in a given direction with nothing beside it, or with the other axes as they
+are, and the weakest direction of all."""
 
 from collections.abc import Collection
 from functools import lru_cache
@@ -16,8 +16,8 @@ from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.layout import Layout
 
 FINE, COARSE = 1e-8, 1e-3
-"""How close answers are, as a share of the strongest actuator's wrench: those to be shown, and those that say
-where to look on."""
+"""How close answers are, as a share of the strongest actuator's wrench: those to be shown, and
+those that say where to look on."""
 BESIDE = 1e-6
 """Share of it that may be left beside the wrench asked for."""
 UNPROVEN = 1e-3
@@ -37,12 +37,14 @@ class Largest(NamedTuple):
     """Direction (R, m) of the plane that touches the set of wrenches there, not normalized."""
 
 
-def largest(sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: float = FINE) -> Largest:
-    """Returns the largest scaled wrenches along unit `ray` (R, m) from points `origin` (R, m); the size is
-    minus infinity where there are none.
+def largest(
+    sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: float = FINE
+) -> Largest:
+    """Returns the largest scaled wrenches along unit `ray` (R, m) from points `origin` (R, m); the
+    size is minus infinity where there are none.
 
-    Each is bracketed: a plane lies outside of the set of all wrenches, and the forces lie inside. `close` is
-    as `FINE`.
+    Each is bracketed: a plane lies outside of the set of all wrenches, and the forces lie inside.
+    `close` is as `FINE`.
     """
     origin = np.broadcast_to(origin, ray.shape)
     size, normal, force = sets.reach(origin, ray, close)
@@ -55,8 +57,8 @@ def largest(sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: flo
 
 
 def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> Largest:
-    """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero; none
-    where rest is out of reach and the direction meets nothing."""
+    """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero;
+    none where rest is out of reach and the direction meets nothing."""
     result = largest(sets, direction, close=close)
     unmet = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
     result.size[unmet] = result.gap[unmet] = 0.0
@@ -64,13 +66,16 @@ def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> 
 
 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
-    """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
-    Wide sectors count as their convex parts, with too many of them some as hulls, see `convex_parts`."""
+    """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the
+    largest gap. Wide sectors count as their convex parts, with too many of them some as hulls, see
+    `convex_parts`."""
     robots = len(sets.radius)
     n = len(directions)
     parts = convex_parts(sets)
     result = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
-    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap))
+    size, proven = (
+        v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap)
+    )
     return size, float((size - proven).max())
 
 
@@ -79,7 +84,8 @@ NOTHING = 1e-6
 
 
 class Ranges(NamedTuple):
-    """What each component of a wrench may be, the other five held; NaN where those five are out of reach."""
+    """What each component of a wrench may be, the other five held; NaN where those five are out of
+    reach."""
 
     low: Array
     """Smallest values (6,) [N, N m]."""
@@ -95,8 +101,8 @@ class Ranges(NamedTuple):
 def axis_ranges(
     layout: Layout, wrench: ArrayLike, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Ranges:
-    """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by about a
-    millionth at most; `lost`, `flow` and errors are as for `force_sets`."""
+    """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by
+    about a millionth at most; `lost`, `flow` and errors are as for `force_sets`."""
     water = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
     parts = _parts(layout, tuple(lost), water, layout.stamps)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
@@ -106,7 +112,9 @@ def axis_ranges(
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -NOTHING
     high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
-    return Ranges(*[np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)])
+    return Ranges(
+        *[np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)]
+    )
 
 
 @lru_cache(maxsize=16)
@@ -122,7 +130,8 @@ RANK_TOLERANCE = 1e-6
 N_RANDOM = 24
 """Random directions from which the weakest one is sought, beside axes and singular vectors."""
 N_WALKS, FINE_WALKS, KEPT = 4, 20, 6
-"""Steps from face to face of the set of wrenches, and further ones from the best ends, of so many."""
+"""Steps from face to face of the set of wrenches, and further ones from the best ends, of so
+many."""
 
 
 class Extent(NamedTuple):
@@ -135,17 +144,18 @@ class Extent(NamedTuple):
 
 
 def singular_values(sets: ForceSets) -> tuple[Array, Array]:
-    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns, of the
-    wrenches of each one's largest force along the axes of its plane."""
+    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns, of
+    the wrenches of each one's largest force along the axes of its plane."""
     matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
     return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
 
 
 def weakest(sets: ForceSets, n_random: int = N_RANDOM, fine: bool = True) -> Extent:
-    """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of that size
-    is within reach. The walk starts from axes, singular vectors and random directions, goes to the face of
-    the set that lies that way, turns to its normal and goes again; the least end of all is returned."""
+    """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of
+    that size is within reach. The walk starts from axes, singular vectors and random directions,
+    goes to the face of the set that lies that way, turns to its normal and goes again; the least
+    end of all is returned."""
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
     direction = vectors[:, :, -1].copy()

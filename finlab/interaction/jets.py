@@ -1,12 +1,14 @@
-"""Jets by a formula of eight constants: how they spread, what they take from whatever stands in them.
+"""Jets by a formula of eight constants: how they spread, what they take from whatever stands in
+them.
 
-Behind a disc of diameter D with thrust T flows a jet of speed `V0 = sqrt(2 T / (rho A))` (actuator disc at
-rest) that spreads and slows down as `D / x` (Blaauw and van de Kaa, 1978). An actuator that takes in the
-water of others loses thrust, by a curve through the tests of two thrusters in line and turned (Dang and
-Laheij, 2004), and turns the water that comes from the side (momentum); its housing is dragged along; a jet
-that meets the hull pushes it back (Nienhuis, 1992). The constants' usual values were fitted to the formulas
-of Dang and Laheij as they are quoted; they hold to 0.05 at distances from 2 to 16 D, turned by up to 30
-degrees. The formula itself is in finlab/core/src/jets.c.
+Behind a disc of diameter D with thrust T flows a jet of speed `V0 = sqrt(2 T / (rho A))` (actuator
+disc at rest) that spreads and slows down as `D / x` (Blaauw and van de Kaa, 1978). An actuator that
+takes in the water of others loses thrust, by a curve through the tests of two thrusters in line and
+turned (Dang and Laheij, 2004), and turns the water that comes from the side (momentum); its housing
+is dragged along; a jet that meets the hull pushes it back (Nienhuis, 1992). The constants' usual
+values were fitted to the formulas of Dang and Laheij as they are quoted; they hold to 0.05 at
+distances from 2 to 16 D, turned by up to 30 degrees. The formula itself is in
+finlab/core/src/jets.c.
 """
 
 from dataclasses import astuple, dataclass
@@ -41,7 +43,8 @@ class Jets(InteractionModel):
     spread: Positive = 37.0
     """How narrow a jet is: its speed falls as exp(-spread r^2 / x^2) beside the middle."""
     lag: Positive = 0.62
-    """Speed of the inflow over that of the own jet, per share of thrust lost, where that is small."""
+    """Speed of the inflow over that of the own jet, per share of thrust lost, where that is
+    small."""
     most: Positive = 0.78
     """One over the largest share of thrust that can be lost."""
     side: Share = 0.3

@@ -1,8 +1,8 @@
 """Jets by networks over pairs of actuators, learned from forward data of other robots.
 
-A network turns the features of a pair, or of an actuator and the hull, into one number for each vector of the
-message; a receiver adds its messages up (Battaglia et al., 2018). Three networks, trained apart, tell by how
-much they differ what they do not know.
+A network turns the features of a pair, or of an actuator and the hull, into one number for each
+vector of the message; a receiver adds its messages up (Battaglia et al., 2018). Three networks,
+trained apart, tell by how much they differ what they do not know.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,13 @@ from msgspec import Meta
 from finlab.arrays import AnyArray, Array
 from finlab.bundle_files import file_stamp, named_content
 from finlab.errors import CheckpointError
-from finlab.interaction.interaction import AtPlaces, InteractionModel, Places, complex_slope, with_own
+from finlab.interaction.interaction import (
+    AtPlaces,
+    InteractionModel,
+    Places,
+    complex_slope,
+    with_own,
+)
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
 
 MEMBERS = 3
@@ -27,8 +33,8 @@ MAX_BYTES, WHAT = 5_000_000, "a learned interaction (.safetensors)"
 """Largest file of a network, and what it is."""
 
 Weights = Mapping[str, AnyArray]
-"""Arrays by name, `pair.0.weight` (MEMBERS, in, out) and `pair.0.bias` (MEMBERS, 1, out) to layer 2, and the
-same for `hull`."""
+"""Arrays by name, `pair.0.weight` (MEMBERS, in, out) and `pair.0.bias` (MEMBERS, 1, out) to layer
+2, and the same for `hull`."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +44,12 @@ class Learned(InteractionModel):
     type: ClassVar[str] = "learned"
 
     path: Annotated[str, Meta(min_length=1, max_length=4096)]
-    """File of the network, as `finlab train interaction` writes it; absolute once loaded from a layout
-    file."""
+    """File of the network, as `finlab train interaction` writes it; absolute once loaded from a
+    layout file."""
 
     def of(self, places: Places) -> "LearnedInteraction":
-        """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no such
-        network."""
+        """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no
+        such network."""
         return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), places)
 
     @property
@@ -93,11 +99,17 @@ class LearnedInteraction(AtPlaces):
         change = self._among @ self._messages(
             "pair", pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :])
         )
-        return change + self._messages("hull", hull_rows(self.places, force)) if self._has_hull else change
+        return (
+            change + self._messages("hull", hull_rows(self.places, force))
+            if self._has_hull
+            else change
+        )
 
     def _messages(self, name: str, rows: Array) -> Array:
         features, vectors = unpacked(name, rows)
-        return np.asarray((numbers(self._weights, name, features)[..., None] * vectors).sum(axis=-2))
+        return np.asarray(
+            (numbers(self._weights, name, features)[..., None] * vectors).sum(axis=-2)
+        )
 
     def _slope_at_rest(self, force: Array) -> tuple[Array, Array]:
         """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
@@ -122,8 +134,8 @@ class LearnedInteraction(AtPlaces):
         return change, with_own(slope, own)
 
     def _slopes(self, name: str, *ways: tuple[Callable[[AnyArray], Any], Array]) -> list[Array]:
-        """Messages (..., p, 3) [N], and their derivatives (..., p, 3, 3) by each of some forces (..., p, 3),
-        given with the function that makes rows of them."""
+        """Messages (..., p, 3) [N], and their derivatives (..., p, 3, 3) by each of some forces
+        (..., p, 3), given with the function that makes rows of them."""
         each = [complex_slope(*way) for way in ways]
         features, vectors = unpacked(name, each[0][0])
         number, steep = numbers_and_slopes(self._weights, name, features)
@@ -136,7 +148,8 @@ class LearnedInteraction(AtPlaces):
 
 
 def _layers(weights: Weights, name: str, features: AnyArray) -> list[AnyArray]:
-    """What each layer of the networks gives (MEMBERS, rows, width) for features (..., m), row by row."""
+    """What each layer of the networks gives (MEMBERS, rows, width) for features (..., m), row by
+    row."""
     flat: list[Any] = [features.reshape(-1, features.shape[-1])]
     for layer in range(LAYERS):
         sums = flat[-1] @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"]
@@ -152,12 +165,16 @@ def numbers(weights: Weights, name: str, features: AnyArray) -> AnyArray:
 def numbers_and_slopes(weights: Weights, name: str, features: Array) -> tuple[Array, Array]:
     """Returns the mean (..., k) of the same over the networks, and its derivatives (..., k, m)."""
     *hidden, last = _layers(weights, name, features)
-    slope = weights[f"{name}.{LAYERS - 1}.weight"].swapaxes(1, 2)[:, None]  # (MEMBERS, rows, k, width)
+    slope = weights[f"{name}.{LAYERS - 1}.weight"].swapaxes(1, 2)[
+        :, None
+    ]  # (MEMBERS, rows, k, width)
     for layer in reversed(range(LAYERS - 1)):
         slope = slope * (1.0 - hidden[layer] * hidden[layer])[:, :, None, :]
         rows = slope.shape[1]
         k = slope.shape[2]
-        slope = slope.reshape(MEMBERS, rows * k, -1) @ weights[f"{name}.{layer}.weight"].swapaxes(1, 2)
+        slope = slope.reshape(MEMBERS, rows * k, -1) @ weights[f"{name}.{layer}.weight"].swapaxes(
+            1, 2
+        )
         slope = slope.reshape(MEMBERS, rows, k, -1)
     number = last.mean(axis=0)
     shape = features.shape[:-1]
@@ -171,8 +188,8 @@ def _kept(path: str, stamp: object) -> tuple[Weights, float]:
 
 
 def read_network(path: str) -> tuple[Weights, float]:
-    """Returns weights, and what `LearnedInteraction` is told to trust, of a file. Raises CheckpointError: it
-    is missing, damaged or of another kind."""
+    """Returns weights, and what `LearnedInteraction` is told to trust, of a file. Raises
+    CheckpointError: it is missing, damaged or of another kind."""
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
@@ -182,13 +199,21 @@ def read_network(path: str) -> tuple[Weights, float]:
         trust = float(weights.pop("trust")[0])
         for name, form in FORMS.items():
             for layer in range(LAYERS):
-                into = form.features if layer == 0 else weights[f"{name}.{layer - 1}.weight"].shape[2]
+                into = (
+                    form.features if layer == 0 else weights[f"{name}.{layer - 1}.weight"].shape[2]
+                )
                 weight, bias = (weights[f"{name}.{layer}.{kind}"] for kind in ("weight", "bias"))
-                if weight.shape[:2] != (MEMBERS, into) or bias.shape != (MEMBERS, 1, weight.shape[2]):
+                if weight.shape[:2] != (MEMBERS, into) or bias.shape != (
+                    MEMBERS,
+                    1,
+                    weight.shape[2],
+                ):
                     raise ValueError(f"{name}.{layer} has another shape")
             if weight.shape[2] != form.vectors:
                 raise ValueError(f"{name} gives another number of vectors")
-        if len(weights) != 2 * LAYERS * len(FORMS) or not all(np.isfinite(w).all() for w in weights.values()):
+        if len(weights) != 2 * LAYERS * len(FORMS) or not all(
+            np.isfinite(w).all() for w in weights.values()
+        ):
             raise ValueError("it holds what no network has")
     except (SafetensorError, KeyError, IndexError, ValueError) as error:
         reason = str(error).splitlines()[0][:100]

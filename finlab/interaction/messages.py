@@ -1,8 +1,9 @@
 """What messages between actuators, and between an actuator and the hull, are made of.
 
-What counts is the frame: features are invariants in the frame of a source's jet (distance along and beside it
-in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own directions. So one
-network serves robots of any number of actuators. Rows are packed: the features, then the vectors.
+What counts is the frame: features are invariants in the frame of a source's jet (distance along and
+beside it in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own
+directions. So one network serves robots of any number of actuators. Rows are packed: the features,
+then the vectors.
 """
 
 from typing import Any, NamedTuple
@@ -37,10 +38,13 @@ class Pairs:
         """Places (p,) of the two."""
         self._size = size[self.source]
         self._own = size[self.receiver]
-        self._way = (places.position[self.receiver] - places.position[self.source]) / self._size[:, None]
+        self._way = (places.position[self.receiver] - places.position[self.source]) / self._size[
+            :, None
+        ]
 
     def rows(self, source: AnyArray, receiver: AnyArray) -> Any:
-        """Returns rows (..., p, 11 + 4 * 3) of forces (..., p, 3) [N] of the sources and of the receivers."""
+        """Returns rows (..., p, 11 + 4 * 3) of forces (..., p, 3) [N] of the sources and of the
+        receivers."""
         thrust, ahead, _ = jets_of(source, self._size)
         own, facing, _ = jets_of(receiver, self._own)
         along = -(self._way * ahead).sum(-1)
@@ -62,7 +66,11 @@ class Pairs:
             np.sqrt(thrust / (own + thrust)),
             np.log(self._own / self._size),
         ]
-        window = 0.5 * (1.0 + np.tanh(2.0 * along + 1.0)) * np.exp(-squared / (3.0 + 0.15 * along * along))
+        window = (
+            0.5
+            * (1.0 + np.tanh(2.0 * along + 1.0))
+            * np.exp(-squared / (3.0 + 0.15 * along * along))
+        )
         strength = np.sqrt(thrust * (own + thrust)) * window * (self._own / self._size)
         return _packed(features, [ahead, facing, outward, _cross(ahead, outward)], strength)
 

@@ -1,9 +1,10 @@
-"""The hull and the mass, drag and buoyancy of the robot that carries the fins. All of it is optional.
+"""The hull and the mass, drag and buoyancy of the robot that carries the fins. All of it is
+optional.
 
-Allocation needs none of this; the app draws the hull, and a simulation takes the dynamics. Derivatives are
-given as positive magnitudes on the diagonal, in the order surge, sway, heave, roll, pitch, yaw; a diagonal
-is the same in FLU and in the NED frame of most publications, because turning about x by half a turn only
-flips signs in pairs.
+Allocation needs none of this; the app draws the hull, and a simulation takes the dynamics.
+Derivatives are given as positive magnitudes on the diagonal, in the order surge, sway, heave, roll,
+pitch, yaw; a diagonal is the same in FLU and in the NED frame of most publications, because turning
+about x by half a turn only flips signs in pairs.
 """
 
 from dataclasses import dataclass
@@ -58,12 +59,15 @@ class Hull(Checked):
         if self.mesh is not None and self.size_m is not None:
             raise LayoutError("a mesh has its own size; use scale instead", "size_m")
         if self.mesh is not None and Path(self.mesh).suffix.lower() not in MESH_SUFFIXES:
-            raise LayoutError(f"expected a {', '.join(MESH_SUFFIXES)} file, got {self.mesh[-40:]!r}", "mesh")
+            raise LayoutError(
+                f"expected a {', '.join(MESH_SUFFIXES)} file, got {self.mesh[-40:]!r}", "mesh"
+            )
 
 
 @dataclass(frozen=True)
 class Body(Checked):
-    """Hull, mass and hydrodynamics, each None where the layout does not say. Checked on construction."""
+    """Hull, mass and hydrodynamics, each None where the layout does not say. Checked on
+    construction."""
 
     hull: Hull | None = None
     """What the hull looks like."""

@@ -18,7 +18,8 @@ Wrench = tuple[float, float, float, float, float, float]
 
 
 class Case(Struct, frozen=True, forbid_unknown_fields=True):
-    """A target [N, N m], a command per actuator in SI and radians (null for a lost one), and its wrench."""
+    """A target [N, N m], a command per actuator in SI and radians (null for a lost one), and its
+    wrench."""
 
     wrench: Wrench
     command: tuple[tuple[float, float, float] | None, ...]
@@ -47,8 +48,8 @@ def robot_of(files: Files, source: str, parse: Callable[..., Layout]) -> Robot:
         parse: `finlab.layout.load.parse_layout`, which reads the layout.
 
     Raises:
-        LayoutError: there is no layout, or one that names a force table or a network outside the bundle, or
-            its self-test has commands for another number of actuators.
+        LayoutError: there is no layout, or one that names a force table or a network outside the
+            bundle, or its self-test has commands for another number of actuators.
     """
     place = f"{source}/{ROBOT}"
     folder = Path(os.path.abspath(source))
@@ -67,7 +68,9 @@ def robot_of(files: Files, source: str, parse: Callable[..., Layout]) -> Robot:
             raise LayoutError(problem, "layout, interaction.path")
         for i, case in enumerate(robot.self_test):
             if len(case.command) != layout.n:
-                problem = f"expected {layout.n} rows, one for each actuator, got {len(case.command)}"
+                problem = (
+                    f"expected {layout.n} rows, one for each actuator, got {len(case.command)}"
+                )
                 raise LayoutError(problem, f"self_test[{i}].command")
     robot.layout = layout
     return robot

@@ -40,25 +40,28 @@ def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
 class Damage:
     """What is known of damaged actuators, by name; those that are not named are whole.
 
-    All but `lost` is a layout with other limits, or with a smaller fin, so that every method accounts for it
-    and limits hold as always: what hangs at a command has that one alone, and the others make up for it. Not
-    to be changed. Raises AllocationError: a share out of range, an angle that is no number, names that are no
-    list. How many numbers a command has, and which forces there are, is known with the layout: see
-    `applied_to`.
+    All but `lost` is a layout with other limits, or with a smaller fin, so that every method
+    accounts for it and limits hold as always: what hangs at a command has that one alone, and the
+    others make up for it. Not to be changed. Raises AllocationError: a share out of range, an angle
+    that is no number, names that are no list. How many numbers a command has, and which forces
+    there are, is known with the layout: see `applied_to`.
     """
 
     lost: Sequence[str] = ()
     """Those that give no force and leave the layout."""
     weak: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency, or of the force."""
+    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency, or of the
+    force."""
     torn: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Share of its law's thrust that one gives at every command, as a fin with a torn blade does."""
+    """Share of its law's thrust that one gives at every command, as a fin with a torn blade
+    does."""
     stuck: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Where one stays: the angle [rad] at which a fin, an azimuth or a tilt no longer turns, though it still
-    pushes; the force [N] at which a thruster hangs."""
+    """Where one stays: the angle [rad] at which a fin, an azimuth or a tilt no longer turns, though
+    it still pushes; the force [N] at which a thruster hangs."""
     running: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
-    """Command that one keeps whatever is asked: of a fin (amplitude [rad], frequency [Hz], zero direction
-    [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a thruster (force [N],)."""
+    """Command that one keeps whatever is asked: of a fin (amplitude [rad], frequency [Hz], zero
+    direction [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a thruster (force
+    [N],)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lost", lost_names(self.lost))
@@ -70,7 +73,9 @@ class Damage:
             }
             object.__setattr__(self, kind, each)
         if both := set(self.stuck) & set(self.running):
-            raise AllocationError(f"damage: an actuator is stuck or running, got both of {', '.join(both)}")
+            raise AllocationError(
+                f"damage: an actuator is stuck or running, got both of {', '.join(both)}"
+            )
 
     @property
     def partly(self) -> dict[str, Mapping[str, Any]]:
@@ -82,12 +87,14 @@ class Damage:
         return {kind: known[name] for kind, known in self.partly.items() if name in known}
 
     def with_fault(self, name: str, kind: str, value: Any) -> "Damage":
-        """Returns it with another fault of an actuator, with a value as of that field (of `lost` any); None
-        mends that fault. What is stuck does not run. Errors are as on construction."""
+        """Returns it with another fault of an actuator, with a value as of that field (of `lost`
+        any); None mends that fault. What is stuck does not run. Errors are as on construction."""
         if kind == "lost":
             others = tuple(other for other in self.lost if other != name)
             return replace(self, lost=others if value is None else (*others, name))
-        out = ("stuck", "running") if kind in ("stuck", "running") and value is not None else (kind,)
+        out = (
+            ("stuck", "running") if kind in ("stuck", "running") and value is not None else (kind,)
+        )
         kept: dict[str, Any] = {
             own: {k: v for k, v in getattr(self, own).items() if k != name} for own in out
         }
@@ -98,19 +105,25 @@ class Damage:
     def renamed(self, names: Mapping[str, str]) -> "Damage":
         """Returns it for actuators with new names, by their old ones; others are forgotten."""
         known = {
-            kind: {names[k]: v for k, v in own.items() if k in names} for kind, own in self.partly.items()
+            kind: {names[k]: v for k, v in own.items() if k in names}
+            for kind, own in self.partly.items()
         }
         return Damage([names[name] for name in self.lost if name in names], **known)
 
     @classmethod
     def known(
-        cls, layout: Layout, lost: Sequence[str], torn: Mapping[str, float], stuck: Mapping[str, float]
+        cls,
+        layout: Layout,
+        lost: Sequence[str],
+        torn: Mapping[str, float],
+        stuck: Mapping[str, float],
     ) -> "Damage":
-        """What actuators that are lost, torn (the share of their force that is left) and stuck (where: an
-        angle [rad], of a thruster its force [N]) leave.
+        """What actuators that are lost, torn (the share of their force that is left) and stuck
+        (where: an angle [rad], of a thruster its force [N]) leave.
 
-        What cannot be used any more counts as lost: a stuck rudder. A torn thruster is weak: it gives the
-        force that it is allocated where it is asked for more; one that is stuck as well gives its share.
+        What cannot be used any more counts as lost: a stuck rudder. A torn thruster is weak: it
+        gives the force that it is allocated where it is asked for more; one that is stuck as well
+        gives its share.
         """
         may = {part.name: part.FAULTS for part in layout.actuators}
         known = {name: at for name, at in stuck.items() if "stuck" in may[name]}
@@ -131,11 +144,13 @@ class Damage:
         stuck: Sequence[str] = (),
         running: Sequence[str] = (),
     ) -> "Damage":
-        """Returns damage of a layout from texts, directions in degrees: `bow=0.5` for a share; `bow=20` for
-        where one is stuck, a fin or a pod at 20 deg, a thruster at 20 N; for a command `bow=0.3,1.0,20` of a
-        fin [rad, Hz, deg], `bow=20,5` of a pod [deg, N], `bow=5` of a thruster [N].
+        """Returns damage of a layout from texts, directions in degrees: `bow=0.5` for a share;
+        `bow=20` for where one is stuck, a fin or a pod at 20 deg, a thruster at 20 N; for a command
+        `bow=0.3,1.0,20` of a fin [rad, Hz, deg], `bow=20,5` of a pod [deg, N], `bow=5` of a
+        thruster [N].
 
-        Raises AllocationError: a text that says something else; LayoutError: there is no actuator of a name.
+        Raises AllocationError: a text that says something else; LayoutError: there is no actuator
+        of a name.
         """
         shares = {
             kind: {name: share for name, (share,) in _named(kind, texts, 1).items()}
@@ -155,16 +170,17 @@ class Damage:
                 wanted = ",".join(f"{number} [{unit}]" for (number, _), unit in numbers)
                 got = ",".join(f"{value:g}" for value in values)
                 raise AllocationError(
-                    f"running: expected NAME={wanted} of the {part.type} {name!r}, got '{name}={got}'"
+                    f"running: expected NAME={wanted} of the {part.type} {name!r}, got "
+                    f"'{name}={got}'"
                 )
             kept[name] = tuple(math.radians(v) if k == turns else v for k, v in enumerate(values))
         return cls(lost, shares["weak"], shares["torn"], held, kept)
 
     def applied_to(self, layout: Layout) -> Layout:
         """Returns the layout with the limits that are left; the lost ones are still there. Raises
-        LayoutError: there is no actuator of a name, or one whose law is a table is torn; AllocationError: its
-        kind cannot be damaged so, its command has another number of values, or a thruster or a pod cannot
-        give the force at which it is said to hang."""
+        LayoutError: there is no actuator of a name, or one whose law is a table is torn;
+        AllocationError: its kind cannot be damaged so, its command has another number of values, or
+        a thruster or a pod cannot give the force at which it is said to hang."""
         return _applied(self, layout) if self.partly else layout
 
 
@@ -178,7 +194,9 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
         for part in [layout.part(name, f"damage: {kind}") for name in known]:
             if kind not in part.FAULTS:
                 may = ", ".join((*part.FAULTS, "lost"))
-                raise AllocationError(f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}")
+                raise AllocationError(
+                    f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}"
+                )
     for name, command in damage.running.items():
         _check_count(layout.part(name), command)
     parts = []
@@ -191,20 +209,21 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
 
 
 def _check_count(part: Actuator, command: Sequence[float]) -> None:
-    """Refuses a command that an actuator is said to keep, if it has another number of values than its
-    kind's. Raises AllocationError."""
+    """Refuses a command that an actuator is said to keep, if it has another number of values than
+    its kind's. Raises AllocationError."""
     if len(command) != len(part.NUMBERS):
         wanted = ", ".join(f"{name} [{unit}]" for name, unit in part.NUMBERS)
         got = ", ".join(f"{value:g}" for value in command)
         raise AllocationError(
-            f"damage of {part.name!r}: running: expected the command that {part.type}s have ({wanted}), "
+            f"damage of {part.name!r}: running: expected the command that {part.type}s have "
+            f"({wanted}), "
             f"{len(part.NUMBERS)} in all, got {len(command)} ({got})"
         )
 
 
 def _named(option: str, texts: Sequence[str], count: int | None) -> dict[str, tuple[float, ...]]:
-    """Numbers by name, of texts NAME=NUMBER,..., so many of each, where that is not None; errors say which
-    option."""
+    """Numbers by name, of texts NAME=NUMBER,..., so many of each, where that is not None; errors
+    say which option."""
     named = {}
     for text in texts:
         name, _, numbers = text.partition("=")
@@ -213,7 +232,11 @@ def _named(option: str, texts: Sequence[str], count: int | None) -> dict[str, tu
         except ValueError:
             values = ()
         if not name or not values or count not in (None, len(values)):
-            wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG of a fin, NAME=DEG,N of a pod, or NAME=N"
+            wanted = (
+                "NAME=NUMBER"
+                if count == 1
+                else "NAME=A,F,DEG of a fin, NAME=DEG,N of a pod, or NAME=N"
+            )
             raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
         named[name] = values
     return named

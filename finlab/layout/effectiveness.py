@@ -1,7 +1,7 @@
 """The geometry of forces, for numpy's arrays and torch's tensors: own axes, body frame, wrench.
 
-Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.actuators.fin.fin`); body frame FLU about the centre of
-gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
+Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.actuators.fin.fin`); body frame FLU about the
+centre of gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 
 from typing import Any
@@ -20,7 +20,8 @@ def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
         mounting_angle: (..., n) [rad].
 
     Returns:
-        (..., n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along shaft, e_h and e_z.
+        (..., n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along shaft, e_h and
+        e_z.
     """
     xp = library_of(position)
     x = position[..., 0]
@@ -40,14 +41,15 @@ def own_effectiveness(layout: Layout) -> Array:
     """What one newton along each actuator's own three axes does to the robot.
 
     Returns:
-        (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of `layout.frames`,
-        with the reaction torque of propellers about the direction of their force.
+        (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of
+        `layout.frames`, with the reaction torque of propellers about the direction of their force.
     """
     return moved_effectiveness(layout, layout.position, layout.frames)
 
 
 def moved_effectiveness(layout: Layout, position: Array, frames: Array) -> Array:
-    """The same (..., n, 3, 6) of actuators at positions (..., n, 3) [m] with own axes (..., n, 3, 3)."""
+    """The same (..., n, 3, 6) of actuators at positions (..., n, 3) [m] with own axes (..., n, 3,
+    3)."""
     reaction = np.array([getattr(part, "torque_per_newton", 0.0) for part in layout.actuators])
     torque = np.cross(position[..., None, :], frames) + reaction[:, None, None] * frames
     return np.concatenate([frames, torque], axis=-1)
@@ -57,9 +59,10 @@ def layout_effectiveness(layout: Layout) -> Array:
     """What one newton along each direction in which an actuator pushes does to the robot.
 
     Returns:
-        (6, m): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N, actuators side by side: of a fin along zero and along
-        shaft x zero, which are e_h and e_z of a horizontal shaft, of a thruster along its axis, of an azimuth
-        along zero and turn_axis x zero, of a rudder along shaft x zero, its lift ahead.
+        (6, m): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N, actuators side by side: of a fin along zero
+        and along shaft x zero, which are e_h and e_z of a horizontal shaft, of a thruster along its
+        axis, of an azimuth along zero and turn_axis x zero, of a rudder along shaft x zero, its
+        lift ahead.
     """
     pairs = zip(own_effectiveness(layout), layout.actuators, strict=True)
     return np.concatenate([own[list(actuator.PUSHES)] for own, actuator in pairs]).T

@@ -1,4 +1,5 @@
-"""Layout graph files: the robot as the complete graph of its actuators, for networkx and learners."""
+"""Layout graph files: the robot as the complete graph of its actuators, for networkx and
+learners."""
 
 import math
 from typing import Annotated, Any, Literal
@@ -26,9 +27,11 @@ class Normalization(Struct, forbid_unknown_fields=True):
     """What numbers are divided by to be of order one."""
 
     features: dict[str, float]
-    """Of the features of fins with horizontal shafts, by name, as the paper's network takes them."""
+    """Of the features of fins with horizontal shafts, by name, as the paper's network takes
+    them."""
     wrench: dict[str, float]
-    """Of each axis of a wrench [N, N m]: the robot's own yardstick, in which errors are measured."""
+    """Of each axis of a wrench [N, N m]: the robot's own yardstick, in which errors are
+    measured."""
 
 
 class Data(Struct, forbid_unknown_fields=True):
@@ -42,10 +45,11 @@ class Data(Struct, forbid_unknown_fields=True):
 
 
 class Graph(Struct, forbid_unknown_fields=True):
-    """A robot's actuators as nodes, each joined with every other one and with itself; node-link form.
+    """A robot's actuators as nodes, each joined with every other one and with itself; node-link
+    form.
 
-    A node has the actuator's name as `id`, what a layout file says of it, and `features`: numbers by name and
-    unit.
+    A node has the actuator's name as `id`, what a layout file says of it, and `features`: numbers
+    by name and unit.
     """
 
     directed: Literal[False]
@@ -56,12 +60,14 @@ class Graph(Struct, forbid_unknown_fields=True):
 
 
 def layout_in_graph(data: Any) -> dict[str, Any]:
-    """Returns the plain values of the layout file that a graph file holds. Raises LayoutError: a part of the
-    graph is missing, unknown or not what it has to be."""
+    """Returns the plain values of the layout file that a graph file holds. Raises LayoutError: a
+    part of the graph is missing, unknown or not what it has to be."""
     graph = checked(data, Graph)
     names = [node.get("id") for node in graph.nodes]
     if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
-        raise LayoutError("expected each actuator with itself and with those after it, in order", "edges")
+        raise LayoutError(
+            "expected each actuator with itself and with those after it, in order", "edges"
+        )
     parts = [
         {"name": node.get("id")} | {key: node[key] for key in node if key not in ("id", "features")}
         for node in graph.nodes

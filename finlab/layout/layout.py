@@ -42,7 +42,8 @@ class Layout(Checked):
     body: "Body | None" = None
     """Hull, mass and hydrodynamics, where known."""
     axes: CommandedAxes = AXES
-    """Axes of the wrench that the robot commands; the others take what the cheapest answer gives them."""
+    """Axes of the wrench that the robot commands; the others take what the cheapest answer gives
+    them."""
     interaction: "InteractionModel | None" = None
     """What the actuators do to each other; None where that does not count."""
 
@@ -58,13 +59,16 @@ class Layout(Checked):
         for i, name in enumerate(self.names):
             if name in first_use:
                 raise LayoutError(
-                    f"{name!r} is already the name of actuator {first_use[name] + 1}", f"actuators[{i}].name"
+                    f"{name!r} is already the name of actuator {first_use[name] + 1}",
+                    f"actuators[{i}].name",
                 )
             first_use[name] = i
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.actuators, self.description, self.body, self.axes, self.interaction))
+        return hash(
+            (self.name, self.actuators, self.description, self.body, self.axes, self.interaction)
+        )
 
     def __hash__(self) -> int:
         # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
@@ -114,7 +118,8 @@ class Layout(Checked):
 
     @property
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:
-        """Time and size of each file that a law reads, for what is kept until one of them changes."""
+        """Time and size of each file that a law reads, for what is kept until one of them
+        changes."""
         return tuple(part.stamp for part in self._readers)
 
     @cached_property
@@ -131,8 +136,8 @@ class Layout(Checked):
         return self.n_fins == self.n
 
     def only(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
-        """Refuses a robot whose actuators are not all of one type, for what is made for that. Raises
-        LayoutError: the sentence names `what` and the first actuator that it does not take.
+        """Refuses a robot whose actuators are not all of one type, for what is made for that.
+        Raises LayoutError: the sentence names `what` and the first actuator that it does not take.
 
         Args:
             what: what was asked for, as the sentence begins.
@@ -149,7 +154,8 @@ class Layout(Checked):
             else:
                 continue
             raise LayoutError(
-                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {problem}; "
+                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} "
+                f"{problem}; "
                 "method dual of `finlab allocate` takes any actuator"
             )
 
@@ -173,15 +179,15 @@ class Layout(Checked):
 
     @cached_property
     def mounting_angle(self) -> Array:
-        """Azimuth of each fin's shaft (n,) [rad]; read-only. Raises LayoutError: an actuator is no fin, or
-        its shaft is not horizontal."""
+        """Azimuth of each fin's shaft (n,) [rad]; read-only. Raises LayoutError: an actuator is no
+        fin, or its shaft is not horizontal."""
         self.only("what asks for mounting angles", horizontal=True)
         return _read_only([fin.mounting_angle or 0.0 for fin in self.fins])
 
     @cached_property
     def lower(self) -> Array:
-        """Least command of each actuator (n, 3), of a fin amplitude [rad], frequency [Hz] and zero direction
-        [rad]; read-only."""
+        """Least command of each actuator (n, 3), of a fin amplitude [rad], frequency [Hz] and zero
+        direction [rad]; read-only."""
         return _read_only([part.lower for part in self.actuators])
 
     @cached_property
@@ -191,14 +197,15 @@ class Layout(Checked):
 
     @cached_property
     def servo_poles(self) -> Array:
-        """Double poles of amplitude, frequency and zero direction of each fin (n, 3) [rad/s]; read-only."""
+        """Double poles of amplitude, frequency and zero direction of each fin (n, 3) [rad/s];
+        read-only."""
         servos = [fin.servo for fin in self.fins]
         return _read_only([(s.amplitude_pole, s.frequency_pole, s.direction_pole) for s in servos])
 
     @cached_property
     def rates(self) -> Array:
-        """How fast the commands of each actuator change at most from tick to tick (n, 3) [per second],
-        infinite where nothing limits them; read-only."""
+        """How fast the commands of each actuator change at most from tick to tick (n, 3) [per
+        second], infinite where nothing limits them; read-only."""
         return _read_only([part.rates for part in self.actuators])
 
     @cached_property
@@ -233,17 +240,19 @@ class Layout(Checked):
         return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
 
     def index(self, name: str, argument: str = "") -> int:
-        """Returns the place of the actuator called `name`. Raises LayoutError: there is none; the message
-        lists those there are, and begins with the `argument` that the name stood in."""
+        """Returns the place of the actuator called `name`. Raises LayoutError: there is none; the
+        message lists those there are, and begins with the `argument` that the name stood in."""
         if name not in self.names:
             what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(
-                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}", argument
+                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}",
+                argument,
             )
         return self.names.index(name)
 
     def indices(self, names: Sequence[str], argument: str = "") -> tuple[int, ...]:
-        """Returns the places of several actuators, in the order asked for; errors as for `index`."""
+        """Returns the places of several actuators, in the order asked for; errors as for
+        `index`."""
         return tuple(self.index(name, argument) for name in names)
 
     def part(self, name: str, argument: str = "") -> Actuator:
@@ -251,14 +260,15 @@ class Layout(Checked):
         return self.actuators[self.index(name, argument)]
 
     def with_part(self, part: Actuator, name: str = "") -> "Layout":
-        """Returns the layout with another actuator in the place of the one of that name, by default its own.
-        Raises LayoutError: there is none, or the new name is another one's."""
+        """Returns the layout with another actuator in the place of the one of that name, by default
+        its own. Raises LayoutError: there is none, or the new name is another one's."""
         i = self.index(name or part.name)
         return replace(self, actuators=(*self.actuators[:i], part, *self.actuators[i + 1 :]))
 
     def without(self, names: Iterable[str], argument: str = "") -> "Layout":
-        """Returns the layout that is left when the actuators called `names` are lost. Raises LayoutError: a
-        name is unknown, or none is left; the message begins with the `argument` that the names stood in."""
+        """Returns the layout that is left when the actuators called `names` are lost. Raises
+        LayoutError: a name is unknown, or none is left; the message begins with the `argument` that
+        the names stood in."""
         names = [names] if isinstance(names, str) else list(names)
         lost = set(self.indices(names, argument))
         if len(lost) == self.n:
@@ -269,8 +279,8 @@ class Layout(Checked):
         return replace(self, actuators=left)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
-        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`; errors
-        as for `with_part`, and those of the fields."""
+        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0,
+        0)`; errors as for `with_part`, and those of the fields."""
         return self.with_part(replace(self.part(name), **changes), name)
 
 

@@ -13,7 +13,13 @@ WORDS = (True, True, False, False, False, True, True)
 def layout_blocks(layout: Layout) -> list[Block]:
     """Returns a layout in words, and a table of its actuators."""
     rows = [
-        (part.name, part.type, *(f"{x:6.3f}" for x in part.position), part.direction_words, part.limits_words)
+        (
+            part.name,
+            part.type,
+            *(f"{x:6.3f}" for x in part.position),
+            part.direction_words,
+            part.limits_words,
+        )
         for part in layout.actuators
     ]
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name

@@ -1,13 +1,14 @@
 """Layouts read from what a user may name: a shipped layout, a layout or graph file, a bundle.
 
-Layout files are YAML for people, JSON accepted. Mounting angles in degrees, the rest SI and radians.
+Layout files are YAML for people, JSON accepted. Mounting angles in degrees, the rest SI and
+radians.
 
-There is one version, 2, which holds actuators of any type under `actuators`. What holds degrees in a file is
-kept in radians; paths become absolute; a table of thrust in a CSV file becomes rows.
+There is one version, 2, which holds actuators of any type under `actuators`. What holds degrees in
+a file is kept in radians; paths become absolute; a table of thrust in a CSV file becomes rows.
 
-Every error names the file and the key, such as
-`x.yaml: actuators[2].limits.amplitude_rad of fin 'bow': minimum 0.6 is above maximum 0.05; swap them`.
-`layout.schema.json` beside this module is made of the same declarations.
+Every error names the file and the key, such as `x.yaml: actuators[2].limits.amplitude_rad of fin
+'bow': minimum 0.6 is above maximum 0.05; swap them`. `layout.schema.json` beside this module is
+made of the same declarations.
 """
 
 import math
@@ -39,7 +40,8 @@ FORMAT = "finlab-layout"
 VERSION = 2
 """Version of layout files; a reader knows exactly one."""
 OF_VERSION_1 = (
-    "version 1, with fins:, is no longer read; write version: 2, actuators: in place of fins:, and type: fin "
+    "version 1, with fins:, is no longer read; write version: 2, actuators: in place of fins:, "
+    "and type: fin "
     "in each of them"
 )
 """What a file of fins, as they were written before there was a release, is refused with."""
@@ -52,20 +54,20 @@ LAYOUT_SUFFIXES = (".yaml", ".yml", ".json")
 def load_layout(layout: str | os.PathLike[str]) -> Layout:
     """Returns a shipped layout by its bare name, such as "A", or the layout in a file or bundle.
 
-    Files are layout files (YAML, JSON) and layout graph files (JSON); a bundle is a folder or zip archive
-    made by `finlab export`. A bare name is never looked up in the current folder while a layout of that name
-    is shipped; write `./A` for a file called `A` there. Relative paths inside a layout file (a force table, a
-    hull mesh) are taken from the file's own folder.
+    Files are layout files (YAML, JSON) and layout graph files (JSON); a bundle is a folder or zip
+    archive made by `finlab export`. A bare name is never looked up in the current folder while a
+    layout of that name is shipped; write `./A` for a file called `A` there. Relative paths inside a
+    layout file (a force table, a hull mesh) are taken from the file's own folder.
 
-    Raises LayoutError: the file cannot be read or is not a valid layout; the message names file and key;
-    DataError: the bundle cannot be read, or was changed.
+    Raises LayoutError: the file cannot be read or is not a valid layout; the message names file and
+    key; DataError: the bundle cannot be read, or was changed.
     """
     return layout_and_lost(layout)[0]
 
 
 def layout_and_lost(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
-    """Returns a layout as `load_layout` opens it, with its errors, and the names of the actuators that a
-    bundle marks as lost; none of a file."""
+    """Returns a layout as `load_layout` opens it, with its errors, and the names of the actuators
+    that a bundle marks as lost; none of a file."""
     file = layout_path(layout)
     source = str(layout)
     if file.suffix not in LAYOUT_SUFFIXES or os.path.isdir(file):
@@ -82,8 +84,8 @@ def layout_and_lost(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, 
 def layout_in(
     text: str, suffix: str, source: str, folder: Path | None = None, *, may_open: bool = True
 ) -> Layout:
-    """Returns the layout in the text of a file whose name ends in `suffix`; the rest as for `parse_layout`.
-    Raises LayoutError: it is no JSON or YAML, or no layout."""
+    """Returns the layout in the text of a file whose name ends in `suffix`; the rest as for
+    `parse_layout`. Raises LayoutError: it is no JSON or YAML, or no layout."""
     parse = parse_json if suffix.lower() == ".json" else parse_yaml
     data = parse(text, source, LayoutError)
     if is_graph(data):
@@ -101,8 +103,9 @@ def is_graph(data: Any) -> bool:
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:
-    """Returns the path that a user means: text may be the name of a shipped layout, a `Path` is always a
-    path. Raises LayoutError: there is neither a shipped layout nor anything else of this name."""
+    """Returns the path that a user means: text may be the name of a shipped layout, a `Path` is
+    always a path. Raises LayoutError: there is neither a shipped layout nor anything else of this
+    name."""
     if not isinstance(layout, str):
         return Path(layout)
     shipped = shipped_layouts()
@@ -122,7 +125,8 @@ def layout_path(layout: str | os.PathLike[str]) -> Path:
 
 
 class Frame(Struct, forbid_unknown_fields=True):
-    """The only frame there is: x forward, y left, z up; a file may leave it out but not contradict it."""
+    """The only frame there is: x forward, y left, z up; a file may leave it out but not contradict
+    it."""
 
     convention: Literal["FLU"] = "FLU"
     origin: Literal["center_of_gravity"] = "center_of_gravity"
@@ -141,12 +145,14 @@ def layout_form() -> Any:
 
 
 def form_for(data: Mapping[str, Any]) -> Any:
-    """Returns the form of a layout file with what its plain values name alone: its kinds of actuator, its
-    interaction. It says the same of these values as that of all layout files, and what they do not name is
-    not imported."""
+    """Returns the form of a layout file with what its plain values name alone: its kinds of
+    actuator, its interaction. It says the same of these values as that of all layout files, and
+    what they do not name is not imported."""
     interaction = data.get("interaction")
     interactions = () if interaction is None else _interactions(_type_of(interaction))
-    return _layout_form(_kinds_among(data.get("actuators")), data.get("body") is not None, interactions)
+    return _layout_form(
+        _kinds_among(data.get("actuators")), data.get("body") is not None, interactions
+    )
 
 
 def _type_of(part: Any) -> Any:
@@ -155,7 +161,8 @@ def _type_of(part: Any) -> Any:
 
 
 def _kinds_among(parts: Any) -> tuple[type[Actuator], ...]:
-    """The kinds of the actuators in a file; all that there are, to choose from, where one is of none."""
+    """The kinds of the actuators in a file; all that there are, to choose from, where one is of
+    none."""
     names = [_type_of(part) for part in parts] if isinstance(parts, list | tuple) else []
     if not names or not all(isinstance(name, str) and name in KINDS for name in names):
         return tuple(KINDS.values())
@@ -163,7 +170,8 @@ def _kinds_among(parts: Any) -> tuple[type[Actuator], ...]:
 
 
 def _interactions(name: Any) -> tuple[Any, ...]:
-    """The class of an interaction by the type that a file gives; all that there are where it is none."""
+    """The class of an interaction by the type that a file gives; all that there are where it is
+    none."""
     from finlab.interaction import INTERACTIONS
 
     names = (name,) if isinstance(name, str) and name in INTERACTIONS else tuple(INTERACTIONS)
@@ -171,7 +179,9 @@ def _interactions(name: Any) -> tuple[Any, ...]:
 
 
 @cache
-def _layout_form(kinds: tuple[type[Actuator], ...], has_body: bool, interactions: tuple[Any, ...]) -> Any:
+def _layout_form(
+    kinds: tuple[type[Actuator], ...], has_body: bool, interactions: tuple[Any, ...]
+) -> Any:
     """The form of a layout file with some kinds of actuator, with or without a body, and some
     interactions."""
     part: Any = actuator_form(kinds)
@@ -201,8 +211,8 @@ def actuator_form(kinds: tuple[type[Actuator], ...]) -> Any:
 
 @cache
 def part_form(cls: type[Checked]) -> Any:
-    """Returns the form of the part of a file that a class stands for: its angles are in degrees, and its
-    parts have forms of their own."""
+    """Returns the form of the part of a file that a class stands for: its angles are in degrees,
+    and its parts have forms of their own."""
     keys = {name: key for name, (key, _) in cls.DEGREES.items()}
     kinds = {name: kind for name, (_, kind) in cls.DEGREES.items()}
     hints = get_type_hints(cls)
@@ -215,12 +225,14 @@ def part_form(cls: type[Checked]) -> Any:
 
 
 def _part_form(hint: Any) -> Any:
-    """The form of what a field holds, where that is a part of its own in a file, or one of several; else
-    None."""
+    """The form of what a field holds, where that is a part of its own in a file, or one of several;
+    else None."""
     parts = [part for part in get_args(hint) or (hint,) if part is not NoneType]
     if not all(isinstance(part, type) and issubclass(part, Part | Checked) for part in parts):
         return None
-    return _union([part.file_form() if issubclass(part, Part) else part_form(part) for part in parts])
+    return _union(
+        [part.file_form() if issubclass(part, Part) else part_form(part) for part in parts]
+    )
 
 
 def _union(kinds: list[Any]) -> Any:
@@ -238,8 +250,8 @@ class Reader:
     """Whether a CSV file of thrust that a part names may be opened."""
 
     def value(self, part: Any) -> Any:
-        """Returns what a part stands for, an instance of a form, a list of them, or a plain value. Raises
-        LayoutError: something does not fit; the message names the key in the part."""
+        """Returns what a part stands for, an instance of a form, a list of them, or a plain value.
+        Raises LayoutError: something does not fit; the message names the key in the part."""
         if isinstance(part, list | tuple):
             items = []
             for i, item in enumerate(part):
@@ -274,14 +286,15 @@ class Reader:
 def parse_layout(
     data: Any, source: str = "layout", folder: Path | None = None, *, may_open: bool = True
 ) -> Layout:
-    """Returns the layout that plain values (as read from a file) describe. Raises LayoutError: something is
-    missing, unknown or out of range.
+    """Returns the layout that plain values (as read from a file) describe. Raises LayoutError:
+    something is missing, unknown or out of range.
 
     Args:
         data: mappings, lists, numbers and text, as in a layout file.
         source: what to call it in error messages.
         folder: where relative paths start; the working directory when None.
-        may_open: whether tables of thrust that it names may be opened; those of fins, and meshes, are not.
+        may_open: whether tables of thrust that it names may be opened; those of fins, and meshes,
+        are not.
     """
     with under(source=source), naming_actuators(data):
         _check_version(data)

@@ -12,15 +12,18 @@ USUAL_ADVANCE = 1.26
 
 
 def places_of(layout: Layout) -> Places:
-    """Returns the places of a layout's actuators. A hull of another shape counts as the ellipsoid of its
-    size, a mesh, whose size no layout says, as none; fins lose nothing to speed that is known."""
+    """Returns the places of a layout's actuators. A hull of another shape counts as the ellipsoid
+    of its size, a mesh, whose size no layout says, as none; fins lose nothing to speed that is
+    known."""
     hull = layout.body.hull if layout.body else None
     size = hull.size_m if hull is not None and hull.size_m else (0.0, 0.0, 0.0)
     center = hull.center_m if hull is not None else (0.0, 0.0, 0.0)
     advance = [_advance(part) for part in layout.actuators]
     diameter = [part.jet for part in layout.actuators]
     half = 0.5 * np.array(size)
-    return Places(layout.position, np.array(diameter), np.array(advance), np.stack([np.array(center), half]))
+    return Places(
+        layout.position, np.array(diameter), np.array(advance), np.stack([np.array(center), half])
+    )
 
 
 def _advance(part: Actuator) -> float:

@@ -17,7 +17,8 @@ from finlab.whole_file import write_whole
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
-    """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
+    """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout
+    back."""
     data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": layout.name}
     if layout.description:
         data["description"] = layout.description
@@ -30,8 +31,8 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a layout file, JSON if the name ends in `.json`, else YAML; an existing file is replaced whole.
-    Raises LayoutError: the file cannot be written."""
+    """Writes a layout file, JSON if the name ends in `.json`, else YAML; an existing file is
+    replaced whole. Raises LayoutError: the file cannot be written."""
     data = layout_to_dict(layout)
     is_json = Path(path).suffix.lower() == ".json"
     write_whole(path, json.dumps(data, indent=2) + "\n" if is_json else yaml_text(data))
@@ -59,10 +60,15 @@ def plain(value: Any) -> Any:
 
 
 def degrees_of(value: Any) -> Any:
-    """Returns degrees of radians [rad], one or a tuple: twelve digits give back what people wrote; where they
-    do not, more are taken, so that reading gives the same radians."""
+    """Returns degrees of radians [rad], one or a tuple: twelve digits give back what people wrote;
+    where they do not, more are taken, so that reading gives the same radians."""
     if isinstance(value, tuple):
         return tuple(map(degrees_of, value))
     exact = math.degrees(value)
-    near = (round(exact, 12), exact, math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf))
+    near = (
+        round(exact, 12),
+        exact,
+        math.nextafter(exact, math.inf),
+        math.nextafter(exact, -math.inf),
+    )
     return next((angle for angle in near if math.radians(angle) == value), near[0])

@@ -1,4 +1,5 @@
-"""Logs of autopilots and of ROS: what a robot was asked for, gave and lost, and what would have held it.
+"""Logs of autopilots and of ROS: what a robot was asked for, gave and lost, and what would have
+held it.
 
 from finlab.log import judge, read_log
 

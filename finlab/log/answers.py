@@ -23,7 +23,9 @@ class Answers(NamedTuple):
     """(N,) [W]."""
 
 
-def answers_to(allocator: Allocator, wrench: Array, lost: Sequence[str] = (), **options: Any) -> Answers:
+def answers_to(
+    allocator: Allocator, wrench: Array, lost: Sequence[str] = (), **options: Any
+) -> Answers:
     """Returns answers to demands, those that ask for the same axes together.
 
     Args:
@@ -37,14 +39,19 @@ def answers_to(allocator: Allocator, wrench: Array, lost: Sequence[str] = (), **
     """
     count = len(wrench)
     answers = Answers(
-        np.empty((count, allocator.layout.n, 3)), np.empty((count, 6)), np.empty(count), np.empty(count)
+        np.empty((count, allocator.layout.n, 3)),
+        np.empty((count, 6)),
+        np.empty(count),
+        np.empty(count),
     )
     open_axes = np.isnan(wrench)
     patterns, group = np.unique(open_axes, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
         rows = np.flatnonzero(group.ravel() == k)
         free = tuple(axis for axis, is_open in zip(AXES, pattern, strict=True) if is_open)
-        batch = allocator.allocate_batch(np.nan_to_num(wrench[rows]), lost=lost, free=free, **options)
+        batch = allocator.allocate_batch(
+            np.nan_to_num(wrench[rows]), lost=lost, free=free, **options
+        )
         answers.command[rows] = batch.command
         answers.unallocated[rows] = batch.unallocated
         answers.err_norm[rows] = batch.err_norm

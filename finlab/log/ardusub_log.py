@@ -1,8 +1,9 @@
-"""Logs of ArduSub (DataFlash), indexed by pymavlink and read as columns: demands, pulses, parameters.
+"""Logs of ArduSub (DataFlash), indexed by pymavlink and read as columns: demands, pulses,
+parameters.
 
-Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot (RCIN,
-channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or less full
-(ArduSub, `AP_Motors6DOF`).
+Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot
+(RCIN, channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or
+less full (ArduSub, `AP_Motors6DOF`).
 """
 
 import re
@@ -37,7 +38,9 @@ def read_dataflash(path: Path) -> Recorded:
     tables, complete = _tables(path)
     messages = [*_rows(tables, "MSG", "time", "Message")]
     if other := next((match for _, words in messages if (match := VEHICLE.match(words))), None):
-        raise DataError(f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known")
+        raise DataError(
+            f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known"
+        )
     if (rate := tables.get("RATE")) is None:
         has = ", ".join(sorted(tables)) or "nothing"
         lacks = f"holds no RATE, expected the demands of ArduSub; it has {has}"
@@ -48,7 +51,9 @@ def read_dataflash(path: Path) -> Recorded:
     sticks = tables.get("RCIN", {})
     if throttle is None and (control := tables.get("CTUN")):
         throttle = _held(control, "ThO", time)[:, 0]
-    heave = np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
+    heave = (
+        np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
+    )
     channels = {name: int(parameters.get(f"RCMAP_{name}", usual)) for name, usual in STICKS.items()}
     forward, lateral = (_stick(sticks, parameters, channel, time) for channel in channels.values())
     setpoints = [forward, -lateral, heave, rate["ROut"], -rate["POut"], -rate["YOut"]]
@@ -63,7 +68,9 @@ def read_dataflash(path: Path) -> Recorded:
         how = "modes that steer them log none"
         record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {how}.")
     _outputs(record, tables, parameters)
-    frame = {name: value for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))}
+    frame = {
+        name: value for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))
+    }
     if record.describe(read_parameters_of_ardusub, frame, path.stem):
         guesses = "guesses are taken; name the robot by --robot LAYOUT"
         record.lacking.append(f"A frame of ArduSub has no arms and no newtons: {guesses}.")
@@ -83,8 +90,8 @@ def _rows(tables: dict[str, Columns], name: str, *columns: str) -> Iterator[tupl
 
 
 def _tables(path: Path) -> tuple[dict[str, Columns], bool]:
-    """Columns of the wanted messages by their names, and whether the last message is whole. pymavlink says
-    where they lie, numpy reads them all at once."""
+    """Columns of the wanted messages by their names, and whether the last message is whole.
+    pymavlink says where they lie, numpy reads them all at once."""
     from pymavlink import DFReader
 
     class Index(silent(DFReader).DFReader_binary):  # type: ignore[misc]  # it ships no types
@@ -96,7 +103,11 @@ def _tables(path: Path) -> tuple[dict[str, Columns], bool]:
     tables = {}
     with Index(str(path)) as log:
         content = np.frombuffer(bytes(log.data_map), np.uint8)
-        ends = [log.offsets[kind][-1] + form.len for kind, form in log.formats.items() if log.offsets[kind]]
+        ends = [
+            log.offsets[kind][-1] + form.len
+            for kind, form in log.formats.items()
+            if log.offsets[kind]
+        ]
         for name in WANTED:
             if (form := log.formats.get(log.name_to_id.get(name))) is None:
                 continue
@@ -109,14 +120,16 @@ def _tables(path: Path) -> tuple[dict[str, Columns], bool]:
             if len(rows):
                 units = zip(form.columns, codes, strict=True)
                 tables[name] = {
-                    column: rows[column] * unit if unit else rows[column] for column, (_, unit, _) in units
+                    column: rows[column] * unit if unit else rows[column]
+                    for column, (_, unit, _) in units
                 }
                 tables[name]["time"] = tables[name]["TimeUS"] * 1e-6
     return tables, max(ends, default=0) <= len(content)
 
 
 def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Array) -> Array:
-    """What a stick of the pilot asked for at times (N,), -1 to 1; NaN where its channel is not logged."""
+    """What a stick of the pilot asked for at times (N,), -1 to 1; NaN where its channel is not
+    logged."""
     if (pulses := sticks.get(f"C{channel}")) is None:
         return np.full(len(time), np.nan)
     least, rest, most = (
@@ -130,7 +143,8 @@ def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Ar
 
 
 def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str, float]) -> None:
-    """Shares of full output of the motors, as their frame says which way they push, and what ESCs say."""
+    """Shares of full output of the motors, as their frame says which way they push, and what ESCs
+    say."""
     if (pulses := tables.get("RCOU")) is None:
         return
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}

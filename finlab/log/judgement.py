@@ -56,7 +56,8 @@ class Timeline:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What a robot could not, and what would have held it; an impulse is the integral over time of a size."""
+    """What a robot could not, and what would have held it; an impulse is the integral over time of
+    a size."""
 
     source: str
     """Name of the file."""
@@ -75,12 +76,13 @@ class Judgement:
     saturated_s: float
     """Time over which any was lost [s]."""
     watts: float | None
-    """Mean power of the outputs by the actuators' own models [W]; None where the log has no outputs."""
+    """Mean power of the outputs by the actuators' own models [W]; None where the log has no
+    outputs."""
     axis: str | None
     """Axis that lost most, as a share of the yardstick; None where none was lost."""
     stopped: tuple[str, ...]
-    """Actuators that were at rest all along while what they would have given was missing, and those that the
-    autopilot had stopped at last, or that had ceased to turn by then."""
+    """Actuators that were at rest all along while what they would have given was missing, and those
+    that the autopilot had stopped at last, or that had ceased to turn by then."""
     spells: tuple[Spell, ...]
     """Those that lost most, by time."""
     n_spells: int
@@ -97,13 +99,14 @@ class Judgement:
 
     @property
     def without(self) -> str | None:
-        """The one actuator that was stopped, which replays that could have held an axis do without."""
+        """The one actuator that was stopped, which replays that could have held an axis do
+        without."""
         return self.stopped[0] if len(self.stopped) == 1 else None
 
     @property
     def held_by(self) -> Replay | None:
-        """Replay on the robot as it is, or else on the improved one, that holds the axis, with least missing,
-        then least power; None where none does, or nothing was lost."""
+        """Replay on the robot as it is, or else on the improved one, that holds the axis, with
+        least missing, then least power; None where none does, or nothing was lost."""
         if self.axis is None:
             return None
         i = AXES.index(self.axis)
@@ -116,30 +119,39 @@ class Judgement:
     def sentence(self) -> str:
         """The answer."""
         if self.axis is None:
-            return f"No axis was lost in {three(self.seconds)} s: no actuator at a limit cut a demand."
+            return (
+                f"No axis was lost in {three(self.seconds)} s: no actuator at a limit cut a demand."
+            )
         i = AXES.index(self.axis)
         longest = max(self.spells, key=lambda spell: spell.end - spell.start)
         worst = max(self.spells, key=lambda spell: spell.missing[i])
         why = f", with {', '.join(worst.limits[:4])}" if worst.limits else ""
         return (
             f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {three(self.lost_s[i])} s of "
-            f"{three(self.seconds)} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the longest from "
+            f"{three(self.seconds)} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the "
+            "longest from "
             f"{longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} of "
             f"{amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
         )
 
     def _remedy(self, i: int) -> str:
-        best = self.held_by or min(self.replays, key=lambda r: (r.lost != self.without, r.missing[i]))
+        best = self.held_by or min(
+            self.replays, key=lambda r: (r.lost != self.without, r.missing[i])
+        )
         where = "" if best.lost is None else f" without {best.lost}"
         if self.held_by is None:
             where = where or (", on the improved layout," if best.robot == "improved" else "")
             misses = f"comes nearest and misses {amount(best.missing, i)}"
             return f"no policy would have held it; {best.name}{where} {misses}"
-        where = where or " on the improved layout, and nothing on this one" * (best.robot == "improved")
+        where = where or " on the improved layout, and nothing on this one" * (
+            best.robot == "improved"
+        )
         more = np.subtract(best.missing, self.missing)
         least = HELD * self.missing[i] * self.scale / self.scale[i]
         price = [f"{amount(more, int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
-        return f"{best.name} would have held it{where}" + (f", for {' and '.join(price)}" if price else "")
+        return f"{best.name} would have held it{where}" + (
+            f", for {' and '.join(price)}" if price else ""
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it as numbers, strings, lists and None, for JSON."""

@@ -1,4 +1,5 @@
-"""Judges a log: what its robot could not, what it gave instead, and which policy would have held it."""
+"""Judges a log: what its robot could not, what it gave instead, and which policy would have held
+it."""
 
 from collections.abc import Sequence
 
@@ -27,7 +28,8 @@ LOST = 0.01
 OFF = 0.05
 """Share of what was asked for that may be missing with no actuator at a limit before it is said."""
 DEAD = 0.1
-"""Least share of the square of what was away that a dead thruster explains, and most that none does."""
+"""Least share of the square of what was away that a dead thruster explains, and most that none
+does."""
 MERGED_S = 0.5
 """Losses that are no further apart are one spell."""
 MOST_SPELLS, BINS = 200, 1000
@@ -39,13 +41,13 @@ Flags = NDArray[np.bool_]
 
 
 def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = True) -> Judgement:
-    """Returns what the log's robot could not, and replays its demands by other methods and policies, with
-    each actuator lost, and on an improved layout.
+    """Returns what the log's robot could not, and replays its demands by other methods and
+    policies, with each actuator lost, and on an improved layout.
 
     Args:
         log: of `read_log`.
-        priority: groups of axes for policy `priority`, most important first; the axis that lost most comes
-            first when empty.
+        priority: groups of axes for policy `priority`, most important first; the axis that lost
+            most comes first when empty.
         improve: whether to search for a better layout.
 
     Raises:
@@ -61,7 +63,8 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
     axis = AXES[int(np.argmax(impulse / scale))] if account.lost.any() else None
     if ((span @ np.abs(account.away) - impulse) / scale).max() > OFF * (asked / scale).max():
         notes.append(
-            "With no actuator at a limit the outputs gave another wrench than was asked for: forces of the "
+            "With no actuator at a limit the outputs gave another wrench than was asked for: "
+            "forces of the "
             "robot, or what a setpoint stands for (--scale), differ from those of the log."
         )
     policies = [CLOSEST, Policy("direction"), _priority(priority, axis)]
@@ -143,8 +146,9 @@ class Account:
         return delivered
 
     def _bound(self) -> Flags:
-        """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a thruster
-        which does not reverse or was stopped, or, in a log without outputs, where the autopilot says so."""
+        """Samples (N,) at which a limit kept the robot from giving more: an actuator's, that of a
+        thruster which does not reverse or was stopped, or, in a log without outputs, where the
+        autopilot says so."""
         log = self.log
         bound = self.at.any(axis=1)
         if log.command is not None:
@@ -156,8 +160,8 @@ class Account:
         return np.asarray(bound)
 
     def _dead(self) -> Flags:
-        """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and whose
-        forces are most of what was away while no actuator was at a limit."""
+        """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and
+        whose forces are most of what was away while no actuator was at a limit."""
         log = self.log
         robot = self.log.robot
         none = np.zeros(robot.n, bool)
@@ -227,7 +231,9 @@ def _priority(groups: Sequence[Sequence[Axis]], axis: Axis | None) -> Policy:
         check_order(groups, "priority")
         return Policy("priority", order=tuple(tuple(group) for group in groups))
     rest = (tuple(each for each in group if each != axis) for group in USUAL)
-    return Policy("priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group)))
+    return Policy(
+        "priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group))
+    )
 
 
 def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
@@ -251,4 +257,8 @@ def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
 
 def _words(log: Log, event: Event) -> str:
     place = event.actuator
-    return event.words if place is None or place >= log.robot.n else f"{log.robot.names[place]} {event.words}"
+    return (
+        event.words
+        if place is None or place >= log.robot.n
+        else f"{log.robot.names[place]} {event.words}"
+    )

@@ -1,7 +1,9 @@
-"""Logs of PX4 (ULog), read by pyulog: setpoints of thrust and torque, outputs of motors, what was left.
+"""Logs of PX4 (ULog), read by pyulog: setpoints of thrust and torque, outputs of motors, what was
+left.
 
-Setpoints are without unit, in x forward, y right, z down; outputs are shares of CA_ROTORi_CT (PX4, messages
-`vehicle_thrust_setpoint`, `vehicle_torque_setpoint`, `actuator_motors`, `control_allocator_status`).
+Setpoints are without unit, in x forward, y right, z down; outputs are shares of CA_ROTORi_CT (PX4,
+messages `vehicle_thrust_setpoint`, `vehicle_torque_setpoint`, `actuator_motors`,
+`control_allocator_status`).
 """
 
 import io
@@ -17,7 +19,8 @@ from finlab.log.recorded import CUT, FLU, Event, Recorded, Series, changes, sile
 
 MAGIC = b"ULog\x01\x125"
 MOTORS, FIRST_MOTOR, PULSES = 12, 101, 16
-"""Most motors, the number of the first as the function of an output, and most outputs that are pulses."""
+"""Most motors, the number of the first as the function of an output, and most outputs that are
+pulses."""
 WARNING = ord("4")
 """Level of a message; more serious ones are below."""
 TOY = 6.5
@@ -33,7 +36,10 @@ TOPICS = {
     "vehicle_torque_setpoint": _each("xyz#", 3),
     "actuator_motors": _each("control#", MOTORS),
     "actuator_outputs": _each("output#", PULSES),
-    "control_allocator_status": (*_each("unallocated_thrust#", 3), *_each("unallocated_torque#", 3)),
+    "control_allocator_status": (
+        *_each("unallocated_thrust#", 3),
+        *_each("unallocated_torque#", 3),
+    ),
     "failure_detector_status": ("motor_failure_mask",),
     "esc_status": ("esc_online_flags", "esc_count", *_each("esc#.esc_rpm", 8)),
 }
@@ -51,10 +57,14 @@ def read_ulog(path: Path) -> Recorded:
     thrust, torque = map(topics.get, list(TOPICS)[:2])
     if thrust is None or torque is None:
         raise DataError(
-            f"{path}: holds no {[name for name in TOPICS if name not in topics][0]}, expected the setpoints "
+            f"{path}: holds no {[name for name in TOPICS if name not in topics][0]}, expected the "
+            "setpoints "
             "that PX4 1.14 and newer log; log them with SDLOG_PROFILE, or take a newer PX4"
         )
-    parameters = {**log.initial_parameters, **{name: value for _, name, value in log.changed_parameters}}
+    parameters = {
+        **log.initial_parameters,
+        **{name: value for _, name, value in log.changed_parameters},
+    }
     both = np.hstack([thrust.at(torque.time), torque.values]) * FLU
     record = Recorded("px4", Series(torque.time, both, torque.back), topics.get("actuator_motors"))
     if record.outputs is None and "actuator_outputs" in topics:
@@ -73,22 +83,32 @@ def read_ulog(path: Path) -> Recorded:
         if each.log_level <= WARNING
     ]
     if mask := topics.get("failure_detector_status"):
-        record.events += changes(mask.time, _bits(mask), "failed, says PX4", "works again, says PX4")
+        record.events += changes(
+            mask.time, _bits(mask), "failed, says PX4", "works again, says PX4"
+        )
     if escs := topics.get("esc_status"):
         known = np.arange(MOTORS) < escs.values[:, 1:2]
-        record.events += changes(escs.time, known & ~_bits(escs), "has an ESC offline", "is online again")
+        record.events += changes(
+            escs.time, known & ~_bits(escs), "has an ESC offline", "is online again"
+        )
         record.turns = Series(escs.time, escs.values[:, 2:])
-    robot = record.describe(read_px4, {k: v for k, v in parameters.items() if k.startswith("CA_")}, path.stem)
-    if robot and {abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)} == {TOY}:
+    robot = record.describe(
+        read_px4, {k: v for k, v in parameters.items() if k.startswith("CA_")}, path.stem
+    )
+    if robot and {abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)} == {
+        TOY
+    }:
         record.lacking.append(
-            f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; name the "
+            f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; "
+            "name the "
             "robot by --robot LAYOUT."
         )
     return record
 
 
 class _File(io.BufferedReader):
-    """A file that knows whether it ended amid what was read; a message begins with a head of 3 bytes."""
+    """A file that knows whether it ended amid what was read; a message begins with a head of 3
+    bytes."""
 
     cut = False
 
@@ -103,17 +123,22 @@ def _series(topic: Any, begin: int) -> Series:
     stamps = topic.data["timestamp"]
     none = np.full(len(stamps), np.nan)
     with np.errstate(invalid="ignore"):  # numbers of a damaged file may be none
-        columns = [np.asarray(topic.data.get(name, none), np.float64) for name in TOPICS[topic.name]]
+        columns = [
+            np.asarray(topic.data.get(name, none), np.float64) for name in TOPICS[topic.name]
+        ]
     return Series.of((stamps - float(begin)) * 1e-6, np.stack(columns, axis=1))
 
 
 def _bits(series: Series) -> NDArray[np.bool_]:
     """Flags (N, 12) in the first column."""
-    return (np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MOTORS) & 1).astype(bool)
+    return (np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MOTORS) & 1).astype(
+        bool
+    )
 
 
 def _by_pulses(outputs: Series, parameters: dict[str, Any]) -> Series | None:
-    """Outputs of motors by PWM_MAIN_FUNCi and the ends of their pulses; None where no output is a motor's."""
+    """Outputs of motors by PWM_MAIN_FUNCi and the ends of their pulses; None where no output is a
+    motor's."""
     motors = {}
     reversing = int(parameters.get("CA_R_REV", 0))
     for i, pulse in enumerate(outputs.values.T, 1):
@@ -125,7 +150,9 @@ def _by_pulses(outputs: Series, parameters: dict[str, Any]) -> Series | None:
             motors[motor] = np.where(pulse < least, np.nan, np.clip(share, -1.0, 1.0))
     if not motors or {*motors} != {*range(len(motors))}:
         return None
-    return Series(outputs.time, np.stack([motors[motor] for motor in sorted(motors)], axis=1), outputs.back)
+    return Series(
+        outputs.time, np.stack([motors[motor] for motor in sorted(motors)], axis=1), outputs.back
+    )
 
 
 _ENDS = (("MIN", 1000.0), ("MAX", 2000.0))

@@ -1,4 +1,5 @@
-"""Reads a log and poses it for one robot: demands in newtons, outputs as commands of its actuators."""
+"""Reads a log and poses it for one robot: demands in newtons, outputs as commands of its
+actuators."""
 
 import os
 from collections.abc import Iterator
@@ -32,8 +33,8 @@ GAP_S = 1.0
 """Longest time that a sample holds; what lies beyond it was not logged."""
 
 STILL_S, PUSHES = 1.0, 0.2
-"""How long [s] a thruster is told to push, by this share of its most at least, before it is dead for not
-turning."""
+"""How long [s] a thruster is told to push, by this share of its most at least, before it is dead
+for not turning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +54,11 @@ class Log(PlainData):
     demand: Array
     """Wrench that was asked for (N, 6) [N, N m]; NaN along an axis that does not count."""
     command: Array | None
-    """What the actuators were told (N, n, 3), as their laws take it, NaN for one that was stopped; None where
-    the log holds no outputs."""
+    """What the actuators were told (N, n, 3), as their laws take it, NaN for one that was stopped;
+    None where the log holds no outputs."""
     unmet: Array | None
-    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says nothing, or the
-    log holds outputs."""
+    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says
+    nothing, or the log holds outputs."""
     events: tuple[Event, ...]
     """What the log says of the robot's health, by time."""
     notes: tuple[str, ...]
@@ -84,14 +85,14 @@ def read_log(
     Args:
         path: of the file, or of a bag's folder.
         robot: a layout, or what `load_layout` takes; by the log's own parameters when None.
-        scale: what a setpoint of 1 asks for on each axis (6,) [N, N m]; of ROS what wrenches are multiplied
-            by. By the autopilot's own rule and the robot's forces when None.
+        scale: what a setpoint of 1 asks for on each axis (6,) [N, N m]; of ROS what wrenches are
+            multiplied by. By the autopilot's own rule and the robot's forces when None.
         demand: topic of a bag that holds the wrench; the only one there when None.
         outputs: topic of a bag that holds what actuators were sent; the only one there when None.
 
     Raises:
-        DataError: the file is damaged, of another kind or too large, or lacks what no option gives; or the
-            package that reads it is not installed.
+        DataError: the file is damaged, of another kind or too large, or lacks what no option gives;
+            or the package that reads it is not installed.
         LayoutError: the robot cannot be read, or does not fit the log's motors.
     """
     place = Path(path)
@@ -128,32 +129,37 @@ def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
 
 
 def _sides(own: Layout | None, robot: Layout) -> Array:
-    """1 for each actuator (n,) that pushes as the log's motor in its place does, if the log says that, and -1
-    for one mounted the other way round. Raises LayoutError: they do not fit."""
+    """1 for each actuator (n,) that pushes as the log's motor in its place does, if the log says
+    that, and -1 for one mounted the other way round. Raises LayoutError: they do not fit."""
     if own is None or own is robot:
         return np.ones(robot.n)
     if own.n != robot.n:
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have {own.n} motors"
+            f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have "
+            f"{own.n} motors"
         )
     axes = [[getattr(part, "axis", (0.0,) * 3) for part in each.actuators] for each in (own, robot)]
     along = np.einsum("nk,nk->n", *map(np.array, axes))
     if (apart := np.abs(along) < 0.5).any():
         raise LayoutError(
-            f"{robot.names[apart.argmax()]!r:.60} of layout {robot.name!r:.60} pushes another way than the "
+            f"{robot.names[apart.argmax()]!r:.60} of layout {robot.name!r:.60} pushes another way "
+            "than the "
             "log's motor in its place; list the actuators in the order of the motors"
         )
     return np.asarray(np.sign(along))
 
 
 def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
-    """What a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along an axis
-    that the robot does not drive. Raises LayoutError: it has other actuators than an autopilot drives."""
+    """What a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along
+    an axis that the robot does not drive. Raises LayoutError: it has other actuators than an
+    autopilot drives."""
     if scale is not None:
         unit = np.asarray(scale, np.float64)
         if unit.shape == (6,) and np.isfinite(unit).all() and (unit > 0.0).all():
             return unit
-        raise DataError(f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}")
+        raise DataError(
+            f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}"
+        )
     if form == "ros":
         return np.ones(6)
     kind = Px4 if form == "px4" else ArduSub
@@ -161,7 +167,8 @@ def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
 
 
 def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None) -> Log:
-    """The log in the robot's newtons, at the times of its outputs, or else of what says what was left."""
+    """The log in the robot's newtons, at the times of its outputs, or else of what says what was
+    left."""
     sides = _sides(record.layout, robot)
     unit = _unit(record.form, robot, scale)
     basis = record.outputs or record.unmet or record.demand
@@ -183,21 +190,30 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
             notes.append("Times at which no output moved, such as before arming, are left out.")
     else:
         asks.append(
-            "It holds no outputs: what the autopilot gave is what its method gives, not what it sent."
+            "It holds no outputs: what the autopilot gave is what its method gives, not what it "
+            "sent."
         )
         if record.unmet is not None:
             unmet = np.nan_to_num(record.unmet.values * unit, posinf=0.0, neginf=0.0)
     if kept.sum() < 2:
-        raise DataError(f"{source}: holds no demands while outputs moved; there is nothing to judge")
+        raise DataError(
+            f"{source}: holds no demands while outputs moved; there is nothing to judge"
+        )
     if len(time) > MOST_SAMPLES:
-        raise DataError(f"{source}: holds {len(time):,} samples, expected up to {MOST_SAMPLES:,}; cut it")
+        raise DataError(
+            f"{source}: holds {len(time):,} samples, expected up to {MOST_SAMPLES:,}; cut it"
+        )
     step = np.diff(time, append=time[-1] + np.median(np.diff(time)))
     if (beyond := float(np.maximum(step - GAP_S, 0.0)[kept].sum())) > 0.0:
         notes.append(f"Gaps between samples, {beyond:.0f} s beyond {GAP_S:g} s each, are left out.")
     if back := max(basis.back, record.demand.back):
-        notes.append(f"Its clock jumps back, by up to {back:.3g} s; samples were sorted by their times.")
+        notes.append(
+            f"Its clock jumps back, by up to {back:.3g} s; samples were sorted by their times."
+        )
     if undriven := [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]:
-        notes.append(f"No thruster drives {', '.join(undriven)}; what was asked there is not judged.")
+        notes.append(
+            f"No thruster drives {', '.join(undriven)}; what was asked there is not judged."
+        )
     return Log(
         source=source,
         form=record.form,
@@ -213,8 +229,11 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
     )
 
 
-def _dead(command: Array, turns: Series | None, time: Array, robot: Layout) -> Iterator[tuple[int, int]]:
-    """Thrusters that turned once, but no more although told so (N, n, 3), and the sample where that began."""
+def _dead(
+    command: Array, turns: Series | None, time: Array, robot: Layout
+) -> Iterator[tuple[int, int]]:
+    """Thrusters that turned once, but no more although told so (N, n, 3), and the sample where that
+    began."""
     speed = np.empty((len(time), 0)) if turns is None else turns.at(time)
     held = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
     most = np.maximum(robot.upper, -robot.lower)[:, 0]
@@ -231,7 +250,8 @@ def robot_rest(robot: Layout) -> Array:
 
 
 def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
-    """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another robot."""
+    """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another
+    robot."""
     n = robot.n
     k = outputs.shape[1]
     if not record.of_shares and k == 3 * n:
@@ -239,7 +259,8 @@ def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -
     if k < n or (k != n and record.form == "ros"):
         thrice = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not {n}{thrice}"
+            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not "
+            f"{n}{thrice}"
         )
     robot.only("a log with one output for each actuator", "thruster")
     values = outputs[:, :n] * sides

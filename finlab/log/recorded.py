@@ -62,7 +62,8 @@ class Recorded:
 
     form: Form
     demand: Series
-    """Wrenches (N, 6), x forward, y left, z up; setpoints without unit of an autopilot, of ROS [N, N m]."""
+    """Wrenches (N, 6), x forward, y left, z up; setpoints without unit of an autopilot, of ROS [N,
+    N m]."""
     outputs: Series | None = None
     """Shares (M, n) of full output, NaN where a motor is stopped; or what ROS sent."""
     of_shares: bool = True
@@ -86,13 +87,16 @@ class Recorded:
     def describe(
         self, read: Callable[[str, str, Exchange], Layout], parameters: dict[str, Any], name: str
     ) -> Layout | None:
-        """The robot that a reader of the autopilot's parameters finds in them; None where it finds none."""
+        """The robot that a reader of the autopilot's parameters finds in them; None where it finds
+        none."""
         exchange = Exchange()
         lines = "\n".join(f"{key} {value}" for key, value in parameters.items())
         try:
             self.layout = read(lines, name[:64] or self.form, exchange)
         except LayoutError as error:
-            self.lacking.append(f"Its parameters hold no robot ({error}); name it by --robot LAYOUT.")
+            self.lacking.append(
+                f"Its parameters hold no robot ({error}); name it by --robot LAYOUT."
+            )
             return None
         self.taken += exchange.notes
         return self.layout

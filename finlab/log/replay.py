@@ -17,7 +17,8 @@ from finlab.physics.objective import REACHED, yardstick
 MOST, MOST_LOST = 2000, 400
 """Most demands that a replay asks, and one with an actuator lost."""
 FINEST = 0.001
-"""Share of the yardstick that demands taken together spread over; doubled until these are few enough."""
+"""Share of the yardstick that demands taken together spread over; doubled until these are few
+enough."""
 
 HASH = np.random.default_rng(0).integers(-(2**63), 2**63, 6, endpoint=False) | 1
 """Factors that make one number of six, modulo 2^64."""
@@ -40,7 +41,8 @@ class Replay:
     watts: float
     """Mean power [W] by the actuators' own models."""
     saturated_s: float
-    """Time over which a wrench was not delivered, by more than a thousandth of the yardstick [s]."""
+    """Time over which a wrench was not delivered, by more than a thousandth of the yardstick
+    [s]."""
 
 
 class Demands(NamedTuple):
@@ -51,12 +53,13 @@ class Demands(NamedTuple):
     span: Array
     """How long each held, all in all (K,) [s]."""
     spread: float
-    """Share of the yardstick that those which were taken together spread over; 0 where they are equal."""
+    """Share of the yardstick that those which were taken together spread over; 0 where they are
+    equal."""
 
 
 def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
-    """Takes demands (N, 6) that held for times (N,) together until at most `most` are left: equal ones, then
-    those in one cell of a grid, ever wider, each as its mean over time."""
+    """Takes demands (N, 6) that held for times (N,) together until at most `most` are left: equal
+    ones, then those in one cell of a grid, ever wider, each as its mean over time."""
     spread = 0.0
     place = np.nan_to_num(wrench / scale, nan=1e9)
     while True:
@@ -81,8 +84,9 @@ def policy_words(policy: Policy) -> str:
 def replay(
     robot: Layout, wrench: Array, span: Array, policies: list[Policy], *, improved: bool = False
 ) -> Iterator[Replay]:
-    """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both autopilots'
-    methods where they take the robot; of a robot that is not `improved` with each actuator lost, too."""
+    """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both
+    autopilots' methods where they take the robot; of a robot that is not `improved` with each
+    actuator lost, too."""
     scale = yardstick(robot)
     intact = demands_of(wrench, span, scale, MOST)
     rough = demands_of(intact.wrench, intact.span, scale, MOST_LOST)
@@ -110,5 +114,6 @@ def replay(
 
 
 def six(values: Array, scale: Array) -> tuple[float, ...]:
-    """Plain numbers of axes (6,); those below a millionth of a yardstick are rounding errors, and 0."""
+    """Plain numbers of axes (6,); those below a millionth of a yardstick are rounding errors, and
+    0."""
     return tuple(map(float, np.where(np.abs(values) < 1e-6 * scale, 0.0, values)))

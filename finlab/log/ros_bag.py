@@ -1,8 +1,8 @@
 """Bags of ROS 1 and 2, read by rosbags: a wrench that was asked for, and what actuators were sent.
 
-Wrenches are geometry_msgs/Wrench or WrenchStamped [N, N m], x forward, y left, z up, NaN for an axis that is
-free. Outputs are actuator_msgs/Actuators (`normalized`) or a Float64MultiArray: of n numbers forces of
-thrusters [N], of 3 n numbers commands as the actuators' laws take them.
+Wrenches are geometry_msgs/Wrench or WrenchStamped [N, N m], x forward, y left, z up, NaN for an
+axis that is free. Outputs are actuator_msgs/Actuators (`normalized`) or a Float64MultiArray: of n
+numbers forces of thrusters [N], of 3 n numbers commands as the actuators' laws take them.
 """
 
 from collections import defaultdict
@@ -26,8 +26,8 @@ ENDS = (".bag", ".mcap", ".db3")
 
 
 def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
-    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it lacks a topic, or
-    has several; any error: it is damaged."""
+    """Reads a bag; topics by name, or the only ones of their kinds. Raises DataError: it lacks a
+    topic, or has several; any error: it is damaged."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -38,7 +38,9 @@ def read_bag(path: Path, demand: str | None, outputs: str | None) -> Recorded:
         demanded = _topic(path, kinds, WRENCHES, demand, "demand")
         sent = _topic(path, kinds, OUTPUTS, outputs, "outputs")
         read = [
-            each for each in reader.connections if each.topic in (demanded, sent) or each.msgtype == HEALTH
+            each
+            for each in reader.connections
+            if each.topic in (demanded, sent) or each.msgtype == HEALTH
         ]
         for connection, nanoseconds, raw in reader.messages(read):
             message: Any = reader.deserialize(raw, connection.msgtype)
@@ -66,19 +68,24 @@ def _numbers(message: Any) -> Any:
 def _topic(
     path: Path, kinds: dict[str, str], wanted: Sequence[str], named: str | None, option: str
 ) -> str | None:
-    """The topic that an option names, or the only one of some types; None where there are no outputs."""
+    """The topic that an option names, or the only one of some types; None where there are no
+    outputs."""
     topics = [topic for topic in sorted(kinds) if kinds[topic] in wanted and named in (None, topic)]
     if not topics and (named is not None or option == "demand"):
         what = "" if named is None else f" {named!r:.60}"
         only = ", ".join(sorted(kinds)) or "none"
         raise DataError(f"{path}: has no topic{what} of {' or '.join(wanted)}, only {only}")
     if len(topics) > 1:
-        raise DataError(f"{path}: has several topics for {option}: {', '.join(topics)}; say --{option} TOPIC")
+        raise DataError(
+            f"{path}: has several topics for {option}: {', '.join(topics)}; say --{option} TOPIC"
+        )
     return topics[0] if topics else None
 
 
 def _series(path: Path, topic: str | None, rows: dict[Any, list[tuple[float, Any]]]) -> Series:
     times, values = zip(*rows[topic], strict=True) if rows[topic] else ((), ())
     if len(widths := {*map(len, values)}) != 1 or 0 in widths:
-        raise DataError(f"{path}: {topic}: expected messages of one length, got {sorted(widths) or 'none'}")
+        raise DataError(
+            f"{path}: {topic}: expected messages of one length, got {sorted(widths) or 'none'}"
+        )
     return Series.of(np.array(times), np.array(values, np.float64))

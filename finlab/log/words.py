@@ -22,28 +22,38 @@ MOST_SPELLS, MOST_EVENTS = 10, 10
 
 def judgement_text(judged: Judgement) -> str:
     """The sentence, then what was lost on each axis, when, and what each replay misses."""
-    columns = [Column("axis", "axis"), Column("unit", "unit"), Column("asked", "asked for", "three")]
+    columns = [
+        Column("axis", "axis"),
+        Column("unit", "unit"),
+        Column("asked", "asked for", "three"),
+    ]
     columns += [Column("missing", "missing", "three"), Column("lost", "lost [s]", "three")]
     names = [f"{motion} {axis}" for motion, axis in zip(MOTIONS, AXES, strict=True)]
     each = zip(names, IMPULSES, judged.asked, judged.missing, judged.lost_s, strict=True)
-    rows: list[Row] = [dict(zip([column.key for column in columns], row, strict=True)) for row in each]
+    rows: list[Row] = [
+        dict(zip([column.key for column in columns], row, strict=True)) for row in each
+    ]
     blocks: list[Block] = [judged.sentence, Table(tuple(columns), rows)]
     worst = sorted(judged.spells, key=lambda spell: spell.start - spell.end)[:MOST_SPELLS]
     for spell in sorted(worst, key=lambda spell: spell.start):
         places = [k for k, axis in enumerate(AXES) if axis in spell.axes]
         axes = ", ".join(f"{AXES[k]} {spell.gave[k]:.3g} of {spell.asked[k]:.3g}" for k in places)
         blocks.append(
-            f"{spell.start:.1f} to {spell.end:.1f} s: {axes}; {', '.join(spell.limits) or 'no limit known'}"
+            f"{spell.start:.1f} to {spell.end:.1f} s: {axes}; "
+            f"{', '.join(spell.limits) or 'no limit known'}"
         )
     blocks.append(_replays(judged))
     blocks += [f"{time:.1f} s: {words}" for time, words in judged.events[:MOST_EVENTS]]
     if judged.watts is not None:
-        blocks.append(f"The outputs took {judged.watts:.3g} W on average, by the actuators' own models.")
+        blocks.append(
+            f"The outputs took {judged.watts:.3g} W on average, by the actuators' own models."
+        )
     return to_text(*blocks, *judged.asks, *judged.notes)
 
 
 def _replays(judged: Judgement) -> Table:
-    """Replays on the robot and the improved one, and, with each actuator lost, the best and the log's own."""
+    """Replays on the robot and the improved one, and, with each actuator lost, the best and the
+    log's own."""
     own = {"px4", "ardusub", "" if judged.held_by is None else judged.held_by.name}
     rows: list[Row] = [
         vars(each)
@@ -54,7 +64,9 @@ def _replays(judged: Judgement) -> Table:
         if each.lost is None or each.name in own
     ]
     columns = [Column("robot", "robot"), Column("name", "method")]
-    columns += [Column(axis, axis, "three", unit=unit) for axis, unit in zip(AXES, IMPULSES, strict=True)]
+    columns += [
+        Column(axis, axis, "three", unit=unit) for axis, unit in zip(AXES, IMPULSES, strict=True)
+    ]
     columns += [
         Column("watts", "power", "three", unit="W"),
         Column("saturated_s", "short", "three", unit="s"),
@@ -63,7 +75,8 @@ def _replays(judged: Judgement) -> Table:
 
 
 def picture(judged: Judgement) -> Figure:
-    """Demand and what the outputs gave over time, of each axis asked for, and actuators at limits."""
+    """Demand and what the outputs gave over time, of each axis asked for, and actuators at
+    limits."""
     line = judged.timeline
     names = judged.robot.names
     shown = [k for k in range(6) if judged.asked[k] > 1e-3 * max(judged.asked)] or [0]
@@ -78,7 +91,9 @@ def picture(judged: Judgement) -> Figure:
         axes.set_ylabel(f"{MOTIONS[k]} [{UNITS[k]}]")
     upper[0].legend(loc="upper right", ncols=3, fontsize="small")
     edges = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
-    last.pcolormesh(edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0)
+    last.pcolormesh(
+        edges, np.arange(len(names) + 1), line.limits.T, cmap="Oranges", vmin=0.0, vmax=1.0
+    )
     last.set_yticks(np.arange(len(names)) + 0.5, names, fontsize="x-small")
     last.set(ylabel="at a limit", xlabel="time of the log [s]")
     figure.suptitle(judged.source)

@@ -1,12 +1,12 @@
 """Distance of a robot's wrench from what its plant says, by what is uncertain of its actuators.
 
-Each actuator errs along its force; fins and turning thrusters by as much across it, and fins along their
-shafts where their table tells. With d the wrench of one standard deviation of such an error, the variance of
-the wrench is the sum of d^2 over all that errs by itself; of actuators that err together it is the square of
-the sum, for their common share of the variance.
+Each actuator errs along its force; fins and turning thrusters by as much across it, and fins along
+their shafts where their table tells. With d the wrench of one standard deviation of such an error,
+the variance of the wrench is the sum of d^2 over all that errs by itself; of actuators that err
+together it is the square of the sum, for their common share of the variance.
 
-A layout says what is uncertain (`uncertainty` of an actuator); where it does not, a table tells by its own
-standard deviations and by the error of its grid.
+A layout says what is uncertain (`uncertainty` of an actuator); where it does not, a table tells by
+its own standard deviations and by the error of its grid.
 """
 
 from collections.abc import Hashable
@@ -28,7 +28,8 @@ from finlab.physics.plant import Plant
 from finlab.physics.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
 OF_ONE_TABLE = 0.5
-"""Share of the variance that actuators with one table have together: alike commands have alike errors."""
+"""Share of the variance that actuators with one table have together: alike commands have alike
+errors."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +41,16 @@ class Known:
     floor: float = 0.0
     """The part of it that is there at any force [N]."""
     common: Hashable = None
-    """Source of the error, the same for those that err together; None for one that errs by itself."""
+    """Source of the error, the same for those that err together; None for one that errs by
+    itself."""
     correlation: float = 1.0
     """Share of the variance that these have together."""
     table: GridUncertainty | None = None
     """Tells the deviation at each command, in place of `share` and `floor`."""
 
     def deviation(self, command: Array, size: Array) -> Array:
-        """Returns the standard deviation (N, 2) [N] along each own direction of the force, and along a fin's
-        shaft, at commands (N, 3) that give forces of a size (N,) [N]."""
+        """Returns the standard deviation (N, 2) [N] along each own direction of the force, and
+        along a fin's shaft, at commands (N, 3) that give forces of a size (N,) [N]."""
         if self.table is not None:
             return self.table.deviation(command)
         own = np.hypot(self.share * size, self.floor)
@@ -56,7 +58,8 @@ class Known:
 
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
-    """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
+    """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad
+    table."""
     return _known(layout, layout.stamps)
 
 
@@ -98,8 +101,8 @@ class Source(NamedTuple):
 
 
 def expected_miss(plant: Plant, command: Array) -> Array:
-    """Returns the standard deviation (N, 6) [N, N m] of the wrench of commands (N, n, 3); lost ones (NaN)
-    add nothing."""
+    """Returns the standard deviation (N, 6) [N, N m] of the wrench of commands (N, n, 3); lost ones
+    (NaN) add nothing."""
     variances = [source.variance for source in sources_of_miss(plant, command)]
     return np.sqrt(sum(variances, np.zeros((len(command), 6))))
 
@@ -134,8 +137,8 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
 
 
 def _errors(layout: Layout, place: int, known: Known, command: Array, force: Array) -> Array:
-    """One standard deviation of the errors (N, 3, 3) [N] of an actuator, each a force in its own frame: along
-    its force (N, 3), across it and along the shaft."""
+    """One standard deviation of the errors (N, 3, 3) [N] of an actuator, each a force in its own
+    frame: along its force (N, 3), across it and along the shaft."""
     lost = np.isnan(command[:, 0])
     deviation = known.deviation(np.nan_to_num(command), np.linalg.norm(force, axis=-1))
     deviation = np.where(lost[:, None], 0.0, deviation)

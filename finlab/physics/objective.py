@@ -1,5 +1,5 @@
-"""Costs that an allocation keeps least: mean power in watts, or the paper's effort `J_en`; and the yardstick
-of a robot, with which errors are compared.
+"""Costs that an allocation keeps least: mean power in watts, or the paper's effort `J_en`; and the
+yardstick of a robot, with which errors are compared.
 
 `J_en` is a sum of squares and one product of normalized commands.
 """
@@ -15,15 +15,15 @@ from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant, plant_of
 
 AMPLITUDE, FREQUENCY, ZERO_DIRECTION, PRODUCT = 1.0, 1.0, 0.1, 1.0
-"""Weights of the squares of normalized amplitude, frequency and zero direction, and of amplitude times
-frequency; the paper prints none."""
+"""Weights of the squares of normalized amplitude, frequency and zero direction, and of amplitude
+times frequency; the paper prints none."""
 
 
 def effort_scale(upper: Values) -> Values:
     """What each command is divided by: its own fin's upper limit (..., 3), an array or a tensor.
 
-    One of zero or below, such as that of an arc below zero, would blow up or change the sign: its size
-    counts, and no less than a floor.
+    One of zero or below, such as that of an arc below zero, would blow up or change the sign: its
+    size counts, and no less than a floor.
     """
     return abs(upper).clip(1e-3)
 
@@ -43,8 +43,8 @@ def fin_effort(command: Values, upper: Values) -> Values:
 
 
 def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
-    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Lost fins (NaN)
-    count nothing."""
+    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Lost
+    fins (NaN) count nothing."""
     effort = fin_effort(command, upper)
     return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
 
@@ -79,7 +79,8 @@ class EffortMeter:
 
 
 Name = Literal["power", "effort"]
-"""`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
+"""`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy
+`J_en`."""
 
 
 class PowerMeter:
@@ -109,19 +110,21 @@ def cost_meter(objective: Name, plant: Plant) -> CostMeter:
 
 
 STEPS = (9, 9, 17)
-"""Values of each of its three numbers that an actuator is tried with, evenly spread over its limits."""
+"""Values of each of its three numbers that an actuator is tried with, evenly spread over its
+limits."""
 LEAST_LEVER = 1e-3
-"""Least ratio [m] of the scale of torques to that of forces, for robots whose actuators turn nothing."""
+"""Least ratio [m] of the scale of torques to that of forces, for robots whose actuators turn
+nothing."""
 
 
 def yardstick(layout: Layout) -> Array:
     """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
 
-    F is the root of the sum of squares of the actuators' largest forces, and T is F times the root mean
-    square of their levers: each one's largest torque about the origin over its largest force. So how a force
-    compares with a torque is a matter of where actuators stand, and stays as it is while rates, damage or a
-    tick leave some of them less to give. A robot that gives nothing has F = 1 N. Raises DataError: a fin's
-    force table cannot be read."""
+    F is the root of the sum of squares of the actuators' largest forces, and T is F times the root
+    mean square of their levers: each one's largest torque about the origin over its largest force.
+    So how a force compares with a torque is a matter of where actuators stand, and stays as it is
+    while rates, damage or a tick leave some of them less to give. A robot that gives nothing has F
+    = 1 N. Raises DataError: a fin's force table cannot be read."""
     plant = Plant(layout)
     wrench = np.einsum("kni,niw->knw", plant.force(plant.grid(STEPS)), plant.effectiveness)
     forces = np.linalg.norm(wrench[..., :3], axis=-1).max(axis=0)
@@ -145,7 +148,8 @@ def judged_power(plant: Plant, command: Array) -> Array:
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:
-    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what is lost (NaN)."""
+    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what is lost
+    (NaN)."""
     lost = np.isnan(command).any(axis=-1, keepdims=True)
     return np.asarray(_meter(layout)(np.where(lost, 0.0, command) if lost.any() else command))
 

@@ -1,7 +1,7 @@
 """The plant: what a robot's actuators really do, in numpy and float64.
 
-It judges every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is the
-velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
+It judges every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is
+the velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
 """
 
 from collections.abc import Sequence
@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 
 class Plant:
-    """The actuators of one layout, each with its own law: commands to wrenches and their derivatives."""
+    """The actuators of one layout, each with its own law: commands to wrenches and their
+    derivatives."""
 
     def __init__(self, layout: Layout) -> None:
-        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made. Raises
-        DataError: a fin's force table cannot be read."""
+        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made.
+        Raises DataError: a fin's force table cannot be read."""
         self.layout = layout
         self.n = layout.n
         self.n_fins = layout.n_fins
@@ -47,7 +48,9 @@ class Plant:
         """Wrench (n, 3, 6) of 1 N along the own axes of each actuator."""
         laws = laws_of(layout.actuators)
         # A robot of one law is spared the copies of fancy indexing.
-        self._laws: list[tuple[Any, ActuatorLaw]] = [(slice(None), laws[0][1])] if len(laws) == 1 else laws
+        self._laws: list[tuple[Any, ActuatorLaw]] = (
+            [(slice(None), laws[0][1])] if len(laws) == 1 else laws
+        )
         own = layout.interaction
         self.interaction: AtPlaces | None = None
         """What the actuators do to each other; None where that does not count."""
@@ -64,8 +67,8 @@ class Plant:
         self._inflow: Array | None = None
 
     def at(self, flow: ArrayLike | None) -> Self:
-        """Returns the plant for those who ask it many times at one flow (..., 6); itself where the flow is
-        without effect."""
+        """Returns the plant for those who ask it many times at one flow (..., 6); itself where the
+        flow is without effect."""
         if flow is None or not self.feels_flow:
             return self
         other = copy(self)
@@ -74,8 +77,8 @@ class Plant:
         return other
 
     def counting(self, axes: NDArray[np.bool_]) -> Self:
-        """Returns the plant for those to whom only some axes (6,) of the wrench count, the others being 0;
-        itself where all do."""
+        """Returns the plant for those to whom only some axes (6,) of the wrench count, the others
+        being 0; itself where all do."""
         if axes.all():
             return self
         other = copy(self)
@@ -84,8 +87,8 @@ class Plant:
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
-        """Returns the velocity (..., n, 3) of each actuator's place through the water in its own frame
-        [m/s]; None at rest, or where no force depends on it."""
+        """Returns the velocity (..., n, 3) of each actuator's place through the water in its own
+        frame [m/s]; None at rest, or where no force depends on it."""
         if flow is None:
             return self._inflow
         if not self.feels_flow:
@@ -99,11 +102,12 @@ class Plant:
         return np.asarray(water[..., :3] + np.cross(water[..., 3:], self.layout.position))
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns the wrench that a command causes. Raises CommandError: the shape does not fit the layout,
-        or a value is infinite or partly NaN.
+        """Returns the wrench that a command causes. Raises CommandError: the shape does not fit the
+        layout, or a value is infinite or partly NaN.
 
         Args:
-            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a lost one and gives no force.
+            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a lost one and gives no
+            force.
             flow: (..., 6), or None at rest.
 
         Returns:
@@ -121,11 +125,13 @@ class Plant:
         known = self.interaction
         if known is None:
             return np.zeros((*force.shape[:-2], 6))
-        return known.offset(body_force(force, self.layout.frames), self.met_by_all(flow)) * self.counts
+        return (
+            known.offset(body_force(force, self.layout.frames), self.met_by_all(flow)) * self.counts
+        )
 
     def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted, near
-        forces."""
+        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted,
+        near forces."""
         known = self.interaction
         frames = self.layout.frames
         if known is None:
@@ -138,7 +144,8 @@ class Plant:
         return None if flow is None else self._moved(flow)
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
+        """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see
+        `wrench`."""
         values, lost = self._checked(command)
         force = self.force(values, flow=flow)
         if lost is not None:
@@ -146,7 +153,8 @@ class Plant:
         return force
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be finite."""
+        """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be
+        finite."""
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
@@ -155,7 +163,9 @@ class Plant:
             force[..., places, :] = law.force(command[..., places, :], *_met(law, inflow, places))
         return force
 
-    def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, *, flow: Array | None = None
+    ) -> tuple[Array, Array]:
         """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
         inflow = self.inflow(flow)
         shape = _broadcast(command, inflow)
@@ -172,8 +182,8 @@ class Plant:
         return force
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns wrenches (..., 6) of commands (..., n, 3) without lost ones, and their derivatives
-        (..., 6, 3 n), one actuator after the other."""
+        """Returns wrenches (..., 6) of commands (..., n, 3) without lost ones, and their
+        derivatives (..., 6, 3 n), one actuator after the other."""
         force, jacobian = self.force_and_jacobian(command, flow=flow)
         offset, effectiveness = self.effect(force, flow=flow)
         jacobian = (jacobian @ effectiveness).reshape(*force.shape[:-2], 3 * self.n, 6)
@@ -181,7 +191,8 @@ class Plant:
         return wrench, jacobian.swapaxes(-1, -2)
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a lost one's."""
+        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a lost
+        one's."""
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
@@ -201,8 +212,11 @@ class Plant:
 
     @cached_property
     def is_uncertain(self) -> bool:
-        """Whether something is known of the errors of its forces; see `finlab.physics.expected_miss`."""
-        return self.interaction is not None or any(part.is_uncertain for part in self.layout.actuators)
+        """Whether something is known of the errors of its forces; see
+        `finlab.physics.expected_miss`."""
+        return self.interaction is not None or any(
+            part.is_uncertain for part in self.layout.actuators
+        )
 
     @cached_property
     def blade(self) -> Blade:
@@ -217,7 +231,8 @@ class Plant:
         return size
 
     def feasible(self, command: Array) -> Array:
-        """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else clips."""
+        """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else
+        clips."""
         return feasible(np.asarray(command, np.float64), self.lower, self.upper, self.turns)
 
     @cached_property
@@ -231,7 +246,8 @@ class Plant:
         return bands if bands.any() else None
 
     def rested(self, command: Array) -> Array:
-        """Returns commands (..., n, 3) with those inside a dead band, which give no force, at rest."""
+        """Returns commands (..., n, 3) with those inside a dead band, which give no force, at
+        rest."""
         if self._dead_band is None:
             return command
         from finlab.actuators.propeller import held
@@ -239,8 +255,11 @@ class Plant:
         return held(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
 
     def grid(self, counts: Sequence[int]) -> Array:
-        """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each number."""
-        share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in counts), indexing="ij"), -1)
+        """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each
+        number."""
+        share = np.stack(
+            np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in counts), indexing="ij"), -1
+        )
         return np.asarray(self.lower + share.reshape(-1, 1, 3) * self.width)
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
@@ -253,11 +272,13 @@ class Plant:
             values = np.asarray(command, dtype=np.float64)
         except (TypeError, ValueError):
             raise CommandError(
-                "expected commands as three numbers per actuator, of a fin [rad, Hz, rad], got something else"
+                "expected commands as three numbers per actuator, of a fin [rad, Hz, rad], got "
+                "something else"
             ) from None
         if values.ndim < 2 or values.shape[-2:] != (self.n, 3):
             raise CommandError(
-                f"expected commands (..., {self.n}, 3) for layout {self.layout.name}, got {values.shape}"
+                f"expected commands (..., {self.n}, 3) for layout {self.layout.name}, got "
+                f"{values.shape}"
             )
         if np.isfinite(values).all():
             return values, None
@@ -277,13 +298,14 @@ def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
 
 
 def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
-    """What a law is told beside the commands: the velocities of its actuators' places, where they count."""
+    """What a law is told beside the commands: the velocities of its actuators' places, where they
+    count."""
     return () if inflow is None or not law.feels_flow else (inflow[..., places, :],)
 
 
 def plant_of(layout: Layout) -> Plant:
-    """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a fin's
-    force table cannot be read."""
+    """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a
+    fin's force table cannot be read."""
     return _made(layout, layout.stamps)
 
 

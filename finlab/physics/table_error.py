@@ -1,9 +1,10 @@
-"""The error of a table between its lines, from what every second and every fourth line say of the others.
+"""The error of a table between its lines, from what every second and every fourth line say of the
+others.
 
-What is interpolated from lines twice as far apart misses the lines left out by more than the table itself
-misses what lies between: by 2^p times as much for a smooth quantity and an interpolation of order p
-(Richardson, 1911). Noise of the measurements does not grow with the distance; lines four times as far apart
-tell the two apart.
+What is interpolated from lines twice as far apart misses the lines left out by more than the table
+itself misses what lies between: by 2^p times as much for a smooth quantity and an interpolation of
+order p (Richardson, 1911). Noise of the measurements does not grow with the distance; lines four
+times as far apart tell the two apart.
 """
 
 from collections.abc import Callable
@@ -37,9 +38,10 @@ class TableError(NamedTuple):
 def line_error(
     count: int, order: int, weights: float, missed: Callable[[int], Array | None]
 ) -> tuple[float, float]:
-    """Returns the errors by spacing and by noise along one axis of `count` lines, three or more, by the order
-    of the interpolation and the sum of its squared weights half way between lines; `missed` gives the errors
-    at the lines left out if every second or every fourth one is kept, as shares, or None."""
+    """Returns the errors by spacing and by noise along one axis of `count` lines, three or more, by
+    the order of the interpolation and the sum of its squared weights half way between lines;
+    `missed` gives the errors at the lines left out if every second or every fourth one is kept, as
+    shares, or None."""
     second = _mean_square(missed(2))
     fourth = _mean_square(missed(4)) if count >= FEWEST[1] else 0.0
     far = 4.0**order
@@ -53,8 +55,8 @@ def line_error(
 
 @lru_cache(maxsize=256)
 def thrust_table_error(model: PowerTable) -> tuple[float, float]:
-    """Returns the standard deviation of the force by the rows of a propeller's table, with straight lines
-    between: as a share of the force, and the part that is there at any force [N]."""
+    """Returns the standard deviation of the force by the rows of a propeller's table, with straight
+    lines between: as a share of the force, and the part that is there at any force [N]."""
     command, force, _ = model.columns
     floor = SMALL * float(np.abs(force).max())
 
@@ -73,7 +75,8 @@ def _mean_square(error: Array | None) -> float:
 
 
 ORDER, OPEN_ORDER = 3, 2
-"""Orders of the cubic interpolation around a circle, and on an axis with ends, where slopes are one-sided."""
+"""Orders of the cubic interpolation around a circle, and on an axis with ends, where slopes are
+one-sided."""
 WEIGHTS = 2 * (9 / 16) ** 2 + 2 * (1 / 16) ** 2
 """Sum of its squared weights half way between two lines."""
 SMALL_FORCE = 0.05
@@ -95,7 +98,8 @@ class GridUncertainty:
 
     @cached_property
     def _variances(self) -> Array:
-        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by file and grid."""
+        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by file and
+        grid."""
         square = (self._grid.values[..., :3] ** 2).sum(axis=-1)
         error = self.error
         share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
@@ -108,13 +112,14 @@ class GridUncertainty:
         return HermiteGrids([self._grid._replace(values=self._variances)])
 
     def deviation(self, command: Array) -> Array:
-        """Returns standard deviations (..., 2) [N] of forces across the shaft and along it at commands (...,
-        3)."""
+        """Returns standard deviations (..., 2) [N] of forces across the shaft and along it at
+        commands (..., 3)."""
         return np.asarray(np.sqrt(np.maximum(self._between(command, 1)[..., 0, 0, 0, :], 0.0)))
 
     @cached_property
     def uncertain_share(self) -> float:
-        """The part of the standard deviation across the shaft that grows with the force, as a share of it."""
+        """The part of the standard deviation across the shaft that grows with the force, as a share
+        of it."""
         square = (self._grid.values[..., :3] ** 2).sum(axis=-1)
         variance = self._variances[..., 0]
         away = square - square.mean()
@@ -139,7 +144,8 @@ def grid_error(grid: Grid) -> TableError:
 
 
 def _missed(grid: Grid, axis: int, step: int) -> Array | None:
-    """Errors of forces at the lines of an axis between those kept, over their sizes, in each component."""
+    """Errors of forces at the lines of an axis between those kept, over their sizes, in each
+    component."""
     lines = grid.axes[axis]
     closed = grid.periodic and axis == 2 and len(lines) % step == 0 and len(lines) > step
     kept = np.arange(0, len(lines), step)

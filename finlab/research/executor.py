@@ -1,7 +1,8 @@
-"""An executor of independent parts: this process, several processes, or the workers of a Dask cluster.
+"""An executor of independent parts: this process, several processes, or the workers of a Dask
+cluster.
 
-Results come in the order of the parts, wherever and however often these were computed: a part is one call of
-one function, whose result depends on its argument alone.
+Results come in the order of the parts, wherever and however often these were computed: a part is
+one call of one function, whose result depends on its argument alone.
 """
 
 import logging
@@ -28,7 +29,8 @@ Part = TypeVar("Part")
 Made = TypeVar("Made")
 
 PATIENCE_S = 10.0
-"""How long a scheduler may take to answer, and a cluster that has lost all workers to have another [s]."""
+"""How long a scheduler may take to answer, and a cluster that has lost all workers to have another
+[s]."""
 _client: ContextVar["Client | None"] = ContextVar("client", default=None)
 
 
@@ -41,11 +43,11 @@ def map_parts(
 ) -> Iterator[Made]:
     """Yields `function(part)` of each part, in order.
 
-    Inside `on_cluster` the parts run there, else in at most `jobs` processes, 1 being this one; those still
-    open are dropped when the iteration ends early. A function of a module, or a `partial` of one, and parts
-    that can be pickled can be sent. With a title `what` there is a bar on a terminal's stderr, which counts
-    units. Raises FinlabError: the cluster is gone, a part ends every worker, or a process of this machine
-    has ended; and whatever `function` raises."""
+    Inside `on_cluster` the parts run there, else in at most `jobs` processes, 1 being this one;
+    those still open are dropped when the iteration ends early. A function of a module, or a
+    `partial` of one, and parts that can be pickled can be sent. With a title `what` there is a bar
+    on a terminal's stderr, which counts units. Raises FinlabError: the cluster is gone, a part ends
+    every worker, or a process of this machine has ended; and whatever `function` raises."""
     client = _client.get()
     count = len(parts)
     jobs = min(jobs, count)
@@ -64,8 +66,8 @@ def cores() -> int:
 
 @contextmanager
 def on_cluster(address: str | None) -> Iterator[None]:
-    """Let `map_parts` use the workers of a Dask cluster; nothing changes without an address. FinlabError:
-    nobody answers there, there are no workers, or they have another finlab."""
+    """Let `map_parts` use the workers of a Dask cluster; nothing changes without an address.
+    FinlabError: nobody answers there, there are no workers, or they have another finlab."""
     if address is None:
         yield
         return
@@ -81,7 +83,9 @@ def on_cluster(address: str | None) -> Iterator[None]:
 def _connected(address: str) -> "Client":
     from distributed import Client
 
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is lost is said in a sentence
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # what is lost is said in a sentence
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -97,11 +101,14 @@ def _connected(address: str) -> "Client":
         versions = {"none"}
     except TimeoutError:
         client.close()
-        raise FinlabError(f"cluster: {address} has no workers; start `dask worker {address}`") from None
+        raise FinlabError(
+            f"cluster: {address} has no workers; start `dask worker {address}`"
+        ) from None
     if versions != {_version()}:
         client.close()
         raise FinlabError(
-            f"cluster: expected workers with finlab {_version()}, got {', '.join(sorted(versions))}; install "
+            f"cluster: expected workers with finlab {_version()}, got "
+            f"{', '.join(sorted(versions))}; install "
             "the same one on each machine"
         )
     return client
@@ -112,7 +119,9 @@ def _version() -> str:
     return version
 
 
-def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs: int) -> Iterator[Made]:
+def _by_processes(
+    function: Callable[[Part], Made], parts: Sequence[Part], jobs: int
+) -> Iterator[Made]:
     others = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, context, end_with_parent) as pool:
@@ -122,7 +131,8 @@ def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs:
             yield from made
         except BrokenProcessPool:
             raise FinlabError(
-                "a process that computes parts has ended: give it more memory, or fewer processes; a script "
+                "a process that computes parts has ended: give it more memory, or fewer "
+                "processes; a script "
                 'must be guarded by `if __name__ == "__main__":`'
             ) from None
         finally:
@@ -130,7 +140,9 @@ def _by_processes(function: Callable[[Part], Made], parts: Sequence[Part], jobs:
                 process.terminate()
 
 
-def _by_cluster(client: "Client", function: Callable[[Part], Made], parts: Sequence[Part]) -> Iterator[Made]:
+def _by_cluster(
+    client: "Client", function: Callable[[Part], Made], parts: Sequence[Part]
+) -> Iterator[Made]:
     """Parts of a worker that is lost run again on another one."""
     waiting = deque(client.map(function, parts, pure=False))
     try:
@@ -161,6 +173,8 @@ def _result(client: "Client", future: "Future[Any]") -> Any:
                     ) from None
         return future.result()
     except KilledWorker:
-        raise FinlabError("cluster: a part ended each worker that took it; give them more memory") from None
+        raise FinlabError(
+            "cluster: a part ended each worker that took it; give them more memory"
+        ) from None
     except CancelledError:
         raise FinlabError("cluster: its scheduler is lost; start it and run it again") from None

@@ -1,7 +1,7 @@
 """Random layouts: of fins, as in training, and of actuators of each kind, for held-out splits.
 
-The numbers that define the training distribution (box, fin counts, spread of limits) are here and nowhere
-else.
+The numbers that define the training distribution (box, fin counts, spread of limits) are here and
+nowhere else.
 """
 
 import math
@@ -47,9 +47,9 @@ def random_layout(
 ) -> Layout:
     """Returns a random layout with fins `fin_1`, `fin_2`, ...
 
-    Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
-    limits as in split `limits`. Raises DataError: `outside` is not smaller than `box` in any direction, so no
-    such layout exists.
+    Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets
+    its own limits as in split `limits`. Raises DataError: `outside` is not smaller than `box` in
+    any direction, so no such layout exists.
 
     Args:
         rng: source of randomness.
@@ -71,7 +71,10 @@ def random_layout(
             break
     angle = rng.uniform(-math.pi, math.pi, most)
     own = _varied_limits(rng, most) if limits == "varied" else [Limits()] * most
-    fins = [Fin(f"fin_{i + 1}", tuple(position[i].tolist()), float(angle[i]), own[i]) for i in range(count)]
+    fins = [
+        Fin(f"fin_{i + 1}", tuple(position[i].tolist()), float(angle[i]), own[i])
+        for i in range(count)
+    ]
     return Layout(name=name, actuators=tuple(fins))
 
 
@@ -128,7 +131,8 @@ FAMILIES: dict[str, Numbers] = {
 """Fin model -> its numbers; what is not named stays as it is by default."""
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
-"""Number of fins to learn from -> how often it is drawn; with 2 or 3 there is next to nothing to choose."""
+"""Number of fins to learn from -> how often it is drawn; with 2 or 3 there is next to nothing to
+choose."""
 WIDE_BOX = (1.5 * TRAINING_BOX[0], 1.5 * TRAINING_BOX[1], 2.0 * TRAINING_BOX[2])
 """Largest |x|, |y|, |z| of a fin [m]: as far as split `ood` goes."""
 WIDE: dict[str, Numbers] = {
@@ -157,7 +161,11 @@ Draw = Callable[[np.random.Generator, str, float], Actuator]
 
 
 def random_robot(
-    rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw], each: bool = False
+    rng: np.random.Generator,
+    name: str,
+    count: tuple[int, int],
+    kinds: Sequence[Draw],
+    each: bool = False,
 ) -> Layout:
     """Returns a robot of random actuators `a1`, `a2`, ...
 
@@ -179,8 +187,8 @@ def random_robot(
 def random_jet_robot(
     rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw] | None = None
 ) -> Layout:
-    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most actuators on or
-    near it, of one of several kinds or of all of them (`kinds` when given)."""
+    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most
+    actuators on or near it, of one of several kinds or of all of them (`kinds` when given)."""
     mixed: list[Draw] = [random_thruster, random_azimuth, random_shaft_fin]
     chosen = kinds or ([mixed[k]] if (k := int(rng.integers(4))) < 3 else mixed)
     robot = random_robot(rng, name, count, chosen)
@@ -190,13 +198,17 @@ def random_jet_robot(
         place = _vector(rng.uniform(1.0, 1.8) * half * _unit(rng))
         jet = {} if isinstance(part, Fin) else {"diameter": log_uniform(rng, *DIAMETER)}
         parts.append(replace(part, position=place, **jet))
-    return replace(robot, actuators=tuple(parts), body=Body(hull=Hull("ellipsoid", _vector(2.0 * half))))
+    return replace(
+        robot, actuators=tuple(parts), body=Body(hull=Hull("ellipsoid", _vector(2.0 * half)))
+    )
 
 
 def random_thruster(rng: np.random.Generator, name: str, size: float) -> Thruster:
     """Returns a thruster in any direction, with forces and a power law of its own."""
     most = size * rng.uniform(*STRENGTH)
-    reverse = rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[ONE_WAY, SYMMETRIC, 1.0 - ONE_WAY - SYMMETRIC])
+    reverse = rng.choice(
+        [0.0, 1.0, rng.uniform(0.2, 1.2)], p=[ONE_WAY, SYMMETRIC, 1.0 - ONE_WAY - SYMMETRIC]
+    )
     reaction = rng.uniform(-REACTION, REACTION) * rng.integers(2)
     return Thruster(
         name,
@@ -212,7 +224,12 @@ def random_azimuth(rng: np.random.Generator, name: str, size: float) -> Azimuth:
     """Returns an azimuth about any axis, half of them within an arc."""
     arc = _arc(rng, *ARC) if rng.integers(2) else (-math.pi, math.pi)
     return Azimuth(
-        name, _position(rng), *_across(rng), (0.0, size * rng.uniform(*STRENGTH)), _law(rng), arc=arc
+        name,
+        _position(rng),
+        *_across(rng),
+        (0.0, size * rng.uniform(*STRENGTH)),
+        _law(rng),
+        arc=arc,
     )
 
 
@@ -236,8 +253,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def random_fin_model(
     rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
 ) -> FinModelSpec:
-    """Returns a fin model with random numbers, of one kind (a key of `families`) or of each equally often;
-    numbers that its family does not name stay as they are by default."""
+    """Returns a fin model with random numbers, of one kind (a key of `families`) or of each equally
+    often; numbers that its family does not name stay as they are by default."""
     kind = kind or str(rng.choice(list(families)))
     drawn = {
         name: log_uniform(rng, *ends) if name in LOGARITHMIC else float(rng.uniform(*ends))
@@ -260,7 +277,9 @@ def _unit(rng: np.random.Generator) -> Array:
     return np.asarray(drawn / np.linalg.norm(drawn))
 
 
-def _across(rng: np.random.Generator) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def _across(
+    rng: np.random.Generator,
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """A unit vector, and one across it."""
     axis = _unit(rng)
     across = np.cross(axis, _unit(rng))
@@ -281,8 +300,9 @@ def _law(rng: np.random.Generator) -> PowerLaw:
 
 
 def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], list[FinKind]]:
-    """Returns `count` fins with nominal limits, and as many with limits drawn as in split `limits`; half of
-    the soft ones push alike in all directions. Few, since compiling one takes as long as many answers."""
+    """Returns `count` fins with nominal limits, and as many with limits drawn as in split `limits`;
+    half of the soft ones push alike in all directions. Few, since compiling one takes as long as
+    many answers."""
     models = [random_fin_model(rng, None, WIDE) for _ in range(2 * count)]
     for k, model in enumerate(models):
         if model.type == "soft" and rng.random() < 0.5:
@@ -292,17 +312,21 @@ def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], l
     return nominal, list(zip(models[count:], varied, strict=True))
 
 
-def random_fin_robot(rng: np.random.Generator, kinds: tuple[list[FinKind], list[FinKind]], n: int) -> Layout:
+def random_fin_robot(
+    rng: np.random.Generator, kinds: tuple[list[FinKind], list[FinKind]], n: int
+) -> Layout:
     """Returns a robot of n fins to learn from, of `random_kinds`; none is one that is evaluated.
 
-    Fins are of one kind or each of its own, half of the robots have limits of their own, and a third are
-    symmetric, where fins are equals and only chance can tell them apart.
+    Fins are of one kind or each of its own, half of the robots have limits of their own, and a
+    third are symmetric, where fins are equals and only chance can tell them apart.
     """
     symmetric = rng.random() < 1 / 3
     position, angle = _symmetric_places(rng, n) if symmetric else _places(rng, n)
     source = kinds[not symmetric and rng.random() < 0.5]
     one_kind = symmetric or rng.random() < 0.5
-    chosen = np.full(n, rng.integers(len(source))) if one_kind else rng.integers(len(source), size=n)
+    chosen = (
+        np.full(n, rng.integers(len(source))) if one_kind else rng.integers(len(source), size=n)
+    )
     fins = []
     for i, (place, turn, (model, limits)) in enumerate(
         zip(position, angle, (source[k] for k in chosen), strict=True)
@@ -325,8 +349,12 @@ def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     if kind == 0:  # evenly around
         azimuth = 2.0 * math.pi * np.arange(n) / n + rng.uniform(0.0, 2.0 * math.pi)
         radius = rng.uniform(0.08, 0.35)
-        position = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros(n)], axis=-1)
-        return position, np.asarray(wrapped(azimuth + rng.choice([0.0, rng.uniform(-math.pi, math.pi)])))
+        position = np.stack(
+            [radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros(n)], axis=-1
+        )
+        return position, np.asarray(
+            wrapped(azimuth + rng.choice([0.0, rng.uniform(-math.pi, math.pi)]))
+        )
     half = n // 2
     one, turn = _places(rng, n - half)
     if kind == 1:  # port and starboard: the mirror image of a shaft's azimuth is its negative
@@ -337,4 +365,6 @@ def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
         other = one[:half] * np.array([1.0, 1.0, -1.0])
         turned = turn[:half]
     order = rng.permutation(n)
-    return np.concatenate([one, other])[order], np.asarray(wrapped(np.concatenate([turn, turned])))[order]
+    return np.concatenate([one, other])[order], np.asarray(wrapped(np.concatenate([turn, turned])))[
+        order
+    ]

@@ -1,7 +1,8 @@
-"""A layout with the files that it names, force tables and a hull, as one archive; from strangers, too.
+"""A layout with the files that it names, force tables and a hull, as one archive; from strangers,
+too.
 
-A layout that a stranger sends may name any path. None of them is ever opened: what is read came along with
-it, and is kept under a name made from its content.
+A layout that a stranger sends may name any path. None of them is ever opened: what is read came
+along with it, and is kept under a name made from its content.
 """
 
 import hashlib
@@ -33,8 +34,8 @@ A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
-    """The model of a force table, which is kept in a folder under a name made from its content. FinlabError:
-    it cannot be kept."""
+    """The model of a force table, which is kept in a folder under a name made from its content.
+    FinlabError: it cannot be kept."""
     return FinModelSpec("table", (("path", _kept(content, folder, ".csv")),))
 
 
@@ -46,15 +47,17 @@ def _kept(content: bytes, folder: Path, suffix: str) -> str:
 
 
 def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
-    """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is where its
-    hull is drawn from a shape. Raises DataError: the mesh cannot be read."""
+    """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is
+    where its hull is drawn from a shape. Raises DataError: the mesh cannot be read."""
     hull = None if layout.body is None else layout.body.hull
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
     path = Path(hull.mesh)
     content = read_file(path, LARGEST_TABLE, "the hull's mesh; import it again")
     name = f"hull{path.suffix.lower()}"
-    return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {name: content}
+    return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {
+        name: content
+    }
 
 
 class Opened(NamedTuple):
@@ -69,11 +72,12 @@ class Opened(NamedTuple):
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
-    """The layout in a zip archive: a bundle, or a layout file with the tables and the mesh that it names.
+    """The layout in a zip archive: a bundle, or a layout file with the tables and the mesh that it
+    names.
 
-    These are kept in folders inside `folder`. Raises LayoutError: it is no such archive, its layout is none,
-    or names a table that is not in it; DataError: a bundle that was changed, or a table that cannot be
-    read."""
+    These are kept in folders inside `folder`. Raises LayoutError: it is no such archive, its layout
+    is none, or names a table that is not in it; DataError: a bundle that was changed, or a table
+    that cannot be read."""
     inside = Path(os.path.abspath(source))
     if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         parts = bundle_files_of(content, source)
@@ -85,7 +89,8 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         layouts = [name for name in parts if name.endswith(LAYOUTS)]
         if len(layouts) != 1:
             raise LayoutError(
-                f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or one "
+                f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or "
+                "one "
                 "layout file with its force tables",
                 source=source,
             )
@@ -97,8 +102,8 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
 
 
 def read_design(source: str, content: bytes, folder: Path) -> Opened:
-    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file. Raises
-    LayoutError: it is none of these, or something in it is wrong."""
+    """The layout in a file of any form that `finlab layout convert` reads, which opens no other
+    file. Raises LayoutError: it is none of these, or something in it is wrong."""
     exchange = Exchange()
     text = decoded(content, source, A_DESIGN, LayoutError)
     with under(source=source):
@@ -107,18 +112,18 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
-    """The layout in the content of a file; what it names is taken to be in `folder`, and not looked at.
-    Raises LayoutError: it is no text, or no layout."""
+    """The layout in the content of a file; what it names is taken to be in `folder`, and not looked
+    at. Raises LayoutError: it is no text, or no layout."""
     text = decoded(content, source, A_LAYOUT, LayoutError)
     return layout_in(text, Path(source).suffix, source, folder, may_open=False)
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
-    """A layout from a stranger, which may name any path, and the parts that came along kept in a folder; no
-    other file is opened. These have the paths by which the layout can name them; a file of the same name does
-    where there is no other, since files that are sent at once have lost their folders. Raises LayoutError:
-    the layout, called `source`, names a force table that did not come along; FinlabError: a file cannot be
-    kept, or is no hull."""
+    """A layout from a stranger, which may name any path, and the parts that came along kept in a
+    folder; no other file is opened. These have the paths by which the layout can name them; a file
+    of the same name does where there is no other, since files that are sent at once have lost their
+    folders. Raises LayoutError: the layout, called `source`, names a force table that did not come
+    along; FinlabError: a file cannot be kept, or is no hull."""
     by_name = {Path(path).name: path for path in parts}
 
     def came(path: str) -> str:
@@ -129,7 +134,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     for path in layout.files:
         if (here := came(path)) not in parts:
             raise LayoutError(
-                f"names {Path(path).name!r:.60}, which did not come along; put the layout and its tables, or "
+                f"names {Path(path).name!r:.60}, which did not come along; put the layout and its "
+                "tables, or "
                 "its learned interaction, into one ZIP archive, and open that",
                 source=source,
             )
@@ -142,16 +148,19 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     mesh = came(body.hull.mesh)
     hull = None
     if mesh in parts:
-        hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
+        hull = replace(
+            body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder)
+        )
     missing = () if hull else (Path(mesh).name[-60:],)
     return Opened(replace(layout, body=replace(body, hull=hull)), missing)
 
 
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
-    """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
+    """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its
+    content.
 
-    One of too many triangles is kept with fewer. Raises FinlabError: it is no closed mesh, too large, or
-    cannot be kept."""
+    One of too many triangles is kept with fewer. Raises FinlabError: it is no closed mesh, too
+    large, or cannot be kept."""
     mesh, report = read_mesh(name, content, scale)
     if report.triangles > MAX_FACES:
         fewer = simplified(mesh, MAX_FACES)
@@ -161,9 +170,12 @@ def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
 
 
 def _largest(source: str, name: str) -> int:
-    """Largest size [bytes] of a file; refuses names that lead out of the folder, or that no layout needs."""
+    """Largest size [bytes] of a file; refuses names that lead out of the folder, or that no layout
+    needs."""
     path = PurePosixPath(name)
     known = path.suffix.lower() in (".csv", NETWORK_SUFFIX, *MESH_SUFFIXES, *LAYOUTS)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or not known:
-        raise LayoutError(f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source)
+        raise LayoutError(
+            f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source
+        )
     return MAX_BYTES if name.endswith(LAYOUTS) else LARGEST_TABLE

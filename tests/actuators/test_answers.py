@@ -1,4 +1,5 @@
-"""Answers to prices: worth as much as any command within the limits, and the commands that give them."""
+"""Answers to prices: worth as much as any command within the limits, and the commands that give
+them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -46,7 +47,9 @@ AZIMUTHS = [
 ]
 RUDDERS = [
     Rudder("wide", (-0.6, 0, 0), UP, AHEAD, 0.01, (-0.5, 0.5), aspect_ratio=2.21),
-    Rudder("one side", (-0.6, 0, 0), (0, 1, 0), AHEAD, 0.02, (0.0, 0.3), aspect_ratio=1.0, stall=0.6),
+    Rudder(
+        "one side", (-0.6, 0, 0), (0, 1, 0), AHEAD, 0.02, (0.0, 0.3), aspect_ratio=1.0, stall=0.6
+    ),
 ]
 
 
@@ -76,7 +79,8 @@ def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
 def check(
     group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
 ) -> None:
-    """No command is worth more at random multipliers (6, N) than the answer, and its own command gives it."""
+    """No command is worth more at random multipliers (6, N) than the answer, and its own command
+    gives it."""
     multipliers = prices_of(group, 5.0)
     m = len(group.responses)
     robot = prepared(group, wrench, low, high)
@@ -118,8 +122,12 @@ def test_azimuths_answer_with_what_is_worth_most() -> None:
         check(group, AzimuthLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
 
 
-@pytest.mark.parametrize("flow", [(1.5, 0.0, 0.0), (1.2, 0.2, -0.1), (-0.8, 0.1, 0.0), (1.0, 1.0, 0.3)])
-def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "flow", [(1.5, 0.0, 0.0), (1.2, 0.2, -0.1), (-0.8, 0.1, 0.0), (1.0, 1.0, 0.3)]
+)
+def test_rudders_answer_with_a_lift_that_their_deflections_give(
+    flow: tuple[float, float, float],
+) -> None:
     wrench = columns(RUDDERS)
     frames = np.array([part.frame for part in RUDDERS])
     inflow = frames @ np.array(flow)
@@ -139,7 +147,9 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[floa
         np.testing.assert_allclose((given * across).sum(-1), force[0, :, 0], atol=most.max() * 1e-2)
         drag = np.einsum("ma,maw->w", given - force[0, :, :1] * across, wrench)
         np.testing.assert_allclose(group.beside_of(force)[0], drag, atol=most.max() * 1e-2)
-    np.testing.assert_allclose(group.beside.sum(axis=0), group.beside_of(np.zeros((1, 2, 2)))[0], atol=1e-12)
+    np.testing.assert_allclose(
+        group.beside.sum(axis=0), group.beside_of(np.zeros((1, 2, 2)))[0], atol=1e-12
+    )
 
 
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
@@ -150,7 +160,9 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     group = RudderGroup([part], wrench).at(inflow)
     robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
     price = np.linspace(-3.0, 3.0, 31)
-    rows = np.linalg.pinv(robot.effectiveness[0])  # multipliers at which lift has a price, and drag none
+    rows = np.linalg.pinv(
+        robot.effectiveness[0]
+    )  # multipliers at which lift has a price, and drag none
     found = [answer(robot, rows @ [own, 0.0])[1] for own in price]
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.met(inflow).course[0]
@@ -190,12 +202,18 @@ def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
     core = prepared(group, columns(AZIMUTHS), low, high).core
     rest = np.zeros((1, 3, 2))
     before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
-    for previous, angles in ((before, [3.0, 0.9, 1.2]), (None, [0, 0, 1]), (np.nan * before, [0, 0, 1])):
+    for previous, angles in (
+        (before, [3.0, 0.9, 1.2]),
+        (None, [0, 0, 1]),
+        (np.nan * before, [0, 0, 1]),
+    ):
         np.testing.assert_allclose(core.commands(rest, previous)[0, :, 0], angles, atol=1e-12)
 
 
 def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
-    robot = Layout("robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1]))
+    robot = Layout(
+        "robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1])
+    )
     found = groups_of(robot.actuators, own_effectiveness(robot))
     assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
     assert [len(group.responses) == len(group.forms) == len(places) for places, group in found]

@@ -1,4 +1,5 @@
-"""Laws of thrusters, azimuths and rudders: derivatives, published figures, and what a plant makes of them."""
+"""Laws of thrusters, azimuths and rudders: derivatives, published figures, and what a plant makes
+of them."""
 
 import math
 from typing import Any
@@ -34,7 +35,13 @@ def azimuth(name: str = "a", model: Any = LAW, **changes: Any) -> Azimuth:
 
 
 def rudder(name: str = "r", **changes: Any) -> Rudder:
-    told = {"shaft": (0.0, 0.0, 1.0), "zero": (1.0, 0.0, 0.0), "aspect_ratio": 2.21, **REMUS, **changes}
+    told = {
+        "shaft": (0.0, 0.0, 1.0),
+        "zero": (1.0, 0.0, 0.0),
+        "aspect_ratio": 2.21,
+        **REMUS,
+        **changes,
+    }
     return Rudder(name=name, position=(-0.638, 0.0, 0.0), **told)
 
 
@@ -58,7 +65,9 @@ def random_commands(low: Array, high: Array) -> Array:
 )
 def test_derivatives_are_those_of_finite_differences(law: type[Any], parts: list[Any]) -> None:
     own: ActuatorLaw = law(parts)
-    command = random_commands(np.array([p.lower for p in parts]), np.array([p.upper for p in parts]))
+    command = random_commands(
+        np.array([p.lower for p in parts]), np.array([p.upper for p in parts])
+    )
     inflow = np.random.default_rng(4).normal(0.0, 2.0, command.shape)
     force, jacobian = own.force_and_jacobian(command, inflow)
     np.testing.assert_array_equal(force, own.force(command, inflow))
@@ -66,11 +75,15 @@ def test_derivatives_are_those_of_finite_differences(law: type[Any], parts: list
     step = 1e-6
     for k in range(3):
         move = step * np.eye(3)[k]
-        by_force = (own.force(command + move, inflow) - own.force(command - move, inflow)) / (2.0 * step)
+        by_force = (own.force(command + move, inflow) - own.force(command - move, inflow)) / (
+            2.0 * step
+        )
         ahead, back = (own.power(command + s * move, inflow) for s in (1.0, -1.0))
         scale = 1.0 + np.abs(force).max()
         np.testing.assert_allclose(jacobian[..., k, :], by_force, atol=2e-6 * scale)
-        np.testing.assert_allclose(gradient[..., k], (ahead - back) / (2.0 * step), atol=1e-4, rtol=1e-4)
+        np.testing.assert_allclose(
+            gradient[..., k], (ahead - back) / (2.0 * step), atol=1e-4, rtol=1e-4
+        )
 
 
 def test_commands_within_the_dead_band_give_no_force_and_take_no_power() -> None:
@@ -89,12 +102,18 @@ def test_the_makers_tables_are_met_and_convex(volts: int) -> None:
     fine = np.linspace(force[0], force[-1], 20001)
     watts, marginal = Sides(table).at(fine)
     assert (np.diff(marginal) > 0.0).all()
-    np.testing.assert_allclose(np.gradient(watts, fine)[1:-1], marginal[1:-1], atol=0.05 * marginal.max())
+    np.testing.assert_allclose(
+        np.gradient(watts, fine)[1:-1], marginal[1:-1], atol=0.05 * marginal.max()
+    )
 
 
 @pytest.mark.parametrize(
     ("volts", "forward", "reverse", "rms"),
-    [(12, 0.912, 1.315, (1.3, 2.5)), (16, 0.997, 1.449, (5.0, 9.5)), (20, 1.163, 1.774, (8.5, 10.5))],
+    [
+        (12, 0.912, 1.315, (1.3, 2.5)),
+        (16, 0.997, 1.449, (5.0, 9.5)),
+        (20, 1.163, 1.774, (8.5, 10.5)),
+    ],
 )
 def test_power_laws_of_the_t200_meet_its_tables(
     volts: int, forward: float, reverse: float, rms: tuple[float, float]
@@ -121,7 +140,9 @@ def test_a_rudder_at_zero_inflow_angle_is_the_fin_of_a_torpedo() -> None:
     """Fin of Fossen's Python Vehicle Simulator: 1/2 rho A CL delta U^2 across the fin."""
     law = RudderLaw([rudder(lift_slope=0.5, drag=0.0, stall=1.2)])
     for delta, speed in ((0.1, 1.0), (-0.26, 2.5)):
-        force = law.force(np.array([[delta, 0.0, 0.0]]), np.array([[speed, 0.0, 0.0]])[:, [1, 0, 2]])
+        force = law.force(
+            np.array([[delta, 0.0, 0.0]]), np.array([[speed, 0.0, 0.0]])[:, [1, 0, 2]]
+        )
         expected = 0.5 * 1000.0 * 6.65e-3 * 0.5 * delta * speed**2
         assert force[0, 2] == pytest.approx(expected, rel=1e-12) and force[0, 0] == 0.0
 
@@ -138,7 +159,9 @@ def test_lift_stands_across_the_flow_and_drag_against_it() -> None:
     inflow = np.array([[0.3, 1.5, 0.4]])
     force = law.force(np.array([[math.atan2(0.4, 1.5), 0.0, 0.0]]), inflow)[0]
     pressure = 0.5 * 1000.0 * 6.65e-3 * (1.5**2 + 0.4**2)
-    np.testing.assert_allclose(force, -0.02 * pressure * np.array([0, 1.5, 0.4]) / math.hypot(1.5, 0.4))
+    np.testing.assert_allclose(
+        force, -0.02 * pressure * np.array([0, 1.5, 0.4]) / math.hypot(1.5, 0.4)
+    )
     assert law.power(np.array([[math.atan2(0.4, 1.5), 0.0, 0.0]]), inflow)[0] == pytest.approx(
         0.02 * pressure * math.hypot(1.5, 0.4)
     )
@@ -176,7 +199,9 @@ def test_a_plant_judges_any_mix() -> None:
     torque[:, 0] += 0.02 * force[:, 0]
     torque[:, 3] -= 0.01 * force[:, 3]
     wrench = plant.wrench(command, flow=flow)
-    np.testing.assert_allclose(wrench, np.concatenate([force, torque], axis=-1).sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(
+        wrench, np.concatenate([force, torque], axis=-1).sum(axis=1), atol=1e-12
+    )
     np.testing.assert_allclose(force[:, 0], command[:, 0, :1] * [0.0, 0.6, 0.8])
     angle = command[:, 3, 0]
     size = command[:, 3, 1]
@@ -186,7 +211,9 @@ def test_a_plant_judges_any_mix() -> None:
     moved = plant.linearize(command, flow=flow)[1]
     step = 1e-6 * np.random.default_rng(1).normal(size=command.shape)
     change = plant.wrench(command + step, flow=flow) - plant.wrench(command - step, flow=flow)
-    np.testing.assert_allclose(change, 2.0 * np.einsum("bwk,bk->bw", moved, step.reshape(6, -1)), atol=1e-8)
+    np.testing.assert_allclose(
+        change, 2.0 * np.einsum("bwk,bk->bw", moved, step.reshape(6, -1)), atol=1e-8
+    )
     assert plant.power(command, flow=flow).shape == (6, 5)
     assert plant.power(command)[:, 1] == pytest.approx(0.0)
 

@@ -1,4 +1,5 @@
-"""The kind of actuator that docs/howto/kind.md makes: all of finlab takes it, and only that page knows it."""
+"""The kind of actuator that docs/howto/kind.md makes: all of finlab takes it, and only that page
+knows it."""
 
 import importlib
 import json
@@ -30,8 +31,12 @@ ROOT = Path(__file__).resolve().parents[2]
 def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with the page's block as the module `water_jet`, which is imported and known."""
     folder = tmp_path_factory.mktemp("kind")
-    blocks = re.findall(r"```python.*?\n(.*?)```", (ROOT / "docs/howto/kind.md").read_text(), re.DOTALL)
-    (folder / "water_jet.py").write_text(next(block for block in blocks if "class WaterJet" in block))
+    blocks = re.findall(
+        r"```python.*?\n(.*?)```", (ROOT / "docs/howto/kind.md").read_text(), re.DOTALL
+    )
+    (folder / "water_jet.py").write_text(
+        next(block for block in blocks if "class WaterJet" in block)
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
         importlib.import_module("water_jet")
@@ -62,7 +67,10 @@ def test_it_is_answered_in_and_out_of_reach_and_damaged(boat: Layout) -> None:
     assert weak.command[:, 1] == pytest.approx([10.0, 20.0], abs=1e-6)
     assert "water_jet" in str(weak) and weak.commands["jet_left"].force == pytest.approx(10.0)
     mirrored = boat.part("jet_left").image()
-    assert mirrored.position == boat.part("jet_right").position and mirrored.value("arc") == (-1.0, 1.0)
+    assert mirrored.position == boat.part("jet_right").position and mirrored.value("arc") == (
+        -1.0,
+        1.0,
+    )
 
 
 def test_the_command_line_and_the_runtime_take_it(
@@ -74,18 +82,32 @@ def test_the_command_line_and_the_runtime_take_it(
     steps = [
         ["layout", "show", robot],
         ["allocate", robot, "--wrench", 10, 0, 0, 0, 0, 1, "--weak", "jet_left=0.5"],
-        ["layout", "optimize", robot, "--actuators", *boat.names, "--rounds", 1, "-o", tmp_path / "b.yaml"],
+        [
+            "layout",
+            "optimize",
+            robot,
+            "--actuators",
+            *boat.names,
+            "--rounds",
+            1,
+            "-o",
+            tmp_path / "b.yaml",
+        ],
         ["simulate", robot, "--trajectory", "circle", "--duration", 12, "-o", tmp_path / "swim"],
         ["export", robot, "-o", tmp_path / "bundle", "--graph", tmp_path / "boat.json"],
         ["layout", "convert", robot, tmp_path / "boat.urdf"],
     ]
     script = "import sys, json; from finlab.cli import main\n"
-    script += "if __name__ == '__main__': sys.exit(any([main(step) for step in json.loads(sys.argv[1])]))"
+    script += (
+        "if __name__ == '__main__': sys.exit(any([main(step) for step in json.loads(sys.argv[1])]))"
+    )
     (tmp_path / "steps.py").write_text(script)
     text = json.dumps([list(map(str, step)) for step in steps])
     path = os.pathsep.join((str(home), str(ROOT)))
     known = {**os.environ, "PYTHONPATH": path, "FINLAB_KINDS": "water_jet"}
-    subprocess.run([sys.executable, tmp_path / "steps.py", text], env=known, check=True, timeout=120)
+    subprocess.run(
+        [sys.executable, tmp_path / "steps.py", text], env=known, check=True, timeout=120
+    )
     said = capfd.readouterr().out
     assert "2 water_jets push in 2 of 2 independent directions" in said and "delivered" in said
     assert load_layout(tmp_path / "boat.json") == boat
@@ -133,7 +155,11 @@ def test_all_kinds_keep_the_contract() -> None:
         ('    type = "water_jet"\n', '    type = "water_jet"\n    1 / 0\n', "ZeroDivisionError"),
         ("    LAW = AzimuthLaw\n    GROUP = AzimuthGroup\n", "", "WaterJet lacks LAW, GROUP"),
         ("COMMAND = JetCommand", "COMMAND = ()", "expected a subclass of Command"),
-        ("    def damaged(self, faults):", "    def hurt(self, faults):", "WaterJet lacks damaged()"),
+        (
+            "    def damaged(self, faults):",
+            "    def hurt(self, faults):",
+            "WaterJet lacks damaged()",
+        ),
         ("    def sample(cls):", "    def other(cls):", "WaterJet lacks sample()"),
         ("    position: Place\n", "", "WaterJet lacks position"),
         ('LIMITS = ("arc", "force")', 'LIMITS = ("arc", "push")', "the field 'push' of its LIMITS"),
@@ -142,7 +168,11 @@ def test_all_kinds_keep_the_contract() -> None:
         ("GROUP = AzimuthGroup", "GROUP = Pump", "a subclass of Group, got"),
         ("@dataclass(frozen=True)\nclass WaterJet", "class WaterJet", "WaterJet is no dataclass"),
         ("KINDS[WaterJet.type] = WaterJet", "KINDS['jet'] = WaterJet", "has the type 'water_jet'"),
-        ("KINDS[WaterJet.type] = WaterJet", "KINDS['jet'] = Pump()", "expected a subclass of Actuator"),
+        (
+            "KINDS[WaterJet.type] = WaterJet",
+            "KINDS['jet'] = Pump()",
+            "expected a subclass of Actuator",
+        ),
     ],
 )
 def test_a_module_of_kinds_that_is_none_is_one_sentence(
@@ -169,7 +199,10 @@ def test_a_module_of_kinds_that_is_not_there_is_one_sentence(tmp_path: Path) -> 
         done = subprocess.run(ask, env=known, capture_output=True, text=True, timeout=60)
         assert done.returncode == 2 and done.stderr.count("\n") == 1
         assert "FINLAB_KINDS: the module 'nowhere' cannot be imported" in done.stderr
-    script = "import finlab\ntry: finlab.load_layout\nexcept finlab.errors.FinlabError as error: print(error)"
+    script = (
+        "import finlab\ntry: finlab.load_layout\nexcept finlab.errors.FinlabError as error: "
+        "print(error)"
+    )
     done = subprocess.run(
         [sys.executable, "-c", "import finlab.errors\n" + script], env=known, capture_output=True
     )
@@ -178,4 +211,6 @@ def test_a_module_of_kinds_that_is_not_there_is_one_sentence(tmp_path: Path) -> 
 
 def test_only_the_page_knows_it() -> None:
     sources = [*(ROOT / "finlab").rglob("*.py"), *(ROOT / "webapp").rglob("*.py")]
-    assert not [path for path in sources if re.search(r"water_?jet", path.read_text(), re.IGNORECASE)]
+    assert not [
+        path for path in sources if re.search(r"water_?jet", path.read_text(), re.IGNORECASE)
+    ]

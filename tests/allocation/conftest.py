@@ -20,7 +20,9 @@ def force_table(tmp_path: Path) -> str:
     for amplitude, frequency, direction in grid:
         thrust = 4.737410112522892 * (frequency * math.sin(amplitude)) ** 2
         force = (0.0, thrust * math.cos(direction), thrust * math.sin(direction))
-        rows.append(",".join(f"{value:.12g}" for value in (amplitude, frequency, direction, *force)))
+        rows.append(
+            ",".join(f"{value:.12g}" for value in (amplitude, frequency, direction, *force))
+        )
     path = tmp_path / "forces.csv"
     path.write_text("\n".join(rows) + "\n")
     return str(path)

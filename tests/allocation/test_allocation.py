@@ -1,4 +1,5 @@
-"""Answers to one target and to many are plain data, and each row is what a single call would say."""
+"""Answers to one target and to many are plain data, and each row is what a single call would
+say."""
 
 import copy
 import pickle
@@ -21,7 +22,8 @@ SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 FAR = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
 
 pytestmark = pytest.mark.skipif(
-    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+    not {"default", "paper"} <= set(shipped_checkpoints()),
+    reason="no trained checkpoints in the tree",
 )
 
 
@@ -43,7 +45,11 @@ def test_every_field_counts_but_the_time() -> None:
     ):
         assert replace(result, **changed) != result, changed
     told = result.candidates
-    for candidates, samples in ((replace(told, power=told.power + 1e-12), None), (None, None), (told, told)):
+    for candidates, samples in (
+        (replace(told, power=told.power + 1e-12), None),
+        (None, None),
+        (told, told),
+    ):
         assert result.with_candidates(candidates, samples) != result
     assert result.with_candidates(told, result.samples) == result
     assert result != "an answer" and result is not None
@@ -53,7 +59,11 @@ def test_every_field_counts_but_the_time() -> None:
 
 def test_nan_equals_nan_and_kinds_differ() -> None:
     nan = float("nan")
-    assert equal(nan, nan) and equal(np.array([1.0, nan]), np.array([1.0, nan])) and equal((nan,), (nan,))
+    assert (
+        equal(nan, nan)
+        and equal(np.array([1.0, nan]), np.array([1.0, nan]))
+        and equal((nan,), (nan,))
+    )
     assert (
         not equal(np.array([1.0]), 1.0)
         and not equal((1.0,), (1.0, 2.0))
@@ -90,7 +100,11 @@ def test_another_command_is_judged_anew(search: AnyRobot) -> None:
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
-    assert not other.reachable and other.err_norm > 0.01 > result.err_norm and other.effort < result.effort
+    assert (
+        not other.reachable
+        and other.err_norm > 0.01 > result.err_norm
+        and other.effort < result.effort
+    )
     assert other.wrench_expected is None and other.target is result.target
 
 
@@ -101,9 +115,9 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
     )
     result = quick_allocator("paper").allocate(strange, SURGE)
     assert not result.reachable and result.binding == () and result.unknown_fins == layout.names
-    assert "not reached" not in str(result) and "the method does not know these fins: front_right" in str(
+    assert "not reached" not in str(
         result
-    )
+    ) and "the method does not know these fins: front_right" in str(result)
     for method in ("dual", "sqp"):
         known = Allocator(strange, method).allocate(SURGE)
         assert known.reachable and known.unknown_fins == ()
@@ -115,14 +129,19 @@ def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) 
     layout = load_layout("A")
     table = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))
     tables = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
-    for answer in (allocator.allocate, lambda *asked, **how: allocator.allocate_batch(*asked, **how)):
+    for answer in (
+        allocator.allocate,
+        lambda *asked, **how: allocator.allocate_batch(*asked, **how),
+    ):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
             answer(tables, SURGE if answer == allocator.allocate else [SURGE], lost=["front_left"])
 
 
 def test_an_axis_that_nothing_drives_is_told_where_it_is_asked_for() -> None:
     allocator = Allocator(load_layout("no_yaw"))
-    assert any("no actuator gives Tz" in note for note in allocator.allocate([1, 0, 0.5, 0, 0, 0.1]).notes)
+    assert any(
+        "no actuator gives Tz" in note for note in allocator.allocate([1, 0, 0.5, 0, 0, 0.1]).notes
+    )
     assert not any("no actuator" in note for note in allocator.allocate([1, 0, 0.5, 0, 0, 0]).notes)
 
 
@@ -147,7 +166,9 @@ def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
     batch = allocator.allocate_batch(layout, targets)
     errors = np.array([allocator.allocate(layout, target).err_norm for target in targets])
     np.testing.assert_allclose(batch.err_norm, errors, rtol=1e-6, atol=1e-5)
-    weighted = allocator.allocate_batch(layout, targets, policy=Policy(axis_weights=(1, 1, 10, 1, 1, 1)))
+    weighted = allocator.allocate_batch(
+        layout, targets, policy=Policy(axis_weights=(1, 1, 10, 1, 1, 1))
+    )
     heave = np.abs(weighted.unallocated[:, 2]) - np.abs(batch.unallocated[:, 2])
     assert (heave <= 1e-2).all() and heave.min() < -0.01
 
@@ -157,7 +178,13 @@ def test_empty_batches_have_the_shapes_of_full_ones(method: str) -> None:
     layout = load_layout("A")
     batch = quick_allocator(method).allocate_batch(layout, np.empty((0, 6)))
     assert batch.command.shape == batch.forces.shape == (0, 4, 3) and batch.wrench.shape == (0, 6)
-    assert batch.err_norm.shape == batch.effort.shape == batch.solve_ms.shape == batch.reachable.shape == (0,)
+    assert (
+        batch.err_norm.shape
+        == batch.effort.shape
+        == batch.solve_ms.shape
+        == batch.reachable.shape
+        == (0,)
+    )
 
 
 @pytest.mark.parametrize("method", OF_FINS)
@@ -166,7 +193,9 @@ def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
     strange = layout.replace_actuator("back_left", model=FinModelSpec("lighthill"))
     batch = quick_allocator(method).allocate_batch(strange, wrenches(2))
     assert batch.unknown_fins == (("back_left",) if method == "paper" else ())
-    assert len(batch.notes) == len(batch.unknown_fins) and all("back_left" in note for note in batch.notes)
+    assert len(batch.notes) == len(batch.unknown_fins) and all(
+        "back_left" in note for note in batch.notes
+    )
 
 
 def test_a_method_that_does_not_know_the_policy_says_so_at_once() -> None:

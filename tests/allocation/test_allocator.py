@@ -1,4 +1,5 @@
-"""What every method has in common: problems are checked, lost fins left out, answers judge themselves."""
+"""What every method has in common: problems are checked, lost fins left out, answers judge
+themselves."""
 
 import math
 from dataclasses import replace
@@ -36,7 +37,9 @@ class Drawn(LeastErrorMethod):
 
     def _solve(self, targets: np.ndarray, *, seed: int, previous: np.ndarray | None) -> Solution:
         self.asked.append((self.layout, previous))
-        seeds = [np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets]
+        seeds = [
+            np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets
+        ]
         share = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
         command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
         few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
@@ -53,17 +56,24 @@ def method() -> AnyRobot:
     ("wrench", "sentence"),
     [
         ([math.nan] * 6, "wrench: Fx must be a number of at most 1e+06 in size, got nan"),
-        ([1, 0, 0, 0, 0, -math.inf], "Tz must be a number of at most 1e+06 in size, got -inf; an axis"),
+        (
+            [1, 0, 0, 0, 0, -math.inf],
+            "Tz must be a number of at most 1e+06 in size, got -inf; an axis",
+        ),
         ([1, 2e6, 0, 0, 0, 0], "Fy must be a number of at most 1e+06 in size, got 2000000.0"),
         ([10**400, 0, 0, 0, 0, 0], "wrench: expected six numbers"),
         (
             [1, 0, 0],
-            "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got an array of shape (3,)",
+            "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got an array of "
+            "shape (3,)",
         ),
         ([], "got an array of shape (0,)"),
         (1.0, "got an array of shape ()"),
         ([SURGE, SURGE], "got an array of shape (2, 6)"),
-        ("forward", "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got 'forward'"),
+        (
+            "forward",
+            "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got 'forward'",
+        ),
         (["a", 0, 0, 0, 0, 0], "wrench: expected six numbers"),
         ([[1, 2], 3, 4, 5, 6, 7], "wrench: expected six numbers"),
         ({"Fx": 1}, "wrench: expected six numbers"),
@@ -85,10 +95,18 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
 @pytest.mark.parametrize(
     ("options", "kind", "sentence"),
     [
-        ({"lost": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
+        (
+            {"lost": ["bow", "keel"]},
+            LayoutError,
+            "robot has no fin 'keel', it has bow, left, stern",
+        ),
         ({"lost": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
         ({"lost": "bow"}, AllocationError, r"expected a list of names, got the text 'bow'; write"),
-        ({"previous": np.zeros((4, 3))}, CommandError, r"previous: expected a command of shape \(3, 3\) for"),
+        (
+            {"previous": np.zeros((4, 3))},
+            CommandError,
+            r"previous: expected a command of shape \(3, 3\) for",
+        ),
         ({"previous": "rest"}, CommandError, "previous: "),
         ({"previous": [[math.inf] * 3] * 3}, CommandError, "previous: "),
     ],
@@ -180,7 +198,9 @@ def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
         Allocator(ROBOT, "dual", "default")  # type: ignore[misc]
     with pytest.raises(AllocationError, match="checkpoint: method 'dual' has no networks, only"):
         Allocator(ROBOT, checkpoint="default")
-    with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
+    with pytest.raises(
+        AllocationError, match="layout: expected a Layout, got 'A'; read a file with"
+    ):
         Allocator("A")  # type: ignore[arg-type]
 
 
@@ -201,7 +221,9 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
 
 @pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp", "paper_sqp", "fixed_frequency"])
 def test_a_thruster_is_named_with_its_type(method: str) -> None:
-    with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
+    with pytest.raises(
+        LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"
+    ):
         finlab.Allocator(load_layout("turtle_hybrid"), method)
 
 

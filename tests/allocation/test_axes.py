@@ -23,7 +23,8 @@ POLICIES = ("closest", "direction", "priority")
 
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize(
-    ("name", "surge"), [("bluerov2", 20.0), ("torpedo", 60.0), ("catamaran", 60.0), ("bluerov2", 0.2)]
+    ("name", "surge"),
+    [("bluerov2", 20.0), ("torpedo", 60.0), ("catamaran", 60.0), ("bluerov2", 0.2)],
 )
 def test_an_axis_that_nobody_commands_decides_nothing(name: str, surge: float, policy: str) -> None:
     answer = Allocator(load_layout(name)).allocate([surge, 0, 0, 0, 0, 0], policy=policy)
@@ -44,14 +45,18 @@ def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
     np.testing.assert_allclose(one.unallocated, 0.0, atol=1e-7)
     held = allocator.allocate([20.0, 0, 0, 0, 0, 0], policy=policy)
     assert one.power <= held.power * (1.0 + 1e-9)
-    robot = Allocator(replace(layout, axes=("Fx",))).allocate([20.0, 1.0, 2.0, 3.0, 4.0, 5.0], policy=policy)
+    robot = Allocator(replace(layout, axes=("Fx",))).allocate(
+        [20.0, 1.0, 2.0, 3.0, 4.0, 5.0], policy=policy
+    )
     np.testing.assert_allclose(robot.command, one.command, atol=1e-9)
 
 
 def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
     plant = OwnPlant(parts := layout_of("r", _three_thrusters()))
     answer = Allocator(parse_layout(parts)).allocate([12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",))
-    watts = [lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)]
+    watts = [
+        lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)
+    ]
     assert answer.power <= min(watts) * (1.0 + 1e-6)
     assert answer.power >= min(watts) * (1.0 - 1e-2)
 
@@ -101,7 +106,9 @@ def test_what_is_no_number_is_an_error_that_names_free(value: float | None) -> N
 def test_an_axis_that_cannot_be_held_is_named() -> None:
     layout = load_layout("bluerov2")
     answer = Allocator(replace(layout, axes=AXES)).allocate([20.0, 0, 0, 0, 0, 0])
-    assert any("Fx, Ty apart" in note or "Fx and Ty apart" in note for note in answer.notes), answer.notes
+    assert any("Fx, Ty apart" in note or "Fx and Ty apart" in note for note in answer.notes), (
+        answer.notes
+    )
     asked = Allocator(layout).allocate([20.0, 0, 0, 0, 3.0, 0])
     assert any("Ty" in note and "not command" in note for note in asked.notes), asked.notes
 
@@ -124,7 +131,9 @@ def test_axes_in_files() -> None:
         parse_layout(layout_to_dict(layout) | {"axes": ["surge"]})
 
 
-def test_the_command_line_and_json_say_which_axes_are_free(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_and_json_say_which_axes_are_free(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     wrench = ["20", "0", "0", "0", "3", "0", "--free", "Ty"]
     assert main(["allocate", "bluerov2_heavy", "--wrench", *wrench, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)

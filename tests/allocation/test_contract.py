@@ -1,7 +1,8 @@
-"""What every method promises of every answer: kinds of robot, damage, policies and ticks in one table.
+"""What every method promises of every answer: kinds of robot, damage, policies and ticks in one
+table.
 
-The judge is `tests/own_plant.py`, a second set of laws, for robots that are whole or have lost actuators; of
-others the limits that damage leaves are checked.
+The judge is `tests/own_plant.py`, a second set of laws, for robots that are whole or have lost
+actuators; of others the limits that damage leaves are checked.
 """
 
 import copy
@@ -86,13 +87,13 @@ def damaged(layout: Layout, word: str) -> Damage | None:
 SLOW_METHODS = ("ipopt", "paper", "sqp", "paper_sqp", "qp")
 """Methods that take so long that a share of their cases is asked every day."""
 ROWS_ALONE = ("mdn", "paper", "ipopt", "sqp", "paper_sqp", "qp")
-"""Methods whose rows share starts, time or single precision: many wrenches get answers as good as each alone,
-which are not the same numbers."""
+"""Methods whose rows share starts, time or single precision: many wrenches get answers as good as
+each alone, which are not the same numbers."""
 
 
 def cases_of(method: str) -> list[Any]:
-    """The kinds of robot that a method takes, whole and damaged; of the default method whole and with a lost
-    actuator each of them every day, of all else a share."""
+    """The kinds of robot that a method takes, whole and damaged; of the default method whole and
+    with a lost actuator each of them every day, of all else a share."""
     always = list[Any]()
     others = list[Any]()
     for kind in KINDS:
@@ -121,9 +122,11 @@ class Question:
     """A command (n, 3) that gives the wrench; None where none has to."""
 
 
-def questions(method: str, allocator: Allocator, robot: Robot, damage: Damage) -> Iterator[Question]:
-    """What is asked: each policy of the method, within reach and beyond, outside of ticks and in one, with
-    all axes and with one that is free."""
+def questions(
+    method: str, allocator: Allocator, robot: Robot, damage: Damage
+) -> Iterator[Question]:
+    """What is asked: each policy of the method, within reach and beyond, outside of ticks and in
+    one, with all axes and with one that is free."""
     layout = damage.applied_to(allocator.layout)
     plant = plant_of(layout).at(robot.flow)
     lost = [name in damage.lost for name in layout.names]
@@ -198,7 +201,9 @@ def test_many_wrenches_get_the_answers_of_each(method: str, kind: str, word: str
         assert (batch.wrench_expected is not None) == (method == "paper")
         check_frozen(batch)
         for row, wrench in enumerate(wrenches):
-            check_row(batch, row, allocator.allocate(wrench, **asked), alike=method not in ROWS_ALONE)
+            check_row(
+                batch, row, allocator.allocate(wrench, **asked), alike=method not in ROWS_ALONE
+            )
     assert pickle.loads(pickle.dumps(batch)) == batch
 
 
@@ -209,11 +214,15 @@ def check_row(batch: BatchAllocation, row: int, answer: Allocation, alike: bool)
         np.testing.assert_allclose(batch.command[row], answer.command, rtol=1e-9, atol=1e-9)
         for figure in ("wrench", "forces", "unallocated", "err_norm", "power", "expected_error"):
             told = getattr(batch, figure)[row]
-            np.testing.assert_allclose(told, getattr(answer, figure), rtol=1e-9, atol=1e-9, err_msg=figure)
+            np.testing.assert_allclose(
+                told, getattr(answer, figure), rtol=1e-9, atol=1e-9, err_msg=figure
+            )
     else:
         works = ~np.isnan(answer.command).any(axis=1)
         command = batch.command[row][works]
-        assert (command >= batch.layout.lower[works]).all() and (command <= batch.layout.upper[works]).all()
+        assert (command >= batch.layout.lower[works]).all() and (
+            command <= batch.layout.upper[works]
+        ).all()
         error = np.linalg.norm((batch.target[row] - batch.wrench[row]) / batch.scale)
         assert batch.err_norm[row] == pytest.approx(error, rel=1e-9, abs=1e-12)
     if batch.bound is not None:
@@ -221,7 +230,8 @@ def check_row(batch: BatchAllocation, row: int, answer: Allocation, alike: bool)
 
 
 def check_answer(answer: Allocation, robot: Robot, word: str) -> None:
-    """Commands are within limits, those that are lost get none, and their wrench is that of the laws."""
+    """Commands are within limits, those that are lost get none, and their wrench is that of the
+    laws."""
     layout = answer.layout
     lost = np.array([name in answer.damage.lost for name in layout.names])
     assert np.isnan(answer.command[lost]).all() and np.isfinite(answer.command[~lost]).all()
@@ -233,22 +243,29 @@ def check_answer(answer: Allocation, robot: Robot, word: str) -> None:
     if word in ("whole", "lost"):
         command = robot.plant.commands_of(answer)
         size = np.abs(answer.forces).sum()
-        np.testing.assert_allclose(answer.wrench, robot.plant.wrench(command), rtol=1e-9, atol=1e-9 * size)
+        np.testing.assert_allclose(
+            answer.wrench, robot.plant.wrench(command), rtol=1e-9, atol=1e-9 * size
+        )
         assert answer.power == pytest.approx(robot.plant.power(command), rel=1e-9, abs=1e-12)
     for place, part in enumerate(layout.actuators):
         if part.type != "thruster":
             continue
         force = answer.command[place, 0]
         if abs(force) < part.dead_band and answer.previous is None:
-            assert not answer.forces[place].any() and force == np.clip(0.0, part.lower[0], part.upper[0])
+            assert not answer.forces[place].any() and force == np.clip(
+                0.0, part.lower[0], part.upper[0]
+            )
 
 
 def check_figures(answer: Allocation, wrench: Array, free: tuple[str, ...]) -> None:
-    """What is missing, the error, the verdict and the bound are what the wrench and the target say."""
+    """What is missing, the error, the verdict and the bound are what the wrench and the target
+    say."""
     counts = np.array([axis in answer.layout.axes and axis not in free for axis in AXES])
     np.testing.assert_array_equal(answer.target, np.where(counts, wrench, np.nan))
     missing = np.where(counts, wrench - answer.wrench, 0.0)
-    np.testing.assert_allclose(answer.unallocated, missing, rtol=0.0, atol=1e-12 * np.abs(wrench).max())
+    np.testing.assert_allclose(
+        answer.unallocated, missing, rtol=0.0, atol=1e-12 * np.abs(wrench).max()
+    )
     error = np.linalg.norm(missing / answer.scale)
     assert answer.err_norm == pytest.approx(error, rel=1e-9, abs=1e-12)
     assert answer.reachable == (answer.err_norm <= 1e-3)
@@ -258,8 +275,8 @@ def check_figures(answer: Allocation, wrench: Array, free: tuple[str, ...]) -> N
 
 
 def check_default(answer: Allocation, question: Question, robot: Robot, word: str) -> None:
-    """The default method delivers what can be, at no more power than a command that is known to, and no
-    command of a tick has changed faster than its drive can, angles the shorter way round."""
+    """The default method delivers what can be, at no more power than a command that is known to,
+    and no command of a tick has changed faster than its drive can, angles the shorter way round."""
     if question.known is not None:
         assert answer.err_norm <= 1e-5
         if word in ("whole", "lost"):
@@ -275,7 +292,9 @@ def check_default(answer: Allocation, question: Question, robot: Robot, word: st
         turns = np.isclose(np.array(part.upper) - np.array(part.lower), 2.0 * math.pi)
         change[turns] = np.minimum(change, np.abs(2.0 * math.pi - change))[turns]
         most = np.array(part.rates) * period_s
-        assert (change <= most * (1.0 + 1e-9) + 1e-9).all(), f"{part.name}: {old} to {new} in {most}"
+        assert (change <= most * (1.0 + 1e-9) + 1e-9).all(), (
+            f"{part.name}: {old} to {new} in {most}"
+        )
 
 
 def check_frozen(answer: Allocation | BatchAllocation) -> None:

@@ -36,7 +36,9 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
 
 
 @pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
-def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: Layout, kind: str) -> None:
+def test_a_torn_fin_gives_its_share_at_every_command(
+    search: AnyRobot, penta: Layout, kind: str
+) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout = replace(penta, actuators=fins)
     bow = penta.index("bow")
@@ -52,7 +54,9 @@ def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: La
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
     with pytest.raises(LayoutError, match="cannot be scaled"):
         FinModelSpec("table", (("path", "fin.csv"),)).scaled(0.5)
-    with pytest.raises(AllocationError, match="damage: torn bow: expected a number of at most 1, got 1.5"):
+    with pytest.raises(
+        AllocationError, match="damage: torn bow: expected a number of at most 1, got 1.5"
+    ):
         Damage(torn={"bow": 1.5})
 
 
@@ -75,8 +79,12 @@ def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -
 def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
     name = penta.names[1]
     result = search.allocate(penta, TARGET, lost=[name], damage=Damage(stuck={"bow": 0.2}))
-    assert np.isnan(result.command[1]).all() and result.command[penta.index("bow"), 2] == pytest.approx(0.2)
-    batch = search.allocate_batch(penta, [TARGET] * 2, lost=[name], damage=Damage(stuck={"bow": 0.2}))
+    assert np.isnan(result.command[1]).all() and result.command[
+        penta.index("bow"), 2
+    ] == pytest.approx(0.2)
+    batch = search.allocate_batch(
+        penta, [TARGET] * 2, lost=[name], damage=Damage(stuck={"bow": 0.2})
+    )
     assert batch.command[:, penta.index("bow"), 2] == pytest.approx(0.2)
 
 
@@ -102,16 +110,28 @@ def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
 
 def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
     wrench = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
-    damage = ["--weak", "front_left=0.5", "--stuck", "back_left=30", "--running", "back_right=0.3,1,90"]
+    damage = [
+        "--weak",
+        "front_left=0.5",
+        "--stuck",
+        "back_left=30",
+        "--running",
+        "back_right=0.3,1,90",
+    ]
     assert main(["allocate", "A", *wrench, *damage]) == 0
     printed = capsys.readouterr().out
     assert "30.0" in printed
-    for wrong in (["--weak", "front_left"], ["--stuck", "front_left=up"], ["--running", "back_left=1,2"]):
+    for wrong in (
+        ["--weak", "front_left"],
+        ["--stuck", "front_left=up"],
+        ["--running", "back_left=1,2"],
+    ):
         assert f"{wrong[0][2:]}: expected NAME=" in refused(["allocate", "A", *wrench, *wrong])
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": ()}}, {"weak": 3}]
+    "wrong",
+    [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": ()}}, {"weak": 3}],
 )
 def test_damage_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
     with pytest.raises(AllocationError, match="damage: .*expected .*, got "):
@@ -140,7 +160,8 @@ def test_a_stuck_fin_is_held_at_the_turn_within_its_limits(
 
 
 @pytest.mark.parametrize(
-    ("share", "amplitude", "frequency"), [(0.6, (0.1, 0.3), (1.0, 1.2)), (0.1, (0.05, 0.05), (0.2, 0.2))]
+    ("share", "amplitude", "frequency"),
+    [(0.6, (0.1, 0.3), (1.0, 1.2)), (0.1, (0.05, 0.05), (0.2, 0.2))],
 )
 def test_what_is_left_of_a_weak_fins_limits(
     penta: Layout, share: float, amplitude: tuple[float, float], frequency: tuple[float, float]

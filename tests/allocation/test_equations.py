@@ -1,4 +1,5 @@
-"""Comments of the core and of the allocation cite equations of docs/theory/method.md that are there."""
+"""Comments of the core and of the allocation cite equations of docs/theory/method.md that are
+there."""
 
 import re
 from pathlib import Path

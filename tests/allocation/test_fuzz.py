@@ -1,4 +1,5 @@
-"""Any robot that a layout may describe gets an answer: within its limits, finite, its error told as it is."""
+"""Any robot that a layout may describe gets an answer: within its limits, finite, its error told as
+it is."""
 
 import warnings
 from functools import cache
@@ -36,7 +37,9 @@ def pick(rng: np.random.Generator, values: Any) -> Any:
 
 def policy(rng: np.random.Generator) -> Policy:
     kind = pick(rng, ("closest", "closest", "direction", "priority"))
-    weights = pick(rng, ((1.0,) * 6, (1.0, 0.0, 1e-6, 1.0, 1e6, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)))
+    weights = pick(
+        rng, ((1.0,) * 6, (1.0, 0.0, 1e-6, 1.0, 1e6, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    )
     return Policy(kind, axis_weights=weights if kind == "closest" else (1.0,) * 6)
 
 
@@ -82,7 +85,9 @@ def ask(seed: int) -> None:
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
     anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
     target = np.clip(
-        pick(rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)), -1e6, 1e6
+        pick(rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)),
+        -1e6,
+        1e6,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -96,9 +101,15 @@ def ask(seed: int) -> None:
         batch = allocator.allocate_batch(
             robot, [target, 0.3 * target], policy=how, lost=asked.get("lost", ())
         )
-    for found, limited in ((result.command, result.layout), *((each, robot) for each in batch.command)):
+    for found, limited in (
+        (result.command, result.layout),
+        *((each, robot) for each in batch.command),
+    ):
         works = [fin not in result.lost for fin in robot.names]
-        assert np.isfinite(found[works]).all() and np.isnan(np.delete(found, np.flatnonzero(works), 0)).all()
+        assert (
+            np.isfinite(found[works]).all()
+            and np.isnan(np.delete(found, np.flatnonzero(works), 0)).all()
+        )
         assert ((found >= limited.lower) & (found <= limited.upper))[works].all()
     healthy = result.layout.without(result.lost) if result.lost else result.layout
     wrench = plant_of(healthy).wrench(result.command[works])

@@ -1,5 +1,5 @@
-"""Thrusters and pods that hang at a command: it is the only one that they have, and the others make up for
-it, whatever the method, by the laws of the whole robot."""
+"""Thrusters and pods that hang at a command: it is the only one that they have, and the others make
+up for it, whatever the method, by the laws of the whole robot."""
 
 import math
 
@@ -82,7 +82,11 @@ def hangs(rng: np.random.Generator, part: Actuator) -> tuple[Damage, Array]:
     if isinstance(part, Azimuth):
         angle = float(rng.uniform(*part.arc))
         return Damage(running={part.name: (angle, force)}), np.array([angle, force, 0.0])
-    damage = Damage(stuck={part.name: force}) if rng.random() < 0.5 else Damage(running={part.name: (force,)})
+    damage = (
+        Damage(stuck={part.name: force})
+        if rng.random() < 0.5
+        else Damage(running={part.name: (force,)})
+    )
     return damage, np.array([force, 0.0, 0.0])
 
 
@@ -149,14 +153,18 @@ def test_power_of_what_hangs_counts_as_it_is() -> None:
 
 def test_jets_of_one_that_hangs_count() -> None:
     layout = load_layout("bluerov2_heavy")
-    jets = Layout(layout.name, layout.actuators, body=layout.body, axes=layout.axes, interaction=Jets())
+    jets = Layout(
+        layout.name, layout.actuators, body=layout.body, axes=layout.axes, interaction=Jets()
+    )
     banded = jets.replace_actuator(layout.names[0], dead_band=3.0)
     for robot_of, force in ((jets, 10.0), (jets, 0.0), (jets, -8.0), (banded, 2.0)):
         result = Allocator(robot_of).allocate(
             [5.0, 2.0, 3.0, 0.0, 0.1, 0.5], damage=Damage(stuck={layout.names[0]: force})
         )
         assert result.err_norm < 1e-5 and result.command[0, 0] == force
-        np.testing.assert_allclose(plant_of(robot_of).wrench(result.command), result.wrench, atol=1e-12)
+        np.testing.assert_allclose(
+            plant_of(robot_of).wrench(result.command), result.wrench, atol=1e-12
+        )
 
 
 def test_a_propeller_that_hangs_is_the_same_propeller() -> None:
@@ -174,7 +182,9 @@ def test_no_file_says_that_a_thruster_hangs() -> None:
     with pytest.raises(LayoutError, match="force_n of thruster .*: must include 0"):
         parse_layout(data)
     with pytest.raises(LayoutError, match="unknown key"):
-        parse_layout({**layout_to_dict(layout), "actuators": [{**data["actuators"][0], "hangs": True}]})
+        parse_layout(
+            {**layout_to_dict(layout), "actuators": [{**data["actuators"][0], "hangs": True}]}
+        )
 
 
 def test_damage_known_of_a_thruster_that_sticks() -> None:
@@ -186,9 +196,13 @@ def test_damage_known_of_a_thruster_that_sticks() -> None:
 
 def test_texts_give_degrees_and_newtons_by_what_they_are_of() -> None:
     rng = np.random.default_rng(3)
-    layout = Layout("mixed", (thruster(rng, "screw", 0.0), pod(rng, "pod", 0.0), thruster(rng, "other", 0.0)))
+    layout = Layout(
+        "mixed", (thruster(rng, "screw", 0.0), pod(rng, "pod", 0.0), thruster(rng, "other", 0.0))
+    )
     damage = Damage.parse(layout, stuck=["screw=-5", "pod=20"], running=["other=7"])
-    assert damage == Damage(stuck={"screw": -5.0, "pod": math.radians(20.0)}, running={"other": (7.0,)})
+    assert damage == Damage(
+        stuck={"screw": -5.0, "pod": math.radians(20.0)}, running={"other": (7.0,)}
+    )
     running = Damage.parse(layout, running=["pod=-30,8"])
     assert running == Damage(running={"pod": (math.radians(-30.0), 8.0)})
     with pytest.raises(
@@ -208,5 +222,9 @@ def test_the_command_line_takes_the_force_at_which_a_thruster_hangs(
     assert "12.000 N" in capsys.readouterr().out
     assert main([*words, "--running", f"{name}=-9"]) == 0
     assert "-9.000 N" in capsys.readouterr().out
-    assert "which is what this thruster can give, got 90 N" in refused([*words, "--stuck", f"{name}=90"])
-    assert f"of the thruster '{name}', got '{name}=1,2'" in refused([*words, "--running", f"{name}=1,2"])
+    assert "which is what this thruster can give, got 90 N" in refused(
+        [*words, "--stuck", f"{name}=90"]
+    )
+    assert f"of the thruster '{name}', got '{name}=1,2'" in refused(
+        [*words, "--running", f"{name}=1,2"]
+    )

@@ -91,11 +91,14 @@ STRONG = {
 def test_strong_fins_on_long_levers_give_numbers(
     model: FinModelSpec, limits: Limits, search: AnyRobot
 ) -> None:
-    """Their derivatives are large and of too low a rank: without a relative ridge a step is no number.
+    """Their derivatives are large and of too low a rank: without a relative ridge a step is no
+    number.
 
     The force of soft fins at their upper limits is nothing beside their largest.
     """
-    layout = Layout("far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits, model) for i in range(3)))
+    layout = Layout(
+        "far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits, model) for i in range(3))
+    )
     problem = problem_of(search, layout)
     target = 1e3 * np.random.default_rng(0).normal(size=(200, 6))
     with warnings.catch_warnings():
@@ -115,7 +118,9 @@ def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
 
 def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
     problem = problem_of(search, HOSTILE["no width"])
-    refined = refine(problem, np.random.default_rng(0).normal(size=(10, 6)), draw(problem, 10, 1), 10)
+    refined = refine(
+        problem, np.random.default_rng(0).normal(size=(10, 6)), draw(problem, 10, 1), 10
+    )
     assert (refined.command[:, 0] == [0.3, 1.0, 0.5]).all()
     assert (refined.command[:, 1, 1] == 2.0).all()
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
@@ -132,7 +137,8 @@ def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
 
 
 def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
-    # The answer lies just across +-pi from the start, and nearly a full turn away the other way round.
+    # The answer lies just across +-pi from the start, and nearly a full turn away the other way
+    # round.
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))
     start = np.array([[[0.4, 1.5, math.pi - 0.1]]])
     target = problem.wrench(np.array([[[0.4, 1.5, -math.pi + 0.1]]]))

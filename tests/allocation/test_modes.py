@@ -30,7 +30,12 @@ def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
     command = np.array(commands)
     k = len(command)
     return Candidates(
-        command, np.zeros((k, 6)), np.zeros(k), np.arange(1.0, k + 1), np.arange(1.0, k + 1) ** 2, ("",) * k
+        command,
+        np.zeros((k, 6)),
+        np.zeros(k),
+        np.arange(1.0, k + 1),
+        np.arange(1.0, k + 1) ** 2,
+        ("",) * k,
     )
 
 
@@ -46,7 +51,8 @@ def signature_of(command: np.ndarray) -> ModeSignature:
 
 
 def test_a_fin_rests_by_its_own_law() -> None:
-    """The same beat is rest for a small fin beside a large one; nothing rests where nothing pushes."""
+    """The same beat is rest for a small fin beside a large one; nothing rests where nothing
+    pushes."""
     command = np.array([PUSH, PUSH, (math.nan,) * 3])
     force = np.array([(2.0, 0.2, 0.0), (2.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
     resting = mode_signature(np.array([command] * 3), force).resting
@@ -77,7 +83,9 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
     modes = find_modes(result.candidates, force, layout.lower, layout.upper)
     assert len(modes) >= 2
     np.testing.assert_array_equal(modes[0].command, result.command)
-    assert modes[0].effort == pytest.approx(result.effort) and modes[0].power == pytest.approx(result.power)
+    assert modes[0].effort == pytest.approx(result.effort) and modes[0].power == pytest.approx(
+        result.power
+    )
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert normalized_error(search.normalization, wrench, target).max() < 1e-3
     ways = [mode.signature for mode in modes]
@@ -87,15 +95,22 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
 
 
 def test_signatures_by_hand() -> None:
-    """Thrust grows with the squares of sin(A) and f; a fin below 15 % of the strongest one rests."""
-    command = np.array([(0.5, 2.0, 1.0), (0.2, 1.2, -2.0), (0.3, 1.0, 0.4), (0.0, 1.0, 0.0), (math.nan,) * 3])
+    """Thrust grows with the squares of sin(A) and f; a fin below 15 % of the strongest one
+    rests."""
+    command = np.array(
+        [(0.5, 2.0, 1.0), (0.2, 1.2, -2.0), (0.3, 1.0, 0.4), (0.0, 1.0, 0.0), (math.nan,) * 3]
+    )
     signature = signature_of(command)
     thrust = [math.log((math.sin(a) * f) ** 2) for a, f, _ in command[:3]]
     assert math.exp(thrust[1] - thrust[0]) < 0.15 and math.exp(thrust[2] - thrust[0]) < 0.15
-    assert signature.resting.tolist() == [False, True, True, True, False], "one that gives nothing rests"
+    assert signature.resting.tolist() == [False, True, True, True, False], (
+        "one that gives nothing rests"
+    )
     stronger = signature_of(np.array([*command[:2], (0.3, 1.4, 0.4)]))
     assert stronger.resting.tolist() == [False, True, False]
-    np.testing.assert_allclose(stronger.thrust, [thrust[0], np.nan, math.log((math.sin(0.3) * 1.4) ** 2)])
+    np.testing.assert_allclose(
+        stronger.thrust, [thrust[0], np.nan, math.log((math.sin(0.3) * 1.4) ** 2)]
+    )
     np.testing.assert_allclose(stronger.direction, [1.0, np.nan, 0.4])
     np.testing.assert_allclose(stronger.style, [math.log(0.25), np.nan, math.log(0.3 / 1.4)])
 
@@ -106,7 +121,9 @@ def test_what_counts_as_different() -> None:
 
     def other(turn: float = 0.0, thrust: float = 0.0, style: float = 0.0) -> ModeSignature:
         return a._replace(
-            direction=a.direction + [turn, 0.0], thrust=a.thrust + [0.0, thrust], style=a.style + [style, 0.0]
+            direction=a.direction + [turn, 0.0],
+            thrust=a.thrust + [0.0, thrust],
+            style=a.style + [style, 0.0],
         )
 
     difference = signature_difference(a, other(math.radians(12.5), 0.05, -0.1))

@@ -1,4 +1,5 @@
-"""Sentences about a robot: restless fins, limits beyond tables, rudders at rest, fins that nobody learned."""
+"""Sentences about a robot: restless fins, limits beyond tables, rudders at rest, fins that nobody
+learned."""
 
 import os
 from dataclasses import replace
@@ -22,7 +23,8 @@ from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import FIN_ROBOTS
 
 pytestmark = pytest.mark.skipif(
-    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+    not {"default", "paper"} <= set(shipped_checkpoints()),
+    reason="no trained checkpoints in the tree",
 )
 
 
@@ -32,7 +34,9 @@ CIRCLE = np.linspace(-np.pi, np.pi, 25)
 
 def robot(limits: Limits, path: Path | None = None) -> Layout:
     model = FinModelSpec("drag") if path is None else FinModelSpec("table", (("path", str(path)),))
-    return Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.7, limits, model), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
+    return Layout(
+        "two", (Fin("a", (0.2, 0.1, 0.0), 0.7, limits, model), Fin("b", (-0.2, 0.1, 0.0), 2.0))
+    )
 
 
 @pytest.mark.parametrize("name", sorted(FIN_ROBOTS))
@@ -73,7 +77,9 @@ def test_zero_directions_beyond_a_table_are_told(
     tmp_path: Path, limits: tuple[float, float], told: bool
 ) -> None:
     path = tmp_path / "arc.csv"
-    write_table(path, DRAG, np.linspace(0.0, 0.6, 5), np.linspace(0.1, 2.1, 5), np.linspace(-1.0, 1.0, 9))
+    write_table(
+        path, DRAG, np.linspace(0.0, 0.6, 5), np.linspace(0.1, 2.1, 5), np.linspace(-1.0, 1.0, 9)
+    )
     notes = fin_notes(robot(Limits(zero_direction=limits), path))
     assert len(notes) == told
     assert all("zero directions of" in note and "its table holds -1 to 1" in note for note in notes)
@@ -88,12 +94,16 @@ def test_a_table_of_two_lines_is_told(tmp_path: Path) -> None:
 
 def test_a_table_without_thrust_within_the_limits_is_refused(tmp_path: Path) -> None:
     amplitude = np.array([0.0, 0.2, 0.3, 0.4, 0.6])
-    grid = np.stack(np.meshgrid(amplitude, [0.1, 2.1], CIRCLE, indexing="ij"), axis=-1).reshape(-1, 3)
+    grid = np.stack(np.meshgrid(amplitude, [0.1, 2.1], CIRCLE, indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
     force = np.where(grid[:, :1] > 0.35, DRAG.force(grid), 0.0)
     rows = [",".join(f"{value:.12g}" for value in row) for row in np.hstack([grid, force])]
     (tmp_path / "fin.csv").write_text("\n".join(["A,f,phi,Fx,Fy,Fz", *rows]))
     layout = robot(Limits((0.05, 0.2)), tmp_path / "fin.csv")
-    with pytest.raises(DataError, match="gives no thrust within its limits, amplitudes 0.05 to 0.2 rad"):
+    with pytest.raises(
+        DataError, match="gives no thrust within its limits, amplitudes 0.05 to 0.2 rad"
+    ):
         Allocator(layout, "analytic").allocate([0.5, 0, 0, 0, 0, 0])
 
 
@@ -101,13 +111,17 @@ def test_a_layout_whose_fit_is_doubtful_says_so_with_every_answer() -> None:
     from dataclasses import replace
 
     plain = robot(Limits())
-    doubted = replace(plain, description="not to be trusted: it hardly moved\nfitted to 40 s of swimming")
+    doubted = replace(
+        plain, description="not to be trusted: it hardly moved\nfitted to 40 s of swimming"
+    )
     assert fin_notes(doubted) == ("layout two is not to be trusted: it hardly moved",)
     assert fin_notes(replace(plain, description="fitted to 40 s of swimming")) == ()
 
 
 def test_rudders_at_rest_are_told() -> None:
-    rudder = Rudder("tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0)
+    rudder = Rudder(
+        "tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0
+    )
     robot = Layout("torpedo", (*load_layout("turtle_hybrid").actuators, rudder))
     assert fin_notes(robot) == (
         "rudder tail gives nothing at rest; tell how the robot moves through the water (flow)",
@@ -125,7 +139,9 @@ def test_commands_in_words() -> None:
 
 
 def test_tables_hold_forces_at_rest() -> None:
-    rudder = Rudder("tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0)
+    rudder = Rudder(
+        "tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0
+    )
     rows = tuple((float(u), float(u), float(abs(u) ** 1.5)) for u in range(-20, 21))
     pusher = Thruster("stern", (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 20.0), PowerTable(rows))
     robot = Layout("torpedo", (pusher, rudder))

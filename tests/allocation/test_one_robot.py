@@ -1,4 +1,5 @@
-"""An allocator is made for one robot: it is copied, sent to other processes, and keeps what it prepares."""
+"""An allocator is made for one robot: it is copied, sent to other processes, and keeps what it
+prepares."""
 
 import copy
 import pickle
@@ -34,7 +35,11 @@ def test_copies_answer_the_same(method: str) -> None:
     allocator = Allocator(layout, method, **QUICK.get(method, {}))
     lost = layout.names[:1]
     answer = allocator.allocate(SURGE, lost=lost)
-    for twin in (copy.copy(allocator), copy.deepcopy(allocator), pickle.loads(pickle.dumps(allocator))):
+    for twin in (
+        copy.copy(allocator),
+        copy.deepcopy(allocator),
+        pickle.loads(pickle.dumps(allocator)),
+    ):
         assert (twin.layout, twin.method, twin.settings) == (
             allocator.layout,
             allocator.method,
@@ -69,7 +74,9 @@ def test_an_answer_needs_no_allocator(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "answer")], check=True, timeout=60)
 
 
-def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_damaged_robots_are_prepared_when_first_asked_about(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     allocator = Allocator(load_layout("A"))
     made = []
     kind = type(allocator._whole.method)
@@ -97,7 +104,11 @@ def test_errors_are_shares_of_what_the_robot_can_push() -> None:
     strongest = 4.737410112522892 * (2.1 * np.sin(0.6)) ** 2
     lever = np.linalg.norm(layout.position, axis=1)
     np.testing.assert_allclose(allocator.scale[:3], 2.0 * strongest, rtol=1e-9)
-    assert 0.8 * 2.0 * strongest * lever.max() < allocator.scale[3] <= 2.0 * strongest * lever.max() * 1.0001
+    assert (
+        0.8 * 2.0 * strongest * lever.max()
+        < allocator.scale[3]
+        <= 2.0 * strongest * lever.max() * 1.0001
+    )
     far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
     assert far.err_norm == pytest.approx((100.0 - far.wrench[0]) / allocator.scale[0], rel=1e-6)
     assert far.expected_error == 0.0 and not far.expected_miss.any()
@@ -116,7 +127,9 @@ def test_the_yardstick_grows_with_the_robot(size: float) -> None:
     plain = Layout(
         "robot", tuple(replace(f, position=tuple(np.array(f.position) / size)) for f in robot.fins)
     )
-    plain = replace(plain, actuators=tuple(replace(f, model=FinModelSpec("drag")) for f in plain.fins))
+    plain = replace(
+        plain, actuators=tuple(replace(f, model=FinModelSpec("drag")) for f in plain.fins)
+    )
     expected = yardstick(plain) * np.repeat([size**2, size**3], 3)
     np.testing.assert_allclose(yardstick(robot), expected, rtol=1e-9)
 
@@ -150,7 +163,9 @@ def test_robots_with_other_actuators_are_told_as_well(name: str) -> None:
 
 def test_an_answer_of_another_robot_is_not_refined() -> None:
     answer = Allocator(load_layout("A"), "mdn").allocate(SURGE)
-    with pytest.raises(AllocationError, match="this answer is of layout 'A', and this allocator is for 'B'"):
+    with pytest.raises(
+        AllocationError, match="this answer is of layout 'A', and this allocator is for 'B'"
+    ):
         Allocator(load_layout("B"), "mdn").refinement(answer)
 
 

@@ -1,4 +1,5 @@
-"""Values are plain data that never change; the page of the default method has every number set by hand."""
+"""Values are plain data that never change; the page of the default method has every number set by
+hand."""
 
 import ast
 import dataclasses
@@ -30,7 +31,8 @@ def classes(room: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_values_do_not_change_and_no_option_is_required(room: str) -> None:
-    """The generated `==` of two arrays is no yes or no: classes with arrays have their own, or none."""
+    """The generated `==` of two arrays is no yes or no: classes with arrays have their own, or
+    none."""
     made = classes(room)
     classes_of_data = {name: each for name, each in made.items() if dataclasses.is_dataclass(each)}
     methods = {name: each for name, each in classes_of_data.items() if issubclass(each, Allocator)}
@@ -53,7 +55,10 @@ FILES = [
     ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
-    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("response", "fin/fin_response", "thruster")),
+    *(
+        ROOT / "finlab/actuators" / f"{name}.py"
+        for name in ("response", "fin/fin_response", "thruster")
+    ),
     *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "kinds")),
 ]
 
@@ -61,7 +66,17 @@ FILES = [
 CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
 DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
 DOUBLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
-NO_CHOICE = {"PI", "TINY", "LARGEST", "NONE", "FL_MOST", "FL_VERSION", "FL_MAGIC", "FL_POINTS", "FL_SCORES"}
+NO_CHOICE = {
+    "PI",
+    "TINY",
+    "LARGEST",
+    "NONE",
+    "FL_MOST",
+    "FL_VERSION",
+    "FL_MAGIC",
+    "FL_POINTS",
+    "FL_SCORES",
+}
 
 
 def numbers(path: Path) -> dict[str, object]:
@@ -83,7 +98,9 @@ def test_the_page_has_every_number_with_a_reason() -> None:
     rows = ROW.findall((ROOT / "docs" / "theory" / "method.md").read_text())
     told = {(where, name): ast.literal_eval(value) for name, value, where, _ in rows}
     known = {
-        (str(path.relative_to(ROOT)), name): value for path in FILES for name, value in numbers(path).items()
+        (str(path.relative_to(ROOT)), name): value
+        for path in FILES
+        for name, value in numbers(path).items()
     }
     for path in CORE:
         for name, text in DEFINED.findall(DOUBLE.sub("", path.read_text())):

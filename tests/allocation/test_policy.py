@@ -1,4 +1,5 @@
-"""What the allocator does when a wrench is out of reach: closest, same direction, or in order of priority."""
+"""What the allocator does when a wrench is out of reach: closest, same direction, or in order of
+priority."""
 
 from dataclasses import replace
 
@@ -30,7 +31,9 @@ def shipped(name: str) -> Layout:
     return load_layout(shipped_layouts()[name])
 
 
-def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_starts: int = 3) -> float:
+def least_error(
+    layout: Layout, target: np.ndarray, weights: np.ndarray, n_starts: int = 3
+) -> float:
     """Weighted error that scipy finds on the plant from several starts."""
     lower = layout.lower
     upper = layout.upper
@@ -42,7 +45,9 @@ def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_start
 
     starts = lower + rng.uniform(0.05, 0.95, (n_starts, *lower.shape)) * (upper - lower)
     costs = [
-        least_squares(residual, start.ravel(), bounds=(lower.ravel(), upper.ravel()), max_nfev=50).cost
+        least_squares(
+            residual, start.ravel(), bounds=(lower.ravel(), upper.ravel()), max_nfev=50
+        ).cost
         for start in starts
     ]
     return float(np.sqrt(2.0 * min(costs)))
@@ -51,12 +56,14 @@ def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_start
 def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> float:
     """An error that no command of fins that turn fully can undercut.
 
-    The wrenches of all fins together lie within a convex set; the plane through its border that faces
-    along the answer's residual is at least this far from the target.
+    The wrenches of all fins together lie within a convex set; the plane through its border that
+    faces along the answer's residual is at least this far from the target.
     """
     residual = (target - result.wrench) / result.scale
     facing = residual / np.linalg.norm(residual)
-    strongest = np.array([[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins])
+    strongest = np.array(
+        [[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins]
+    )
     thrust = np.linalg.norm(Plant(layout).body_forces(strongest), axis=1)
     pulls = ((facing / result.scale) @ layout_effectiveness(layout)).reshape(-1, 2)
     return float(facing @ (target / result.scale) - thrust @ np.linalg.norm(pulls, axis=1))
@@ -199,7 +206,9 @@ def test_methods_without_weights_say_so() -> None:
             Policy("direction"),
             Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0)),
         ):
-            with pytest.raises(AllocationError, match=f"method '{name}' minimizes the plain error") as caught:
+            with pytest.raises(
+                AllocationError, match=f"method '{name}' minimizes the plain error"
+            ) as caught:
                 method.allocate(layout, FAR, policy=policy)
             assert "use method 'dual'" in str(caught.value) and "\n" not in str(caught.value)
         assert np.isfinite(method.allocate(layout, FAR, policy=CLOSEST).command).all()
@@ -208,10 +217,16 @@ def test_methods_without_weights_say_so() -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"kind": "nearest"}, "policy: expected one of closest, direction, priority, got 'nearest'"),
+        (
+            {"kind": "nearest"},
+            "policy: expected one of closest, direction, priority, got 'nearest'",
+        ),
         ({"axis_weights": (1.0,) * 5}, "axis_weights: expected six numbers from 0"),
         ({"axis_weights": (0.0,) * 6}, "axis_weights: expected six numbers from 0, not all 0"),
-        ({"axis_weights": (1.0, -1.0, 1.0, 1.0, 1.0, 1.0)}, "axis_weights: expected six numbers from 0"),
+        (
+            {"axis_weights": (1.0, -1.0, 1.0, 1.0, 1.0, 1.0)},
+            "axis_weights: expected six numbers from 0",
+        ),
         ({"axis_weights": (np.nan,) * 6}, "axis_weights: expected six numbers from 0"),
         ({"order": (("Fq",),)}, "order: expected axes among Fx, Fy, Fz, Tx, Ty, Tz, got 'Fq'"),
         ({"order": (("Fx",), ("Fz", "Fx"))}, "order: every axis may be named once"),
@@ -235,13 +250,24 @@ def test_a_name_that_is_no_policy_is_refused(search: AnyRobot) -> None:
 def test_policies_from_words() -> None:
     assert as_policy("closest") == policy_from("closest") == CLOSEST
     assert as_policy(CLOSEST) is CLOSEST
-    assert policy_from("closest", ["1", 2, 1, 1, 1, 0]).axis_weights == (1.0, 2.0, 1.0, 1.0, 1.0, 0.0)
+    assert policy_from("closest", ["1", 2, 1, 1, 1, 0]).axis_weights == (
+        1.0,
+        2.0,
+        1.0,
+        1.0,
+        1.0,
+        0.0,
+    )
     assert policy_from("priority", None, ["Fx,Fy", "Tz"]).order == (("Fx", "Fy"), ("Tz",))
 
 
 def test_groups_end_with_the_axes_that_are_not_named() -> None:
     groups = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).groups
-    assert [tuple(np.array(AXES)[group]) for group in groups] == [("Fz",), ("Tx", "Ty"), ("Fx", "Fy", "Tz")]
+    assert [tuple(np.array(AXES)[group]) for group in groups] == [
+        ("Fz",),
+        ("Tx", "Ty"),
+        ("Fx", "Fy", "Tz"),
+    ]
 
 
 @pytest.mark.parametrize(

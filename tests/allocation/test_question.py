@@ -1,4 +1,5 @@
-"""What an allocator may be asked: the last values that are taken, the first that are refused, and why."""
+"""What an allocator may be asked: the last values that are taken, the first that are refused, and
+why."""
 
 import math
 import re
@@ -68,7 +69,9 @@ def test_the_largest_wrench_is_still_taken() -> None:
 
 @pytest.mark.parametrize("shape", [(6,), (2, 5), (1, 2, 6), ()])
 def test_many_wrenches_are_rows_of_six(shape: tuple[int, ...]) -> None:
-    sentence = f"wrench: expected an array of shape (N, 6) in N and N m, got an array of shape {shape}"
+    sentence = (
+        f"wrench: expected an array of shape (N, 6) in N and N m, got an array of shape {shape}"
+    )
     with pytest.raises(CommandError, match=f"^{re.escape(sentence)}$"):
         question.check_wrenches(np.zeros(shape))
 
@@ -104,7 +107,12 @@ def test_truth_values_and_text_are_no_numbers(wrong: Any) -> None:
     ):
         with pytest.raises(CommandError, match=f"^{name}: expected .*, got "):
             ask()
-    for given in ([1, 0, 0, 0, 0, 0], np.ones(6, np.float32), np.ones(6, np.int16), (1.0, 0, 0, 0, 0, 0)):
+    for given in (
+        [1, 0, 0, 0, 0, 0],
+        np.ones(6, np.float32),
+        np.ones(6, np.int16),
+        (1.0, 0, 0, 0, 0, 0),
+    ):
         assert allocator.allocate(given).target.dtype == np.float64
 
 
@@ -123,12 +131,16 @@ def test_seeds_are_whole_numbers_from_0(seed: object) -> None:
 
 @pytest.mark.parametrize("seed", [-1, True, 1.0, "1", None])
 def test_other_seeds_are_refused(seed: object) -> None:
-    with pytest.raises(AllocationError, match=f"^seed: expected a whole number from 0, got {seed!r}$"):
+    with pytest.raises(
+        AllocationError, match=f"^seed: expected a whole number from 0, got {seed!r}$"
+    ):
         question.check_seed(seed)
 
 
 def test_no_layout_is_refused() -> None:
-    with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
+    with pytest.raises(
+        AllocationError, match="layout: expected a Layout, got 'A'; read a file with"
+    ):
         question.check_layout("A")
 
 

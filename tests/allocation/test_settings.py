@@ -31,7 +31,8 @@ SAME_ANSWER = ("dual", "analytic", "qp", "ipopt", "px4", "ardusub")
 """Methods that may find the same answer with those settings."""
 
 pytestmark = pytest.mark.skipif(
-    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+    not {"default", "paper"} <= set(shipped_checkpoints()),
+    reason="no trained checkpoints in the tree",
 )
 
 
@@ -54,7 +55,9 @@ def test_other_settings_answer_otherwise(method: str) -> None:
 
 def test_networks_are_shared() -> None:
     network = Allocator(load_layout("A"), "mdn")
-    assert network.on(load_layout("B")).weights is network.weights and network.checkpoint == "default"
+    assert (
+        network.on(load_layout("B")).weights is network.weights and network.checkpoint == "default"
+    )
     again = Allocator(load_layout("ucat"), "mdn", checkpoint=network.weights)
     assert again.weights is network.weights
 
@@ -76,7 +79,11 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("dual", {"robust": float("nan")}, "robust: expected a number .* W, got nan"),
         ("dual", {"robust": 10**400}, "robust: expected a number .*, got 1000"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam,"),
-        ("sqp", {"time_limit_s": 0.0}, "time_limit_s: expected a number above 0 up to 3600 s, got 0.0"),
+        (
+            "sqp",
+            {"time_limit_s": 0.0},
+            "time_limit_s: expected a number above 0 up to 3600 s, got 0.0",
+        ),
         ("sqp", {"n_starts": 0}, "n_starts: expected a whole number from 1"),
     ],
 )

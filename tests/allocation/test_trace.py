@@ -1,4 +1,5 @@
-"""DEVELOPMENT.md follows one allocation through the files: a profile agrees, and C has its functions."""
+"""DEVELOPMENT.md follows one allocation through the files: a profile agrees, and C has its
+functions."""
 
 import re
 import sys
@@ -63,7 +64,9 @@ def test_a_question_goes_to_the_core_and_back_as_traced() -> None:
     allocator = finlab.Allocator(finlab.load_layout("turtle_hybrid"))
     profile = called(lambda: allocator.allocate([2, 0, 40, 0, 0, 0.5], lost=["front_left"]))
     there = traced("For each question")
-    _, *back = traced("And back")  # the first step returns from a function that was called on the way there
+    _, *back = traced(
+        "And back"
+    )  # the first step returns from a function that was called on the way there
     assert_in_order(there + back, profile)
 
 

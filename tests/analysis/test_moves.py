@@ -15,7 +15,10 @@ Layouts = Callable[[str], Layout]
 
 
 def test_layout_a_is_two_pairs(shipped: Layouts) -> None:
-    assert mirror_pairs(shipped("A")) == (("front_right", "front_left"), ("back_left", "back_right"))
+    assert mirror_pairs(shipped("A")) == (
+        ("front_right", "front_left"),
+        ("back_left", "back_right"),
+    )
 
 
 def test_a_twin_follows_and_the_rest_stays(shipped: Layouts) -> None:
@@ -37,11 +40,17 @@ def test_a_twin_follows_and_the_rest_stays(shipped: Layouts) -> None:
 @pytest.mark.parametrize("name", ["A", "bluerov2_heavy", "turtle_hybrid", "catamaran", "torpedo"])
 def test_free_actuators_can_keep_the_symmetry_there_is(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
-    moves = Moves(layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators})
+    moves = Moves(
+        layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators}
+    )
     drawn = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
     for vector, free in zip(moves.mirrored(drawn), drawn, strict=True):
         assert (vector >= moves.lower).all() and (vector <= moves.upper).all()
-        assert mirror_pairs(moves.moved(vector)) == mirror_pairs(layout) != mirror_pairs(moves.moved(free))
+        assert (
+            mirror_pairs(moves.moved(vector))
+            == mirror_pairs(layout)
+            != mirror_pairs(moves.moved(free))
+        )
 
 
 @pytest.mark.parametrize(
@@ -52,7 +61,11 @@ def test_free_actuators_can_keep_the_symmetry_there_is(shipped: Layouts, name: s
         (["back_left"], (), "bounds: .* but has none"),
         (["front_left"], (("front_left", "back_left"),), "not each other's mirror image"),
         (["front_left"], (("front_left", "front_left"),), "not each other's mirror image"),
-        (["front_left"], (("front_left", "front_right"), ("front_right", "front_left")), "one mirror pair"),
+        (
+            ["front_left"],
+            (("front_left", "front_right"), ("front_right", "front_left")),
+            "one mirror pair",
+        ),
     ],
 )
 def test_wrong_questions(

@@ -1,4 +1,5 @@
-"""The null space of an answer: the wrench stays, watts are no less, and beyond the ranges it ends."""
+"""The null space of an answer: the wrench stays, watts are no less, and beyond the ranges it
+ends."""
 
 import numpy as np
 import pytest
@@ -44,7 +45,12 @@ def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
 
 
 def test_it_has_as_many_directions_as_forces_beyond_the_rank() -> None:
-    for name, lost in (("bluerov2_heavy", ()), ("hexa", ()), ("hexa", ("middle_left",)), ("catamaran", ())):
+    for name, lost in (
+        ("bluerov2_heavy", ()),
+        ("hexa", ()),
+        ("hexa", ("middle_left",)),
+        ("catamaran", ()),
+    ):
         layout = load_layout(name)
         answer = Allocator(layout).allocate([1.0, 0, 0, 0, 0, 0.1], lost=lost)
         left = layout_effectiveness(layout.without(lost) if lost else layout)[layout.commanded]
@@ -52,7 +58,9 @@ def test_it_has_as_many_directions_as_forces_beyond_the_rank() -> None:
         assert len(space.basis) == left.shape[1] - np.linalg.matrix_rank(left), name
         assert not any(set(lost) & set(space.takers(k)) for k in range(len(space.basis)))
         moved = space.commands(np.ones((1, len(space.basis))) * 0.1)[0]
-        assert [bool(np.isnan(row).all()) for row in moved] == [part in lost for part in layout.names]
+        assert [bool(np.isnan(row).all()) for row in moved] == [
+            part in lost for part in layout.names
+        ]
 
 
 def test_beyond_a_range_an_actuator_has_no_command() -> None:
@@ -78,4 +86,6 @@ def test_the_mean_of_two_commands_of_fins_misses_and_of_thrusters_does_not() -> 
         assert answer.with_command(other).reachable
         mean = answer.with_command(space.mean(answer.command, other))
         assert (mean.err_norm > 0.05) is misses
-        np.testing.assert_allclose(space.mean(answer.command, answer.command), answer.command, atol=1e-12)
+        np.testing.assert_allclose(
+            space.mean(answer.command, answer.command), answer.command, atol=1e-12
+        )

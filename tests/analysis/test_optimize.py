@@ -56,7 +56,11 @@ def test_no_yaw_learns_to_yaw(shipped: Layouts) -> None:
 def test_it_stops_when_told(shipped: Layouts) -> None:
     seen: list[Progress] = []
     found = optimize_layout(
-        shipped("A"), ["front_right"], rounds=50, progress=seen.append, cancelled=lambda: len(seen) >= 1
+        shipped("A"),
+        ["front_right"],
+        rounds=50,
+        progress=seen.append,
+        cancelled=lambda: len(seen) >= 1,
     )
     assert found.cancelled
     assert len(seen) == 1
@@ -82,7 +86,9 @@ def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
     inwards = Bounds(
         x=(x, x), y=(y, y + 0.05), z=(z, z), mounting_angle=(angle, angle)
     )  # shorter levers only
-    found = optimize_layout(layout, layout.names[:1], {layout.names[0]: inwards}, rounds=1, mirror=())
+    found = optimize_layout(
+        layout, layout.names[:1], {layout.names[0]: inwards}, rounds=1, mirror=()
+    )
     assert found.value_after == found.value_before
     assert not found.improved
     assert found.layout is layout
@@ -92,7 +98,9 @@ def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("finlab.analysis.climb.CLEARANCE", 0.2)
     layout = shipped("A")
     box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
-    found = optimize_layout(layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1)
+    found = optimize_layout(
+        layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1
+    )
     places = found.layout.position
     assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
 
@@ -103,7 +111,12 @@ def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPa
         ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
         ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 6 directions after a loss"),
         ("A", "mission_power", [[1, 2, 3]], "wrench: expected an array of shape"),
-        ("A", "mission_power", [[1, 0, 0, 0, 0, float("inf")]], "wrench: Tz must be a number of at most"),
+        (
+            "A",
+            "mission_power",
+            [[1, 0, 0, 0, 0, float("inf")]],
+            "wrench: Tz must be a number of at most",
+        ),
     ],
 )
 def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, message: str) -> None:
@@ -115,7 +128,10 @@ def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, me
 SHIPPED = {
     "bluerov2_heavy": (["lift_rear_right"], {}),
     "bluerov2": (["lift_left", "front_left"], {}),
-    "torpedo": (["elevator_left"], {"axes": ["surge", "roll", "pitch", "yaw"], "flow": [1.5, 0, 0, 0, 0, 0]}),
+    "torpedo": (
+        ["elevator_left"],
+        {"axes": ["surge", "roll", "pitch", "yaw"], "flow": [1.5, 0, 0, 0, 0, 0]},
+    ),
     "catamaran": (["left", "bow"], {}),
     "fish": (["tail"], {}),
     "turtle_hybrid": (["lift_left", "front_left"], {}),
@@ -152,7 +168,9 @@ def test_the_mission_of_a_torpedo_counts_at_its_speed(shipped: Layouts) -> None:
     rolled = [[5.0, 0.0, 0.0, 0.5, 0.0, 0.0]]
     left = layout.actuators[layout.index("elevator_left")]
     bounds = {left.name: Bounds.around(left, (0.0, 0.05, 0.0), 0.0)}
-    found = optimize_layout(layout, [left.name], bounds, "mission_power", mission=rolled, flow=flow, rounds=1)
+    found = optimize_layout(
+        layout, [left.name], bounds, "mission_power", mission=rolled, flow=flow, rounds=1
+    )
     assert found.improved
     after = least_power(found.layout, rolled, flow=flow)
     assert -found.value_after == pytest.approx(after[0])
@@ -182,26 +200,35 @@ def slopes_are_differences(hill: Hill, moves: Moves, rel: float) -> None:
     assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=rel, abs=1e-3 * abs(look.value))
 
 
-@pytest.mark.parametrize("name", ["bluerov2_heavy", "A", "turtle_hybrid", "catamaran", "fish", "hexa"])
+@pytest.mark.parametrize(
+    "name", ["bluerov2_heavy", "A", "turtle_hybrid", "catamaran", "fish", "hexa"]
+)
 def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
-    moves = Moves(layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators})
+    moves = Moves(
+        layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators}
+    )
     axes = [axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts]
     near = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]]
     far = [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
     slopes_are_differences(Directions(moves, axes, False), moves, 0.02)
     slopes_are_differences(Power(moves, near, None), moves, 0.02)
-    slopes_are_differences(Power(moves, far, None), moves, 0.1)  # the nearest point by other weights
+    slopes_are_differences(
+        Power(moves, far, None), moves, 0.1
+    )  # the nearest point by other weights
 
 
 @pytest.mark.parametrize(("goal", "least"), [("weakest_direction", 112.0), ("mission_power", -1.2)])
 def test_eight_thrusters_find_their_places(shipped: Layouts, goal: str, least: float) -> None:
-    """The same arguments and seed give the same layout; what is proposed keeps its distance and its grid."""
+    """The same arguments and seed give the same layout; what is proposed keeps its distance and its
+    grid."""
     layout = shipped("bluerov2_heavy")
     grid = (0.001, np.radians(1.0))
     bounds = {part.name: Bounds.around(part, 0.05, np.pi / 2) for part in layout.actuators}
     seen: list[Progress] = []
-    found = optimize_layout(layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=seen.append)
+    found = optimize_layout(
+        layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=seen.append
+    )
     assert found.value_after >= least
     assert [one.round for one in seen] == list(range(1, len(seen) + 1))
     assert all(later.best >= one.best for one, later in zip(seen, seen[1:], strict=False))
@@ -222,7 +249,9 @@ def test_a_wall_without_slope_is_kept(shipped: Layouts) -> None:
     def wall(position: Array, frames: Array) -> Array:
         return 0.02 * (np.abs(position[..., 1]) > inner).sum(-1)
 
-    found, free = (optimize_layout(layout, layout.names, rounds=3, rule=rule) for rule in (wall, None))
+    found, free = (
+        optimize_layout(layout, layout.names, rounds=3, rule=rule) for rule in (wall, None)
+    )
     assert np.abs(found.layout.position[:, 1]).max() <= inner
     assert np.abs(free.layout.position[:, 1]).max() > inner
     assert found.value_after > 1.1 * found.value_before

@@ -1,4 +1,5 @@
-"""A real browser for the flows. Without Chromium they are skipped, loudly; on CI that is a failure."""
+"""A real browser for the flows. Without Chromium they are skipped, loudly; on CI that is a
+failure."""
 
 import os
 import shutil
@@ -11,9 +12,12 @@ from typing import Any
 
 import pytest
 
-CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
+CHROMIUM = next(
+    (p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None
+)
 MISSING = (
-    "NO CHROMIUM: the browser tests were skipped, so nothing checked the app's pages. Install one with "
+    "NO CHROMIUM: the browser tests were skipped, so nothing checked the app's pages. Install one "
+    "with "
     "`apt-get install chromium` and run them again."
 )
 FLAGS = [
@@ -87,7 +91,11 @@ def browser() -> Iterator[Any]:
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as home:
         chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS, downloads_path=home
+            executable_path=CHROMIUM,
+            headless=True,
+            chromium_sandbox=False,
+            args=FLAGS,
+            downloads_path=home,
         )
         yield chromium
         chromium.close()
@@ -102,7 +110,9 @@ def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
 
     def open_page(context: Any = None) -> Page:
         if context is None:
-            context = browser.new_context(viewport={"width": 1400, "height": 860}, accept_downloads=True)
+            context = browser.new_context(
+                viewport={"width": 1400, "height": 860}, accept_downloads=True
+            )
             contexts.append(context)
         return Page(context.new_page(), served)
 

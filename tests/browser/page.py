@@ -15,7 +15,8 @@ from webapp.viser_internals import run_script
 WAIT_MS = 120_000
 """Longest wait for the page: software rendering on a busy machine is slow."""
 PAUSE_S = 0.12
-"""Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the last."""
+"""Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the
+last."""
 
 ROW = "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
 """From a label to the row it stands in."""
@@ -70,7 +71,9 @@ class Page:
     @property
     def view(self) -> Any:
         """The server's side of this tab; another one after a reload."""
-        return next(view for view in self._served.app.views.values() if view.session is self.session)
+        return next(
+            view for view in self._served.app.views.values() if view.session is self.session
+        )
 
     def start_over(self) -> None:
         """As at first sight: the state, the tab, the camera, and no notes."""
@@ -95,14 +98,18 @@ class Page:
         self.close_notes()
         self.tab("Allocate")
         self.until(
-            lambda: not self.view.busy and self.page.locator(".mantine-Notification-root").count() == 0
+            lambda: (
+                not self.view.busy and self.page.locator(".mantine-Notification-root").count() == 0
+            )
         )
         self.catch_up()
         self.problems.clear()
 
     def close_notes(self) -> None:
         """Close all notes; by script, because one that fades away cannot be clicked."""
-        script = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+        script = (
+            "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+        )
         self.page.evaluate(script)
 
     def until(
@@ -111,8 +118,8 @@ class Page:
         seconds: float = 120.0,
         told: Callable[[], str] = lambda: "what was waited for did not happen",
     ) -> None:
-        """Wait for the server or the page to come round, longer on a page that needs patience; `told` says
-        what was there instead."""
+        """Wait for the server or the page to come round, longer on a page that needs patience;
+        `told` says what was there instead."""
         end = time.monotonic() + seconds * self.patience
         while not condition():
             assert time.monotonic() < end, told()
@@ -124,19 +131,26 @@ class Page:
         loop = self._served.server.get_event_loop()
         gui = self.view.client.gui
         loop.call_soon_threadsafe(run_script, gui, f"window.finlabMark = {self._marks}")
-        self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks, polling=20)
+        self.page.wait_for_function(
+            "mark => window.finlabMark === mark", arg=self._marks, polling=20
+        )
 
     def rest(self, milliseconds: int) -> None:
-        """Let time pass on the page's own clock: what it had put off until earlier has happened by then."""
+        """Let time pass on the page's own clock: what it had put off until earlier has happened by
+        then."""
         self.page.evaluate("time => new Promise(done => setTimeout(done, time))", milliseconds)
 
     def node(self, name: str) -> None:
         """Wait for a node of the scene."""
-        self.page.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name] != null", arg=name)
+        self.page.wait_for_function(
+            "name => window.__viserMutable?.nodeRefFromName[name] != null", arg=name
+        )
 
     def visible(self, name: str, wanted: bool = True) -> None:
         """Wait until a node is shown, or hidden."""
-        script = "([name, wanted]) => !!window.__viserMutable.nodeRefFromName[name]?.visible === wanted"
+        script = (
+            "([name, wanted]) => !!window.__viserMutable.nodeRefFromName[name]?.visible === wanted"
+        )
         self.page.wait_for_function(script, arg=[name, wanted])
 
     def tab(self, name: str) -> None:
@@ -183,7 +197,9 @@ class Page:
             seen = self.row(label).first.input_value()
             return seen == text
 
-        self.until(there, told=lambda: f"{label} shows {seen!r}, not {text!r}; {self.session.state}")
+        self.until(
+            there, told=lambda: f"{label} shows {seen!r}, not {text!r}; {self.session.state}"
+        )
 
     def type(self, label: str, value: str, place: int = -1) -> None:
         """Type into a number box."""
@@ -220,7 +236,9 @@ class Page:
         self._pause()
 
     @contextlib.contextmanager
-    def held(self, start: tuple[float, float], end: tuple[float, float], steps: int = 14) -> Iterator[None]:
+    def held(
+        self, start: tuple[float, float], end: tuple[float, float], steps: int = 14
+    ) -> Iterator[None]:
         """Drag with the mouse, as slowly as a hand; it is let go when the context ends."""
         mouse = self.page.mouse
         mouse.move(*start)
@@ -249,7 +267,9 @@ class Page:
 
         self.until(above)
 
-    def pixel(self, node: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, float]:
+    def pixel(
+        self, node: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> tuple[float, float]:
         """Where a point of a node is on the screen."""
         x, y = self.page.evaluate(PROJECT, [node, list(point)])
         return x, y
@@ -260,7 +280,10 @@ class Page:
 
     def notes(self) -> list[str]:
         """Texts of the notes that are shown."""
-        return [str(t) for t in self.page.locator(".mantine-Notification-root:visible").all_inner_texts()]
+        return [
+            str(t)
+            for t in self.page.locator(".mantine-Notification-root:visible").all_inner_texts()
+        ]
 
     def vertices(self, node: str) -> list[float]:
         """First coordinates of a mesh as the browser holds it."""

@@ -27,7 +27,9 @@ def describe(page: Any, texts: tuple[str, ...]) -> None:
     """What the inspector has of the selected fin: name, place, shaft."""
     session = page.session
     name, x, y, z, shaft = texts
-    page.page.locator(".fl.head b", has_text="1").or_(page.page.locator(".fl.head b")).first.wait_for()
+    page.page.locator(".fl.head b", has_text="1").or_(
+        page.page.locator(".fl.head b")
+    ).first.wait_for()
     page.type("Name", name)
     page.until(lambda: session.selected == name)
     for place, text in enumerate((x, y, z)):
@@ -56,7 +58,9 @@ def test_a_robot_from_nothing_to_another_browser(
     page.until(lambda: page.vertices("/robot/hull") != before)
     page.press("Estimate")
     page.until(lambda: session.state.layout.body.mass_kg is not None)
-    page.page.get_by_text("It is neutral.").or_(page.page.get_by_text("it is neutral")).first.wait_for()
+    page.page.get_by_text("It is neutral.").or_(
+        page.page.get_by_text("it is neutral")
+    ).first.wait_for()
     page.type("Name", "Manta <b>")
     page.page.locator("textarea:visible").first.fill("A flat one.\nSix fins.")
     page.row("Name").first.focus()
@@ -77,7 +81,9 @@ def test_a_robot_from_nothing_to_another_browser(
     for left, right in zip(layout.fins[::2], layout.fins[1::2], strict=True):
         x, y, z = right.position
         assert left.position == pytest.approx((x, -y, z))
-    assert page.page.locator(".fin-list b, .fl-robot b").count() == 0, "a name is text, never markup"
+    assert page.page.locator(".fin-list b, .fl-robot b").count() == 0, (
+        "a name is text, never markup"
+    )
 
     page.press("Share")
     page.page.locator(".fl-ask input").wait_for()
@@ -113,7 +119,9 @@ def test_the_list_selects(page: Any) -> None:
     page.until(lambda: session.selection == ("front_left", "back_left"))
     page.page.locator(".fin-list tr[data-fin=front_right] .name").hover()
     page.page.mouse.down()
-    page.page.evaluate("document.querySelectorAll('.fin-list').forEach(list => list.outerHTML += '')")
+    page.page.evaluate(
+        "document.querySelectorAll('.fin-list').forEach(list => list.outerHTML += '')"
+    )
     page.page.mouse.up()  # on a list that was rendered again meanwhile
     page.until(lambda: session.selected == "front_right")
 
@@ -129,7 +137,11 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
     most = [math.radians(30.0)] * 3
     page.until(lambda: [fin.limits.amplitude[1] for fin in session.state.layout.fins[:3]] == most)
     page.choose("Model", "lighthill")
-    page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["lighthill"] * 3 + ["drag"])
+    page.until(
+        lambda: (
+            [fin.model.type for fin in session.state.layout.fins] == ["lighthill"] * 3 + ["drag"]
+        )
+    )
     page.type("Width [m]", "0.12")
     page.page.locator("svg.plot:visible", has_text="A 30°").first.wait_for()
     page.until(lambda: session.history.undo_name == "Width of 3 actuators")
@@ -147,7 +159,9 @@ def test_the_gizmo_moves_a_linked_pair(page: Any) -> None:
     page.until(lambda: session.selected == "front_left")
     page.look_from_above()
     before = session.state.layout
-    page.drag(page.pixel("/robot/fins/1", (0.168, 0, 0)), page.pixel("/robot/fins/1", (0.228, 0, 0)))
+    page.drag(
+        page.pixel("/robot/fins/1", (0.168, 0, 0)), page.pixel("/robot/fins/1", (0.228, 0, 0))
+    )
     page.until(lambda: session.state.layout != before and page.view.scenery.robot.dragged is None)
     page.until(lambda: not page.view.busy)
     right, left = session.state.layout.fins[:2]
@@ -167,7 +181,9 @@ def test_reach_draws_sets_and_compares_layouts(page: Any) -> None:
     page.key("n")
     page.key("x")
     page.until(lambda: page.session.state.failed == ("front_right",))
-    page.until(lambda: page.vertices("/robot/attainable/now") != whole and page.text(".score") != card)
+    page.until(
+        lambda: page.vertices("/robot/attainable/now") != whole and page.text(".score") != card
+    )
     page.visible("/robot/attainable/whole")
     page.choose("Draw the set of", "none")
     page.visible("/robot/attainable/now", False)
@@ -206,7 +222,9 @@ def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any)
         page.press("Forget")
         card.wait_for()
         page.page.keyboard.press(key)
-        page.until(lambda mass=mass: card.count() == 0 and session.state.layout.body.mass_kg == mass)
+        page.until(
+            lambda mass=mass: card.count() == 0 and session.state.layout.body.mass_kg == mass
+        )
     page.shows("Mass [kg]", "")
     page.key("Control+z")
     page.shows("Mass [kg]", "19")

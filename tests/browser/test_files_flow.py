@@ -34,7 +34,8 @@ def measured_robot(folder: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
-    """Drag files over an element of the page, see what the page says to that, and let them go there."""
+    """Drag files over an element of the page, see what the page says to that, and let them go
+    there."""
     coded = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
     carried = page.page.evaluate_handle(CARRIED, coded)
     target = page.page.locator(place).first
@@ -104,13 +105,17 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
     for tab in ("Design", "Simulate", "Export", "Allocate"):
         page.tab(tab)
     page.catch_up()
-    assert page.page.evaluate("window.pwned") is None and page.page.locator("img[src=x]").count() == 0
+    assert (
+        page.page.evaluate("window.pwned") is None and page.page.locator("img[src=x]").count() == 0
+    )
 
 
 def test_what_is_exported(page: Any, tmp_path: Path) -> None:
     page.tab("Export")
     lines = page.page.locator("pre.command:visible")
-    page.until(lambda: "finlab allocate ucat.yaml --wrench 1.2 0 0 0 0 0.25" in lines.all_inner_texts())
+    page.until(
+        lambda: "finlab allocate ucat.yaml --wrench 1.2 0 0 0 0 0.25" in lines.all_inner_texts()
+    )
     assert "finlab-runtime check ucat_bundle.zip" in lines.all_inner_texts()
     assert load_layout(page.download("Save the design", tmp_path / "ucat.yaml")).name == "ucat"
     bundle = page.download("Export the bundle (ZIP)", tmp_path / "page.zip")
@@ -128,7 +133,9 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
     page.tab("Design")
     page.key("n")
     before = session.state
-    page.until(lambda: "drag" in page.page.locator(".fl:has-text('stiff blade')").first.inner_text())
+    page.until(
+        lambda: "drag" in page.page.locator(".fl:has-text('stiff blade')").first.inner_text()
+    )
     page.upload("Fit from measurements (CSV)", cell)
     page.until(lambda: session.state.layout.fins[0].model.type == "table" and not page.view.busy)
     page.page.get_by_text("May be trusted within what was measured.").wait_for()

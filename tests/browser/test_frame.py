@@ -59,7 +59,8 @@ def resized(page: Any) -> Iterator[Any]:
 
 
 def settle(page: Any) -> None:
-    """Wait until the page has laid itself out, new parts have their names, and colors have faded in."""
+    """Wait until the page has laid itself out, new parts have their names, and colors have faded
+    in."""
     page.rest(NAMING_MS)
     page.page.wait_for_function(SETTLED)
 
@@ -93,7 +94,9 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
             for box in boxes.values():
                 assert box["left"] >= 0 and box["right"] <= width and box["bottom"] <= height
             assert page.page.evaluate(SMALL) == [], f"type of 13 px at least, in {name}"
-            assert page.page.evaluate(WIDE) == [], f"nothing is cut off in {name} at {width} x {height}"
+            assert page.page.evaluate(WIDE) == [], (
+                f"nothing is cut off in {name} at {width} x {height}"
+            )
             if size == (900, 700):  # a small view has its words beside it
                 assert overlaps(page.page.evaluate(WORDS)) == [], name
     assert page.problems == []
@@ -108,12 +111,18 @@ def test_a_phone_watches(resized: Any) -> None:
     for task in TASKS:
         page.tab(task)
         settle(page)
-        boxes = {name: box for name, box in page.page.evaluate(REGIONS).items() if box["height"] > 0.0}
+        boxes = {
+            name: box for name, box in page.page.evaluate(REGIONS).items() if box["height"] > 0.0
+        }
         assert overlaps(boxes) == [] and boxes["canvas"]["height"] > 200, task
         assert ("left" in boxes) == (task == "Log"), "what is said of a log is read there"
-        assert page.page.evaluate("document.documentElement.scrollWidth") == 390, "nothing is beside the page"
+        assert page.page.evaluate("document.documentElement.scrollWidth") == 390, (
+            "nothing is beside the page"
+        )
         for box in (*boxes.values(), page.page.locator(".fl-status").bounding_box()):
-            assert box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["y"] + box["height"] <= 844
+            assert (
+                box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["y"] + box["height"] <= 844
+            )
     page.tab("Allocate")
     page.until(lambda: "Out of reach" in page.text(".fl-status .pill"))
     page.type("Fx [N]", "1.2")
@@ -147,7 +156,13 @@ def test_keys_do_what_the_list_of_commands_says(page: Any) -> None:
     session = page.session
     page.key("Alt+1")
     page.until(lambda: session.desk.task == "Design")
-    for key, n_fins in (("n", 4), ("Control+d", 5), ("Control+z", 4), ("Control+y", 5), ("Control+z", 4)):
+    for key, n_fins in (
+        ("n", 4),
+        ("Control+d", 5),
+        ("Control+z", 4),
+        ("Control+y", 5),
+        ("Control+z", 4),
+    ):
         page.key(key)
         page.until(lambda n_fins=n_fins: session.state.layout.n_fins == n_fins)
     page.page.get_by_role("button", name="Redo: Duplicate").first.wait_for()
@@ -159,7 +174,9 @@ def test_keys_do_what_the_list_of_commands_says(page: Any) -> None:
     page.until(lambda: session.state.layout.n_fins == 3)
     for _ in range(3):
         page.key("Control+Shift+z")
-    page.until(lambda: len(page.notes()) == 1, told=lambda: f"{len(page.notes())} notes, expected one")
+    page.until(
+        lambda: len(page.notes()) == 1, told=lambda: f"{len(page.notes())} notes, expected one"
+    )
     page.key("Escape")
     page.until(lambda: session.selected is None)
     page.key("Control+j")
@@ -172,7 +189,9 @@ def test_the_camera_frames_turns_and_leaves_ctrl_alone(page: Any) -> None:
     def off() -> float:
         canvas = page.page.evaluate(REGIONS)["canvas"]
         x, y = page.pixel("/robot/fins/2")
-        return float(abs(x - canvas["x"] - canvas["width"] / 2) + abs(y - canvas["y"] - canvas["height"] / 2))
+        return float(
+            abs(x - canvas["x"] - canvas["width"] / 2) + abs(y - canvas["y"] - canvas["height"] / 2)
+        )
 
     page.session.select("back_left")
     page.key("f")
@@ -204,7 +223,9 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
         return int(page.page.evaluate("window.finlabFrames.count"))
 
     view = page.view
-    page.until(lambda: not (view.busy or view.jobs.analyst.busy or view.jobs.ranging.busy))  # all has come
+    page.until(
+        lambda: not (view.busy or view.jobs.analyst.busy or view.jobs.ranging.busy)
+    )  # all has come
     page.catch_up()
     page.rest(600)
     before = drawn()
@@ -239,7 +260,8 @@ GRAVE = ("moderate", "serious", "critical")
 
 
 def findings(page: Any, rules: list[str] | None = None) -> list[str]:
-    """What it finds that is grave on what is seen now, one line for each kind; by some rules, or by all."""
+    """What it finds that is grave on what is seen now, one line for each kind; by some rules, or by
+    all."""
     tab = page.page
     settle(page)
     if not tab.evaluate("() => typeof axe === 'object'"):
@@ -249,7 +271,9 @@ def findings(page: Any, rules: list[str] | None = None) -> list[str]:
         if violation["impact"] in GRAVE:
             nodes = violation["nodes"]
             first = nodes[0]["html"][:160].replace("\n", " ")
-            found.append(f"{violation['id']}, {len(nodes)} times: {violation['help']}, as in {first}")
+            found.append(
+                f"{violation['id']}, {len(nodes)} times: {violation['help']}, as in {first}"
+            )
     return found
 
 

@@ -1,4 +1,5 @@
-"""The tour, lessons, the list of commands; tabs that are apart, and work that is there after a reload."""
+"""The tour, lessons, the list of commands; tabs that are apart, and work that is there after a
+reload."""
 
 from collections.abc import Callable
 from typing import Any
@@ -38,7 +39,9 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     for stop in range(2, 4):
         page.press("Next")
         page.until(lambda stop=stop: f"{stop} of 4" in page.text(".tour"))
-    page.until(lambda: page.view.jobs.swimming.swimmer is not None and page.view.jobs.swimming.time > 0.3)
+    page.until(
+        lambda: page.view.jobs.swimming.swimmer is not None and page.view.jobs.swimming.time > 0.3
+    )
     page.visible("/floor", False)
     page.until(lambda: "off the path" in page.text(".fl-status"))
     page.press("Next")
@@ -66,7 +69,11 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     assert "the green arrows did not" in page.text(".fl-lesson")
     page.press("Next")
-    page.until(lambda: "From a sample" in page.text(".fl-lesson") and not page.view.jobs.answering.searching)
+    page.until(
+        lambda: (
+            "From a sample" in page.text(".fl-lesson") and not page.view.jobs.answering.searching
+        )
+    )
     page.press("▶ Play")
     page.until(lambda: "✓" in page.text(".fl-lesson") and page.session.step is None)
     page.press("Next")

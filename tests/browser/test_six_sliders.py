@@ -1,4 +1,5 @@
-"""The site's page whose answers the core gives as WebAssembly, in a real browser beside the library."""
+"""The site's page whose answers the core gives as WebAssembly, in a real browser beside the
+library."""
 
 import http.server
 import shutil
@@ -57,19 +58,28 @@ def test_the_browser_answers_as_the_library_does(six_sliders: Any, name: str, lo
     names = [layout.names[lost]] if lost >= 0 else []
     allocator = finlab.Allocator(layout)
     rng = np.random.default_rng(5)
-    wrenches = rng.normal(size=(12, 6)) * allocator.scale * np.tile([[0.3], [3.0]], (6, 1)) * layout.commanded
+    wrenches = (
+        rng.normal(size=(12, 6))
+        * allocator.scale
+        * np.tile([[0.3], [3.0]], (6, 1))
+        * layout.commanded
+    )
     for policy in ("closest", "direction", "priority"):
         answers = six_sliders.evaluate(ASKS, [name, lost, wrenches.tolist(), policy])
         for wrench, answer in zip(wrenches, answers, strict=True):
             own = allocator.allocate(wrench, lost=names, policy=policy)
             missing = (own.wrench - answer["wrench"]) * layout.commanded / allocator.scale
             assert np.linalg.norm(missing) < 1e-6
-            assert sum(power or 0.0 for power in answer["power"]) == pytest.approx(own.power, rel=1e-3)
+            assert sum(power or 0.0 for power in answer["power"]) == pytest.approx(
+                own.power, rel=1e-3
+            )
 
 
 def test_a_slider_and_a_lost_actuator_change_the_verdict(six_sliders: Any) -> None:
     six_sliders.select_option("[name=robot]", "A")
-    six_sliders.wait_for_function("document.querySelector('#demo th button').textContent === 'front_right'")
+    six_sliders.wait_for_function(
+        "document.querySelector('#demo th button').textContent === 'front_right'"
+    )
     assert six_sliders.inner_text(".verdict").startswith("Exact. ")
     six_sliders.focus("input[aria-label^=Fx]")
     six_sliders.keyboard.press("End")

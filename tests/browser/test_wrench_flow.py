@@ -1,4 +1,5 @@
-"""Ask for a wrench, fail and damage fins, choose among answers and methods: numbers and arrows follow."""
+"""Ask for a wrench, fail and damage fins, choose among answers and methods: numbers and arrows
+follow."""
 
 from pathlib import Path
 from typing import Any
@@ -18,17 +19,23 @@ def test_numbers_and_arrows_follow_the_target(page: Any) -> None:
     page.until(lambda: page.instances("/robot/wrench/forces") != before)
     page.press("Turn")
     page.until(lambda: page.session.state.target[5] > 0 and page.session.state.target[0] == 1.2)
-    page.until(lambda: page.view.jobs.ranging.answer is not None and not page.view.jobs.ranging.busy)
+    page.until(
+        lambda: page.view.jobs.ranging.answer is not None and not page.view.jobs.ranging.busy
+    )
     high = float(page.view.jobs.ranging.answer.high[0])
     marks = page.row("Fx [N]").first.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
     track = marks.locator(".mantine-Slider-trackContainer")
     said = "track => getComputedStyle(track, '::after').content"
     page.until(lambda: f"{high:.0f}" in track.evaluate(said))
     page.type("Fz [N]", "30")
-    page.until(lambda: "Out of reach" in page.text(".fl-status") and "left undone" in page.text(".said"))
+    page.until(
+        lambda: "Out of reach" in page.text(".fl-status") and "left undone" in page.text(".said")
+    )
     page.choose("Out of reach", "direction")
     page.until(
-        lambda: page.session.state.policy == "direction" and "% of what is asked" in page.text(".said")
+        lambda: (
+            page.session.state.policy == "direction" and "% of what is asked" in page.text(".said")
+        )
     )
     assert page.problems == []
 
@@ -39,13 +46,22 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     force = page.instances("/robot/forces")[0]
     page.press("2")
     page.until(lambda: session.state.failed == ("front_left",))
-    page.until(lambda: "lost" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
     page.until(
-        lambda: len(page.instances("/robot/forces")) == 3 and page.instances("/robot/forces")[0] != force
+        lambda: "lost" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status")
+    )
+    page.until(
+        lambda: (
+            len(page.instances("/robot/forces")) == 3
+            and page.instances("/robot/forces")[0] != force
+        )
     )
     for number in ("1", "3"):
         page.press(number)
-        page.until(lambda number=number: session.state.layout.names[int(number) - 1] in session.state.failed)
+        page.until(
+            lambda number=number: (
+                session.state.layout.names[int(number) - 1] in session.state.failed
+            )
+        )
     page.press("4")
     page.until(lambda: "once all are lost" in page.text(".fl-status"))
     page.unfold("Damage", "Which")
@@ -77,7 +93,9 @@ def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     watts = answering.seen().best.power
     page.choose("Least", "effort")
     page.until(lambda: session.state.method == "mdn" and not page.view.busy)
-    page.until(lambda: "least effort" in page.text(".fl-status") and answering.seen().best.power > watts)
+    page.until(
+        lambda: "least effort" in page.text(".fl-status") and answering.seen().best.power > watts
+    )
     page.until(lambda: rows.count() > 1 and not answering.searching)
     page.until(lambda: "component" in rows.first.inner_text())
     best = answering.seen().best
@@ -102,7 +120,9 @@ def test_a_robot_with_thrusters_is_shown_and_answered(page: Any) -> None:
     page.type("Fz [N]", "40")
     page.until(lambda: "thruster" in page.text("table.fins") and "Exact" in page.text(".fl-status"))
     page.press("6")
-    page.until(lambda: session.state.failed == ("lift_right",) and "5 of 6" in page.text(".fl-status"))
+    page.until(
+        lambda: session.state.failed == ("lift_right",) and "5 of 6" in page.text(".fl-status")
+    )
     page.until(lambda: 0 < len(page.instances("/robot/forces")) < 6)
     page.tab("Simulate")
     page.until(lambda: page.page.get_by_text("Start lets this robot swim").is_visible())
@@ -131,7 +151,11 @@ def test_a_number_counts_when_it_is_typed_whole(page: Any) -> None:
         page.until(lambda: session.state.target[0] == value and not page.view.busy)
         page.until(lambda: box.input_value() == f"{value:g}", told=lambda: box.input_value())
 
-    for text, end, value in (("2.347", "Enter", 2.347), ("-0.5", "Tab", -0.5), ("12.25", "Enter", 12.25)):
+    for text, end, value in (
+        ("2.347", "Enter", 2.347),
+        ("-0.5", "Tab", -0.5),
+        ("12.25", "Enter", 12.25),
+    ):
         asked(text, end, value)
     asked("77", "Escape", 12.25)
     asked("", "Enter", 12.25)
@@ -179,7 +203,9 @@ def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     swimming = page.view.jobs.swimming
     page.choose("Scenario", "lost-in-current")
     page.until(lambda: not page.session.swim.announced)
-    page.until(lambda: "In a current of 0.07 m/s a fin is lost half-way" in page.page.inner_text("body"))
+    page.until(
+        lambda: "In a current of 0.07 m/s a fin is lost half-way" in page.page.inner_text("body")
+    )
     page.choose("Method", "analytic")
     page.until(lambda: page.session.state.method == "analytic")
     page.type("Speed", "8")

@@ -20,7 +20,17 @@ WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
 KEYS = [
     *("actuators", "fins", "command", "lost", "target", "flow", "wrench_expected"),
     *("wrench_plant", "unallocated", "err_norm", "expected_error", "expected_miss", "effort"),
-    *("power", "bound", "calm_power", "scale", "solve_ms", "method", "checkpoint", "reachable", "share"),
+    *(
+        "power",
+        "bound",
+        "calm_power",
+        "scale",
+        "solve_ms",
+        "method",
+        "checkpoint",
+        "reachable",
+        "share",
+    ),
     *("binding", "unknown_fins", "notes"),
 ]
 
@@ -90,11 +100,15 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
-    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method dual\n", out)
+    assert re.search(
+        r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method dual\n", out
+    )
 
 
 def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, str, str]]) -> None:
-    code, out, _ = allocate("A", "--wrench", "500", "0", "0", "0", "0", "0", "--policy", "direction")
+    code, out, _ = allocate(
+        "A", "--wrench", "500", "0", "0", "0", "0", "0", "--policy", "direction"
+    )
     assert code == 0
     assert "not reached: " in out.splitlines()[-1]
     assert "% of the wrench is delivered" in out.splitlines()[-1]
@@ -104,8 +118,14 @@ def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, st
     ("argv", "message"),
     [
         (["A", "--wrench", "nan", "0", "0", "0", "0", "0"], "wrench: Fx must be a number"),
-        (["A", "--wrench", "0", "0", "0", "0", "0", "-inf"], "wrench: Tz must be a number of at most"),
-        (["A", "--wrench", "1e300", "0", "0", "0", "0", "0"], "wrench: Fx must be a number of at most"),
+        (
+            ["A", "--wrench", "0", "0", "0", "0", "0", "-inf"],
+            "wrench: Tz must be a number of at most",
+        ),
+        (
+            ["A", "--wrench", "1e300", "0", "0", "0", "0", "0"],
+            "wrench: Fx must be a number of at most",
+        ),
         (["A", "--wrench", "1", "0", "0"], "Expected 6 values"),
         (["A", "--wrench", "1", "0", "0", "0", "0", "0", "0"], "Unrecognized options: 0"),
         (["A", "--wrench", "1", "0", "0", "0", "0", "up"], "Error parsing --wrench"),
@@ -132,7 +152,10 @@ def test_bad_arguments_are_one_plain_message(
 
 @pytest.mark.parametrize("name", ["bomb", "python", "binary", "big", "many", "empty"])
 def test_hostile_files_end_in_one_sentence(
-    name: str, allocate: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    allocate: Callable[..., tuple[int, str, str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     content, _ = HOSTILE[name]
     monkeypatch.chdir(tmp_path)
@@ -151,7 +174,12 @@ def test_whole_program(tmp_path: Path) -> None:
 
     def run(*argv: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [*command, *argv], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60
+            [*command, *argv],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
         )
 
     good = run(*WRENCH)
@@ -162,7 +190,9 @@ def test_whole_program(tmp_path: Path) -> None:
     assert bad.stderr.startswith("finlab: error: ") and "Traceback" not in bad.stderr
 
 
-def test_a_fin_that_is_stuck_keeps_its_direction(allocate: Callable[..., tuple[int, str, str]]) -> None:
+def test_a_fin_that_is_stuck_keeps_its_direction(
+    allocate: Callable[..., tuple[int, str, str]],
+) -> None:
     stuck = answer(allocate("A", *WRENCH, "--json", "--stuck", "front_left=30"))
     assert stuck["command"][1][2] == pytest.approx(0.5235987755982988)
 

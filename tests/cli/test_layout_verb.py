@@ -65,7 +65,10 @@ def test_show_works_from_any_folder(
 
 def test_check_and_json_take_any_actuator(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layout", "check", "turtle_hybrid"]) == 0
-    assert capsys.readouterr().out == "turtle_hybrid: ok, layout turtle_hybrid with 4 fins and 2 thrusters\n"
+    assert (
+        capsys.readouterr().out
+        == "turtle_hybrid: ok, layout turtle_hybrid with 4 fins and 2 thrusters\n"
+    )
     assert main(["layout", "show", "turtle_hybrid", "--lost", "lift_left", "--json"]) == 0
     values = json.loads(capsys.readouterr().out)
     assert (values["counted"], values["lost"]) == ("4 fins and 1 thruster", ["lift_left"])
@@ -73,9 +76,21 @@ def test_check_and_json_take_any_actuator(capsys: pytest.CaptureFixture[str]) ->
     assert values["axes"][0] == "surge"
 
 
-def test_optimize_writes_a_better_layout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimize_writes_a_better_layout(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     output = tmp_path / "better.yaml"
-    arguments = ["layout", "optimize", "A", "--fins", "front_right", "--rounds", "1", "-o", str(output)]
+    arguments = [
+        "layout",
+        "optimize",
+        "A",
+        "--fins",
+        "front_right",
+        "--rounds",
+        "1",
+        "-o",
+        str(output),
+    ]
     assert main(arguments) == 0
     out, err = capsys.readouterr()
     assert "weakest_direction: 11.54 -> " in out
@@ -108,8 +123,14 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("optimize A -o OUT --fins front_right --goal beauty", "goal: expected one of"),
         ("optimize A -o OUT --fins front_right --reach -1", "expected --reach from 0 m"),
         ("optimize A -o OUT --fins front_right --turn 200", "--turn from 0 to 180 degrees"),
-        ("optimize A -o OUT --fins front_right --rounds 0", "rounds: expected a number of at least 1"),
-        ("optimize A -o no/where.yaml --fins front_right", "output: expected a file in an existing folder"),
+        (
+            "optimize A -o OUT --fins front_right --rounds 0",
+            "rounds: expected a number of at least 1",
+        ),
+        (
+            "optimize A -o no/where.yaml --fins front_right",
+            "output: expected a file in an existing folder",
+        ),
     ],
 )
 def test_wrong_questions(argv: str, message: str, tmp_path: Path) -> None:

@@ -38,7 +38,9 @@ def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("verb", list(verbs(_command_line([]))))
-def test_every_verb_has_a_page_of_help_with_an_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_verb_has_a_page_of_help_with_an_example(
+    verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main([*verb.split(), "--help"]) == 0
     page = capsys.readouterr().out
     assert page.startswith(f"usage: finlab {verb}".strip())
@@ -51,7 +53,8 @@ def test_every_verb_has_a_page_of_help_with_an_example(verb: str, capsys: pytest
 
 
 def without_work(run: Callable[..., Any], seen: list[str]) -> Callable[..., None]:
-    """A function with the options of a verb's, which does nothing but note that its options were read."""
+    """A function with the options of a verb's, which does nothing but note that its options were
+    read."""
 
     @functools.wraps(run)
     def noted(*args: Any, **options: Any) -> None:
@@ -69,11 +72,15 @@ def still(app: SubcommandApp, seen: list[str]) -> None:
             command.target = without_work(command.target, seen)
 
 
-ALL_EXAMPLES = [line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())]
+ALL_EXAMPLES = [
+    line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())
+]
 
 
 @pytest.mark.parametrize("line", list(dict.fromkeys(ALL_EXAMPLES)))
-def test_the_options_of_every_example_are_understood(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_options_of_every_example_are_understood(
+    line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     program, *argv = shlex.split(line)
     seen: list[str] = []
     verb = copy.deepcopy(_verb(argv[0], argv))
@@ -122,7 +129,8 @@ def test_help_is_fast_and_loads_nothing_heavy() -> None:
     )
     heavy, seconds = done.stdout.splitlines()[-2:]
     assert heavy == "[]"
-    # Of this process alone, so that a busy machine does not count: 0.25 s; numpy alone takes 0.15 s more.
+    # Of this process alone, so that a busy machine does not count: 0.25 s; numpy alone takes 0.15 s
+    # more.
     assert float(seconds) < 1.0
 
 
@@ -147,7 +155,9 @@ RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
         (">&-", "standard output is closed; write the output to another place"),
     ],
 )
-def test_output_that_cannot_be_written_is_one_sentence(command: list[str], output: str, reason: str) -> None:
+def test_output_that_cannot_be_written_is_one_sentence(
+    command: list[str], output: str, reason: str
+) -> None:
     line = f"{' '.join(command)} {output}; echo $? >&2"
     done = subprocess.run(["bash", "-c", line], stderr=subprocess.PIPE, text=True, timeout=30)
     name = "finlab" if command[2] == "finlab" else "finlab-runtime"
@@ -177,7 +187,9 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
     assert (tmp_path / "fin.csv").exists()
 
 
-def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unwritable_output_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "file"
     file.write_text("in the way")
     assert main(["train", "mdn", "--preset", "smoke", "--output", str(file / "below")]) == 2
@@ -218,7 +230,9 @@ def test_every_verb_prints_one_object_or_writes_it(
     assert keys(json.loads((tmp_path / "x.json").read_text())) == keys(shown)
     with pytest.raises(ValueError, match="Expecting value"):
         json.loads(capsys.readouterr().out)  # the table
-    assert "json: expected a file in an existing folder" in refused([*argv, "--json", str(tmp_path)])
+    assert "json: expected a file in an existing folder" in refused(
+        [*argv, "--json", str(tmp_path)]
+    )
 
 
 def keys(value: Any) -> Any:
@@ -231,8 +245,17 @@ def keys(value: Any) -> Any:
 @pytest.mark.parametrize(
     "line",
     [
-        *("eval wrench R", "eval faults R", "eval velocity --layouts R", "eval trajectory --layouts R"),
-        *("eval faults --trajectory T", "eval trajectory --trajectory T", "simulate A --trajectory T"),
+        *(
+            "eval wrench R",
+            "eval faults R",
+            "eval velocity --layouts R",
+            "eval trajectory --layouts R",
+        ),
+        *(
+            "eval faults --trajectory T",
+            "eval trajectory --trajectory T",
+            "simulate A --trajectory T",
+        ),
         *("simulate R", "app --layout R"),
     ],
 )
@@ -250,7 +273,9 @@ def test_named_files_are_read_in_the_process_with_limits(
         place.write_text("t,x: [", encoding="utf-8")
     for module in ("finlab.files.guarded", "finlab.files.csv_table"):
         monkeypatch.setattr(f"{module}.read_file", elsewhere)
-    assert f"error: {tmp_path}/a." in refused([str(places.get(word, word)) for word in line.split()])
+    assert f"error: {tmp_path}/a." in refused(
+        [str(places.get(word, word)) for word in line.split()]
+    )
 
 
 def test_missing_extra_names_the_command_that_installs_it(
@@ -260,7 +285,9 @@ def test_missing_extra_names_the_command_that_installs_it(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["app"]) == 2
-    sentence = "the web app needs 'viser', which is not installed; run: pip install 'finlab-marine[app]'"
+    sentence = (
+        "the web app needs 'viser', which is not installed; run: pip install 'finlab-marine[app]'"
+    )
     assert capsys.readouterr().err == f"finlab: error: {sentence}\n"
 
 

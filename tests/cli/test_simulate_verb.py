@@ -23,7 +23,9 @@ def line(tmp_path: Path) -> list[str]:
     return ["simulate", "A", "--trajectory", str(path), "--method", "analytic"]
 
 
-def test_a_log_is_written(line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_is_written(
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
     argv = [*line, "--lost", "front_left@4", "--output", str(out)]
     assert main(argv) == 0
@@ -35,7 +37,9 @@ def test_a_log_is_written(line: list[str], tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("limit", [0, 20_000])
-def test_a_full_disk_is_a_sentence_and_leaves_nothing(limit: int, line: list[str], tmp_path: Path) -> None:
+def test_a_full_disk_is_a_sentence_and_leaves_nothing(
+    limit: int, line: list[str], tmp_path: Path
+) -> None:
     """A limit on the size of files stands for the disk."""
     out = tmp_path / "out"
     ended = subprocess.run(
@@ -84,7 +88,10 @@ def test_the_papers_controllers_and_a_picture(
 
 
 def test_without_matplotlib_a_picture_is_refused_before_the_swim(
-    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    line: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main([*line, "--plot", str(tmp_path / "path.png")]) == 2
@@ -104,7 +111,10 @@ def test_without_matplotlib_a_picture_is_refused_before_the_swim(
         (["--torn", "front_left=2@3"], "a share of the thrust between 0 and 1"),
         (["--lost", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
-        (["--excite", "--monitor"], "leave --controller, --lost, --torn, --stuck, --whole, --monitor and"),
+        (
+            ["--excite", "--monitor"],
+            "leave --controller, --lost, --torn, --stuck, --whole, --monitor and",
+        ),
         (["-o", __file__], "cannot be made a folder: File exists"),
     ],
 )

@@ -1,4 +1,5 @@
-"""`finlab train mdn`, then an allocation with the result; what `finlab fit fin` says on a terminal."""
+"""`finlab train mdn`, then an allocation with the result; what `finlab fit fin` says on a
+terminal."""
 
 import io
 import json
@@ -35,7 +36,20 @@ def test_trains_the_network_over_forces_and_allocates_with_it(
     folder = str(tmp_path / "mine")
     assert main(["train", "mdn", "-o", folder, *SMOKE]) == 0
     assert f"{folder}: checkpoint mine, preset smoke, sha256 " in capsys.readouterr().out
-    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", folder, "--json"]
+    command = [
+        "allocate",
+        "A",
+        "--wrench",
+        "1",
+        "0",
+        "0",
+        "0",
+        "0",
+        "0",
+        "--checkpoint",
+        folder,
+        "--json",
+    ]
     assert main([*command, "--method", "mdn"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["checkpoint"] == "mine" and answer["err_norm"] < 1e-4
@@ -57,7 +71,10 @@ def test_says_what_to_install_where_torch_is_missing(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WITHOUT_TORCH, "train", "mdn", "-o", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2 and done.stdout == ""
-    assert done.stderr == "finlab: error: torch is not installed; run: pip install 'finlab-marine[train]'\n"
+    assert (
+        done.stderr
+        == "finlab: error: torch is not installed; run: pip install 'finlab-marine[train]'\n"
+    )
 
 
 def test_a_full_disk_is_one_sentence_with_the_path(tmp_path: Path) -> None:
@@ -84,7 +101,10 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_steps_are_told_on_terminals_alone(
-    terminal: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    terminal: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     command = commands(40)
     data = write(tmp_path / "cell.csv", columns_of(command, measured(soft(), command)))

@@ -1,4 +1,5 @@
-"""`finlab export ROBOT --c DIR`: the self-test here, under sanitizers, on aarch64 and on a Cortex-M7."""
+"""`finlab export ROBOT --c DIR`: the self-test here, under sanitizers, on aarch64 and on a
+Cortex-M7."""
 
 import os
 import re
@@ -47,17 +48,23 @@ def exported(name: str, samples: int = 24, flow: tuple[float, ...] | None = None
 
 
 def ran(command: str, folder: Path, code: int = 0) -> str:
-    """What a command prints, run in a folder; `*` stands for names. Compilers that are missing fail the test:
-    `make test` installs them."""
-    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, timeout=7200)
+    """What a command prints, run in a folder; `*` stands for names. Compilers that are missing fail
+    the test: `make test` installs them."""
+    done = subprocess.run(
+        command, shell=True, cwd=folder, capture_output=True, text=True, timeout=7200
+    )
     assert done.returncode == code, f"{command}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return done.stdout
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang -DFL_SINGLE"])
 @pytest.mark.parametrize(("name", "flow"), sampled(starmap(pytest.param, EXPORTS), every=2))
-def test_self_test_holds(name: str, flow: tuple[float, ...] | None, compiler: str, tmp_path: Path) -> None:
-    words = f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+def test_self_test_holds(
+    name: str, flow: tuple[float, ...] | None, compiler: str, tmp_path: Path
+) -> None:
+    words = (
+        f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    )
     assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
 
@@ -71,7 +78,9 @@ def test_single_precision_chooses_the_same_parts_of_sets_with_gaps(tmp_path: Pat
 def test_single_precision_goes_on_while_the_ridge_grows(tmp_path: Path) -> None:
     """From the first prices of foils at a kink, eight steps in a row are refused."""
     words = f"gcc -std=c99 -O1 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
-    assert ran(words, exported("torpedo", 24, (1.5, 0.0, 0.0, 0.0, 0.0, 0.0))).startswith("0 of 24 ")
+    assert ran(words, exported("torpedo", 24, (1.5, 0.0, 0.0, 0.0, 0.0, 0.0))).startswith(
+        "0 of 24 "
+    )
 
 
 @pytest.mark.parametrize("single", SINGLE)
@@ -112,7 +121,9 @@ def test_single_precision_answers_as_double_does(name: str, tmp_path: Path) -> N
 )
 def test_fuzzer_finds_nothing(name: str, cases: int, compiler: str, tmp_path: Path) -> None:
     cases = int(os.environ.get("FUZZ", cases))  # `make fuzz`: a million in all
-    words = f"{compiler} -std=c99 -O1 {SANITIZED} -DFL_NO_MAIN -DFL_PARTS=20 -I. *.c {HERE / 'fuzz.c'}"
+    words = (
+        f"{compiler} -std=c99 -O1 {SANITIZED} -DFL_NO_MAIN -DFL_PARTS=20 -I. *.c {HERE / 'fuzz.c'}"
+    )
     folder = exported(name, flow=SPEED if name == "torpedo" else None)
     said = ran(f"{words} -lm -o {tmp_path}/it && {tmp_path}/it {cases}", folder)
     blocks, refused_ones, answers = map(int, re.findall(r"\d+", said)[:3])
@@ -122,7 +133,9 @@ def test_fuzzer_finds_nothing(name: str, cases: int, compiler: str, tmp_path: Pa
 def test_on_aarch64(tmp_path: Path) -> None:
     for single in SINGLE:
         words = f"aarch64-linux-gnu-gcc -std=c99 -O2 -static {single} *.c -lm -o {tmp_path / 'it'}"
-        assert ran(f"{words} && qemu-aarch64 {tmp_path / 'it'}", exported("octo", 200)).startswith("0 of ")
+        assert ran(f"{words} && qemu-aarch64 {tmp_path / 'it'}", exported("octo", 200)).startswith(
+            "0 of "
+        )
 
 
 def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
@@ -131,12 +144,17 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
     board = f"-Wl,--gc-sections -nostartfiles -T{HERE / 'board.ld'} {HERE / 'board.c'}"
     ran(f"{SMALL} -DFL_NO_MAIN {board} -I. *.c -lm -o {elf}", folder)
     machine = (
-        "-M mps2-an500 -display none -monitor none -serial stdio -semihosting-config enable=on,target=native"
+        "-M mps2-an500 -display none -monitor none -serial stdio -semihosting-config "
+        "enable=on,target=native"
     )
     said = ran(f"qemu-system-arm {machine} -kernel {elf}", folder)
     found = {name: int(value) for name, value in re.findall(r"(\w+) (\d+)", said)}
     assert found["differ"] == 0 and found["static"] + found["stack"] <= 17_000
-    core = [path.stem for path in folder.glob("*.c") if path.stem not in ("robot", "allocate", "selftest")]
+    core = [
+        path.stem
+        for path in folder.glob("*.c")
+        if path.stem not in ("robot", "allocate", "selftest")
+    ]
     for name in core:
         ran(f"{SMALL} -c {name}.c -o {tmp_path / name}.o", folder)
     sizes = ran(f"arm-none-eabi-size {shlex.join(f'{name}.o' for name in core)}", tmp_path)
@@ -146,9 +164,14 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
 def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
     method = AnyRobot().method(load_layout(name))
-    robot = method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
+    robot = (
+        method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
+    )
     thin = thinned(robot.block)
-    assert max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin)) * 4 <= 4096
+    assert (
+        max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin)) * 4
+        <= 4096
+    )
     assert len(thinned(thin)) <= len(thin)
     double = actuators_of(robot.block)
     single = actuators_of(thin)
@@ -159,7 +182,8 @@ def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
 def test_cmake_builds_and_the_examples_compile(tmp_path: Path) -> None:
     folder = exported("bluerov2_heavy")
     ran(
-        f"cmake -S . -B {tmp_path}/b -DFL_SINGLE=ON && cmake --build {tmp_path}/b && {tmp_path}/b/selftest",
+        f"cmake -S . -B {tmp_path}/b -DFL_SINGLE=ON && cmake --build {tmp_path}/b && "
+        f"{tmp_path}/b/selftest",
         folder,
     )
     (tmp_path / "src").symlink_to(folder)  # where a sketch of Arduino has its C files
@@ -171,7 +195,8 @@ def test_cmake_builds_and_the_examples_compile(tmp_path: Path) -> None:
             (tmp_path / header).write_text(stubs)
         (tmp_path / "one.cpp").write_text(f'{stubs}#include "{example}"\n')
         ran(
-            f"g++ -std=c++17 -Wall -Wextra -Werror -I{tmp_path} -I. -c {tmp_path}/one.cpp -o {tmp_path}/o",
+            f"g++ -std=c++17 -Wall -Wextra -Werror -I{tmp_path} -I. -c {tmp_path}/one.cpp -o "
+            f"{tmp_path}/o",
             folder,
         )
 
@@ -183,5 +208,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "front_left" not in (tmp_path / "c" / "robot.h").read_text()
     (tmp_path / "c" / "mine.c").write_text("")
     assert "'mine.c'" in refused(["export", "A", "--c", str(tmp_path / "c")])
-    assert "--c DIR" in refused(["export", "torpedo", "-o", str(tmp_path / "e"), "--flow", *"100000"])
+    assert "--c DIR" in refused(
+        ["export", "torpedo", "-o", str(tmp_path / "e"), "--flow", *"100000"]
+    )
     assert "no C sources" in refused(["export", "A", "--method", "mdn", "--c", str(tmp_path / "d")])

@@ -1,4 +1,5 @@
-"""The core as Python calls it: sizes of both languages, damaged blocks, arguments, one answer and many."""
+"""The core as Python calls it: sizes of both languages, damaged blocks, arguments, one answer and
+many."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -82,7 +83,9 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
         assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).within[0]
     with pytest.raises(CommandError, match="argument"):
         heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.inf)))
-    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).within[0]  # nothing is known
+    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).within[
+        0
+    ]  # nothing is known
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,4 +1,5 @@
-"""The fields of a block are said once: one more in the middle changes no answer, in Python or exported C."""
+"""The fields of a block are said once: one more in the middle changes no answer, in Python or
+exported C."""
 
 import os
 import shutil
@@ -44,7 +45,9 @@ def copied(folder: Path) -> Path:
     before = "FL_FIELD(fl_real, own, [3][6],"
     text = fields.read_text()
     assert text.count(before) == 1
-    fields.write_text(text.replace(before, f'FL_FIELD(fl_real, spare, [5], "1", "of a test")\n{before}'))
+    fields.write_text(
+        text.replace(before, f'FL_FIELD(fl_real, spare, [5], "1", "of a test")\n{before}')
+    )
     return copy
 
 
@@ -53,14 +56,17 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     sources = sorted(map(str, (copy / "core" / "src").glob("*.c")))
     library = str(copy / "core" / "libfinlab.so")
     subprocess.run(
-        ["gcc", *FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"], check=True
+        ["gcc", *FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"],
+        check=True,
     )
     said = {}
     for name, place in (("now", Path(finlab.__file__).parents[1]), ("more", tmp_path)):
         out = tmp_path / name
         out.mkdir()
         words = {**os.environ, "PYTHONPATH": str(place)}
-        subprocess.run([sys.executable, "-c", ASK, str(out), str(LAYOUTS)], env=words, cwd=out, check=True)
+        subprocess.run(
+            [sys.executable, "-c", ASK, str(out), str(LAYOUTS)], env=words, cwd=out, check=True
+        )
         said[name] = dict(np.load(out / "commands.npz"))
     assert "spare" in said["more"].pop("fields") and "spare" not in said["now"].pop("fields")
     for name, commands in said["now"].items():

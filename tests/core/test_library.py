@@ -1,4 +1,5 @@
-"""The core as a C library that others link: warnings, names of the linker, several robots in one program."""
+"""The core as a C library that others link: warnings, names of the linker, several robots in one
+program."""
 
 import itertools
 import subprocess
@@ -78,7 +79,9 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
     (tmp_path / "main.cpp").write_text(MAIN)
     program = tmp_path / "main"
     words = ["g++", "-std=c++17", "-Wall", "-Wextra", "-pedantic", "-Werror", "main.cpp"]
-    subprocess.run([*words, *map(str, objects), "-lm", "-o", str(program)], check=True, cwd=tmp_path)
+    subprocess.run(
+        [*words, *map(str, objects), "-lm", "-o", str(program)], check=True, cwd=tmp_path
+    )
     subprocess.run([str(program)], check=True)
 
 

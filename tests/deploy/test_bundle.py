@@ -1,4 +1,5 @@
-"""Bundles: the same bytes every time, read back whole, and refused once anything in them was changed."""
+"""Bundles: the same bytes every time, read back whole, and refused once anything in them was
+changed."""
 
 import hashlib
 import json
@@ -62,14 +63,20 @@ def test_folder_and_archive_hold_the_same_and_come_back(
     bundle.write_zip(tmp_path / "A.zip")
     for place in (tmp_path / "A", tmp_path / "A.zip"):
         assert read_bundle_files(place) == dict(bundle.files)
-        assert finlab.load_layout(place) == finlab.load_layout(str(place)) == finlab.load_layout("A")
+        assert (
+            finlab.load_layout(place) == finlab.load_layout(str(place)) == finlab.load_layout("A")
+        )
         assert load_robot(place).layout == finlab.load_layout("A")
         assert Allocator.from_bundle(place).allocate(WRENCH) == truth
     bundle.write(tmp_path / "A")  # an earlier bundle is replaced
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["A", "A.zip"], "nothing else is left behind"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["A", "A.zip"], (
+        "nothing else is left behind"
+    )
 
 
-def test_the_method_with_networks_answers_with_those_of_this_finlab(of_mdn: Bundle, tmp_path: Path) -> None:
+def test_the_method_with_networks_answers_with_those_of_this_finlab(
+    of_mdn: Bundle, tmp_path: Path
+) -> None:
     of_mdn.write(tmp_path)
     desk = Allocator(finlab.load_layout("A"), "mdn")
     assert Allocator.from_bundle(tmp_path).allocate(WRENCH) == desk.allocate(WRENCH)
@@ -91,7 +98,9 @@ def test_networks_of_ones_own_travel(
     line = ["export", "A", "-o", str(place), "--method", method, "--checkpoint", str(folder)]
     assert main([*line, "--zip"] if archive else line) == 0
     shutil.rmtree(folder)
-    assert Allocator.from_bundle(place).allocate(WRENCH) == truth == load_robot(place).allocate(WRENCH)
+    assert (
+        Allocator.from_bundle(place).allocate(WRENCH) == truth == load_robot(place).allocate(WRENCH)
+    )
     assert truth.checkpoint == "mine"
     again = make_bundle(Allocator.from_bundle(place))
     assert dict(again.files) == read_bundle_files(place)
@@ -99,7 +108,9 @@ def test_networks_of_ones_own_travel(
     files = dict(again.files)
     weights = NETWORKS + "model.safetensors"
     for damaged in (files[weights][:-4], files[weights][:-4] + bytes(4)):
-        with pytest.raises(CheckpointError, match="checkpoint/model.safetensors: its SHA-256 is not the one"):
+        with pytest.raises(
+            CheckpointError, match="checkpoint/model.safetensors: its SHA-256 is not the one"
+        ):
             parse_robot(resealed({**files, weights: damaged}))
     del files[NETWORKS + "config.json"]
     with pytest.raises(CheckpointError, match="checkpoint/config.json: no such file"):
@@ -109,7 +120,9 @@ def test_networks_of_ones_own_travel(
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
     shipped_allocator: AnyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    make_bundle(shipped_allocator.on(finlab.load_layout("A")), ("back_left",)).write_zip(tmp_path / "A.zip")
+    make_bundle(shipped_allocator.on(finlab.load_layout("A")), ("back_left",)).write_zip(
+        tmp_path / "A.zip"
+    )
     robot = str(tmp_path / "A.zip")
     line = ["allocate", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
     assert main(line) == 0
@@ -127,23 +140,37 @@ def test_settings_travel(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"settings": []}, "settings must be keys and values"),
-        ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
+        (
+            {"settings": {"n_tries": 3}},
+            "settings: method 'dual' knows the settings .*, got 'n_tries'",
+        ),
         ({"period_s": -1.0}, "period_s: expected a number"),
         ({"robust": float("nan")}, "holds NaN, expected a finite number"),
-        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 9; export it again"),
-        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 9; export it again"),
+        (
+            {"version": 4.0},
+            "is a bundle of version 4.0, this finlab reads version 9; export it again",
+        ),
+        (
+            {"version": "4"},
+            "is a bundle of version '4', this finlab reads version 9; export it again",
+        ),
         ({"version": 3}, "is a bundle of version 3, this finlab reads version 9; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"method": "sqp"}, "method must be one of dual, mdn, paper, got 'sqp'"),
         ({"method": "mdn", "settings": {}}, "was made with other networks than this finlab's"),
-        ({"method": "mdn", "settings": {}, "checkpoint": "mine"}, "'mine' is not among the shipped ones"),
+        (
+            {"method": "mdn", "settings": {}, "checkpoint": "mine"},
+            "'mine' is not among the shipped ones",
+        ),
     ],
 )
 def test_settings_no_robot_should_try_are_refused(
     change: dict[str, object], message: str, bundle: Bundle
 ) -> None:
-    files = edited(bundle, ABOUT, lambda d: (d if set(change) & set(d) else d["settings"]).update(change))
+    files = edited(
+        bundle, ABOUT, lambda d: (d if set(change) & set(d) else d["settings"]).update(change)
+    )
     with pytest.raises(FinlabError, match=message):
         parse_robot(files)
 
@@ -171,11 +198,17 @@ def test_other_networks_than_those_of_the_desk_are_refused(of_mdn: Bundle) -> No
 
 
 def test_force_tables_travel_and_answer_from_folder_and_archive(
-    measured: Layout, measured_bundle: Bundle, shipped_allocator: AnyRobot, force_table: Path, tmp_path: Path
+    measured: Layout,
+    measured_bundle: Bundle,
+    shipped_allocator: AnyRobot,
+    force_table: Path,
+    tmp_path: Path,
 ) -> None:
     content = force_table.read_bytes()
     assert measured_bundle.files[table_name(content)] == content
-    assert str(force_table.parent).encode() not in b"".join(measured_bundle.files.values()), "no path leaks"
+    assert str(force_table.parent).encode() not in b"".join(measured_bundle.files.values()), (
+        "no path leaks"
+    )
     measured_bundle.write(tmp_path / "robot")
     measured_bundle.write_zip(tmp_path / "robot.zip")
     truth = shipped_allocator.allocate(measured, WRENCH, lost=["front_left"])
@@ -200,11 +233,15 @@ def test_a_force_table_outside_the_bundle_is_refused(
 ) -> None:
     (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
     table = {"type": "table", "path": path}
-    forged = Bundle(edited(measured_bundle, ROBOT, lambda d: d["layout"]["actuators"][2].update(model=table)))
+    forged = Bundle(
+        edited(measured_bundle, ROBOT, lambda d: d["layout"]["actuators"][2].update(model=table))
+    )
     place = tmp_path / ("x.zip" if archive else "x")
     (forged.write_zip if archive else forged.write)(place)
     for read in (finlab.load_layout, load_robot):
-        with pytest.raises(FinlabError, match=r"model.path: names a force table that is not in the bundle"):
+        with pytest.raises(
+            FinlabError, match=r"model.path: names a force table that is not in the bundle"
+        ):
             read(place)
 
 
@@ -227,7 +264,9 @@ def archive_of(path: Path, **files: bytes) -> Path:
     ],
     ids=["missing", "empty", "out of the archive", "zip bomb", "tables", "out of tables"],
 )  # fmt: skip
-def test_what_is_no_bundle_is_refused(make: Callable[[Path], Path], message: str, tmp_path: Path) -> None:
+def test_what_is_no_bundle_is_refused(
+    make: Callable[[Path], Path], message: str, tmp_path: Path
+) -> None:
     with pytest.raises(DataError, match=message):
         load_robot(make(tmp_path))
 
@@ -250,7 +289,9 @@ def test_a_full_disk_leaves_nothing_under_the_final_name(
     write(tmp_path / "old" / "bundle", bundle)
     before = held(tmp_path)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limits[1]))  # a file cannot be longer than that
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (200_000, limits[1])
+    )  # a file cannot be longer than that
     try:
         for name in ("new", "old/bundle"):
             with pytest.raises(DataError, match="cannot be written"):
@@ -299,7 +340,10 @@ def test_export_refuses_the_name_of_a_file(capsys: pytest.CaptureFixture[str]) -
         (lambda d: d.update(lost=["nobody"]), "no fin 'nobody'"),
         (lambda d: d["layout"].update(surprise=1), "layout: surprise: unknown key"),
         (lambda d: d["self_test"][0]["command"].pop(), r"self_test\[0\].command: expected 4 rows"),
-        (lambda d: d["self_test"][0].pop("wrench"), r"self_test\[0\].wrench: required key is missing"),
+        (
+            lambda d: d["self_test"][0].pop("wrench"),
+            r"self_test\[0\].wrench: required key is missing",
+        ),
     ],
 )
 def test_a_robot_that_is_none_is_refused(

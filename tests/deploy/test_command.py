@@ -15,7 +15,13 @@ from finlab.actuators.rudder import Rudder
 from finlab.deploy import deployed_robot
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.command import main
-from finlab.deploy.deployed_robot import DeployedRobot, extremes, load_robot, parse_robot, self_check
+from finlab.deploy.deployed_robot import (
+    DeployedRobot,
+    extremes,
+    load_robot,
+    parse_robot,
+    self_check,
+)
 from finlab.errors import FinlabError
 from finlab.layout import Layout, save_layout
 from finlab.physics import plant_of
@@ -43,7 +49,9 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
         f"assert main(['allocate', {str(folder)!r}, *{WRENCH!r}]) == 0\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'\n"
     )
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")
+    }
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env=environment
     )
@@ -57,14 +65,20 @@ def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> Non
     assert main([*question, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     lost = shown["fins"].index("back_left")
-    assert shown["lost"] == ["back_left"] and shown["target"] == TARGET and shown["command"][lost] is None
+    assert (
+        shown["lost"] == ["back_left"]
+        and shown["target"] == TARGET
+        and shown["command"][lost] is None
+    )
     kept = [row for row in shown["command"] if row is not None]
     np.testing.assert_array_equal(kept, np.delete(truth.command, lost, axis=0))
     assert (shown["power"], shown["wrench_plant"]) == (truth.power, truth.wrench.tolist())
     far = ["--wrench", "90", "0", "0", "0", "0", "0", "--policy", "direction"]
     assert main(["allocate", str(folder), *far, "--lost", "back_left"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[:5] == ["actuator", "type", "command", "force", "[N]"], "the table of the library"
+    assert lines[0].split()[:5] == ["actuator", "type", "command", "force", "[N]"], (
+        "the table of the library"
+    )
     assert lines[1 + lost].split() == ["back_left", "fin", "lost"]
     assert any(line.startswith("err_norm ") for line in lines)
 
@@ -77,7 +91,9 @@ def test_a_layout_file_is_refused_with_the_way_out(
         (tmp_path / name).write_bytes((tmp_path / "robot.yaml").read_bytes())
         assert main(["check", str(tmp_path / name)]) == 2
         told = capsys.readouterr().err
-        assert told.startswith(f"finlab-runtime: error: {tmp_path / name}: ") and told.count("\n") == 1
+        assert (
+            told.startswith(f"finlab-runtime: error: {tmp_path / name}: ") and told.count("\n") == 1
+        )
     assert main(["check", "nowhere"]) == 2
     assert capsys.readouterr().err.startswith("finlab-runtime: error: nowhere: no such file")
 
@@ -107,7 +123,9 @@ def test_check_prints_each_finding(
         (["serve", "bundle", "--watchdog-s=2", "--no-watchdog"], "not allowed with argument"),
     ],
 )
-def test_a_wrong_call_ends_with_usage_and_2(arguments: list[str], message: str, capsys: Any) -> None:
+def test_a_wrong_call_ends_with_usage_and_2(
+    arguments: list[str], message: str, capsys: Any
+) -> None:
     assert main(arguments) == 2
     told = capsys.readouterr().err
     assert told.startswith("usage: finlab-runtime ") and message in told
@@ -134,7 +152,9 @@ def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
     answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], lost=["front_right"])
     assert answer.names == finlab.load_layout("A").names
     assert np.isnan(answer.command[0]).all() and not np.isnan(answer.command[1:]).any()
-    np.testing.assert_allclose(answer.wrench + answer.unallocated, [1, 0, 0.5, 0, 0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(
+        answer.wrench + answer.unallocated, [1, 0, 0.5, 0, 0, 0.1], atol=1e-12
+    )
     far = robot.allocate([90, 0, 0, 0, 0, 0], policy="direction")
     assert far.err_norm > 1 and abs(far.wrench[1]) < 0.1
     with pytest.raises(FinlabError, match="no fin 'nobody'"):
@@ -178,7 +198,9 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
 
 
 def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None:
-    rudder = Rudder("tail", (-0.6, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.02, (-0.5, 0.5), 3.0)
+    rudder = Rudder(
+        "tail", (-0.6, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.02, (-0.5, 0.5), 3.0
+    )
     layout = Layout("hybrid", (*finlab.load_layout("turtle_hybrid").actuators, rudder))
     flow = [0.8, 0, 0, 0, 0, 0]
     wrench = [2.0, 0, 5.0, 0, 0, 0.3]

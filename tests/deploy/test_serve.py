@@ -40,7 +40,8 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Script:
-    """A transport that plays requests (None is silence) and keeps what was sent; its clock alone moves on, by
+    """A transport that plays requests (None is silence) and keeps what was sent; its clock alone
+    moves on, by
     0.3 s with each request."""
 
     def __init__(self, *requests: Any) -> None:
@@ -67,7 +68,9 @@ class Script:
         self.sent.append(json.loads(line, parse_constant=pytest.fail))
 
 
-def served(robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0) -> list[dict[str, Any]]:
+def served(
+    robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0
+) -> list[dict[str, Any]]:
     script = Script(*requests)
     Server(robot, watchdog).run(script)
     return script.sent
@@ -82,7 +85,9 @@ def test_answers_like_the_library(robot: DeployedRobot) -> None:
     assert [first[key] for key in ("err_norm", "power")] == [truth.err_norm, truth.power]
     ahead = served(robot, {**GOOD, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9})[0]
     assert ahead["wrench"][0] == pytest.approx(2.0, abs=1e-3), "fins will have followed by then"
-    assert end["status"] == "neutral" and end["command"][2] is None, "a lost fin gets no command at the end"
+    assert end["status"] == "neutral" and end["command"][2] is None, (
+        "a lost fin gets no command at the end"
+    )
 
 
 @pytest.mark.parametrize("id_", [None, 0, -1.5, "a", [1, "x"], {"of": [None, True]}])
@@ -110,7 +115,10 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
         ({**GOOD, "policy": 3}, "policy: expected text, got 3"),
         ({**GOOD, "flow": [1, 0, 0]}, "flow: expected six numbers"),
-        ({**GOOD, "reference": [1, 0, 0, 0, 0, 0]}, r"reference: expected an array of shape \(N, 6\)"),
+        (
+            {**GOOD, "reference": [1, 0, 0, 0, 0, 0]},
+            r"reference: expected an array of shape \(N, 6\)",
+        ),
         ({**GOOD, "id": "x" * 1000}, "id: longer than 1000 characters"),
         ({**GOOD, "id": float("nan")}, "holds NaN, expected a finite number"),
         ({**GOOD, "id": [float("-inf")]}, "holds -Infinity, expected a finite"),
@@ -154,7 +162,15 @@ def test_only_good_targets_and_rest_wind_up_the_watchdog(
     monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
     Server(robot, 1.0).run(script)
     status = [reply["status"] for reply in script.sent]
-    assert status == ["ok", *["error"] * 2, "ok", *["error"] * 3, "neutral", "error", *["neutral"] * 2]
+    assert status == [
+        "ok",
+        *["error"] * 2,
+        "ok",
+        *["error"] * 3,
+        "neutral",
+        "error",
+        *["neutral"] * 2,
+    ]
     assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 1.0, 1.0])
     np.testing.assert_array_equal(np.array(script.sent[-1]["command"]), robot.neutral())
     script = Script(GOOD, b"nonsense")
@@ -179,7 +195,9 @@ def test_commands_change_no_faster_than_servos_do(
     before = np.array(server.answers(forwards)[0]["command"])
     truth = robot.allocate([-1, 0, 0.5, 0, 0, 0], previous=before)
     assert truth.err_norm > 0.05, "forwards and backwards are ticks apart"
-    np.testing.assert_allclose(np.array(server.answers(backwards)[0]["command"]), truth.command, atol=1e-9)
+    np.testing.assert_allclose(
+        np.array(server.answers(backwards)[0]["command"]), truth.command, atol=1e-9
+    )
     now[0] += RECENT_S
     assert server.answers(forwards)[0]["err_norm"] < 1e-5, "commands of long ago bind no more"
 
@@ -215,7 +233,9 @@ def test_an_answer_that_is_no_number_is_an_error(
     assert reply["status"] == "error" and "answers with NaN" in reply["error"]
 
 
-@pytest.mark.parametrize("fault", [IndexError("of ours"), MemoryError(), RecursionError(), DataError("gone")])
+@pytest.mark.parametrize(
+    "fault", [IndexError("of ours"), MemoryError(), RecursionError(), DataError("gone")]
+)
 def test_after_a_fault_in_a_solve_the_robot_rests_and_the_next_request_is_answered(
     fault: Exception, robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -258,7 +278,8 @@ def test_axes_that_are_not_commanded_are_null(robot: DeployedRobot) -> None:
 def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
     robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before a solve, and after one in which the process paused; after silence, rest comes first."""
+    """Before a solve, and after one in which the process paused; after silence, rest comes
+    first."""
     now = [100.0]
     monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
     answer = Server.answers
@@ -278,7 +299,9 @@ def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
             now[0] += silence
             return Line(json.dumps(GOOD | {"id": name}).encode(), now[0] - age)
 
-    script = Late((0.0, 0.1, "a"), (3.9, 4.0, "old"), (0.0, 0.1, "b"), (0.0, 0.1, "slow"), (0.0, 0.1, "c"))
+    script = Late(
+        (0.0, 0.1, "a"), (3.9, 4.0, "old"), (0.0, 0.1, "b"), (0.0, 0.1, "slow"), (0.0, 0.1, "c")
+    )
     Server(robot, 1.0).run(script)
     told = [(reply["status"], reply["id"]) for reply in script.sent]
     rest = ("neutral", None)
@@ -328,7 +351,9 @@ def test_streams_keep_only_the_newest_request(streams: StandardStreams) -> None:
         streams.send(b"to nobody\n")
 
 
-def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams, requests: int) -> None:
+def test_a_line_without_end_takes_no_memory_and_no_time(
+    streams: StandardStreams, requests: int
+) -> None:
     for _ in range(100):
         os.write(requests, bytes(MAX_LINE))
     assert streams.newest(0.1) is None
@@ -361,7 +386,9 @@ def test_requests_that_nobody_takes_need_no_memory(requests: int) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 30_000, "kB, of 120 MB"
 
 
-def test_a_signal_ends_waiting_and_sending(streams: StandardStreams, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_ends_waiting_and_sending(
+    streams: StandardStreams, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("finlab.deploy.transport.PATIENCE", 0.05)
     source, requests = os.pipe()
     _, sink = os.pipe()
@@ -376,7 +403,9 @@ def test_a_signal_ends_waiting_and_sending(streams: StandardStreams, monkeypatch
 
 def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "finlab.deploy.command", "serve", str(folder), *options]
-    return subprocess.Popen(command, **{"stdin": subprocess.PIPE, "stderr": subprocess.PIPE, **streams})
+    return subprocess.Popen(
+        command, **{"stdin": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+    )
 
 
 def pipe(end: IO[bytes] | None) -> IO[bytes]:
@@ -424,7 +453,9 @@ def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> No
 
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("part", [b"", b'{"wrench": [1, '])
-def test_the_fins_rest_once_when_told_to_stop(number: signal.Signals, part: bytes, folder: Path) -> None:
+def test_the_fins_rest_once_when_told_to_stop(
+    number: signal.Signals, part: bytes, folder: Path
+) -> None:
     service = answering(folder, "--no-watchdog")
     pipe(service.stdin).write(part)
     pipe(service.stdin).flush()
@@ -434,7 +465,9 @@ def test_the_fins_rest_once_when_told_to_stop(number: signal.Signals, part: byte
 
 
 @pytest.mark.parametrize(("part", "status"), [(b"", ["neutral"]), (b'{"wr', ["error", "neutral"])])
-def test_the_fins_rest_once_when_the_requests_end(part: bytes, status: list[str], folder: Path) -> None:
+def test_the_fins_rest_once_when_the_requests_end(
+    part: bytes, status: list[str], folder: Path
+) -> None:
     service = answering(folder)
     pipe(service.stdin).write(part)
     assert ended(service) == (status, "") and service.returncode == 0
@@ -459,7 +492,8 @@ def test_without_streams_it_ends_with_a_sentence(closed: str, full: str, folder:
 
 
 @pytest.mark.parametrize(
-    "option", [f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")]
+    "option",
+    [f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")],
 )
 def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixture[str]) -> None:
     from finlab.deploy.command import main

@@ -1,4 +1,5 @@
-"""What values show in notebooks: the figures of the object, hostile names as plain text, and a picture."""
+"""What values show in notebooks: the figures of the object, hostile names as plain text, and a
+picture."""
 
 import re
 import sys
@@ -35,7 +36,10 @@ def result(**asked: Any) -> finlab.Allocation:
 @cache
 def swim() -> Any:
     loop = ClosedLoop(
-        robot(), finlab.Allocator(robot()), make_trajectory("station", 12.0), failures=[(HOSTILE, 1.0)]
+        robot(),
+        finlab.Allocator(robot()),
+        make_trajectory("station", 12.0),
+        failures=[(HOSTILE, 1.0)],
     )
     return loop.run()
 

@@ -1,4 +1,5 @@
-"""Every example runs as a notebook, shows a picture or a table at its end, and says what there is to see."""
+"""Every example runs as a notebook, shows a picture or a table at its end, and says what there is
+to see."""
 
 import os
 import runpy
@@ -27,7 +28,9 @@ PATIENCE_S = 20.0
 @pytest.fixture(scope="module")
 def kernel() -> Iterator[NotebookClient]:
     """One kernel for all notebooks: to start one takes longer than most of them."""
-    client = NotebookClient(jupytext.reads("", "py:percent"), timeout=PATIENCE_S, kernel_name="python3")
+    client = NotebookClient(
+        jupytext.reads("", "py:percent"), timeout=PATIENCE_S, kernel_name="python3"
+    )
     with client.setup_kernel():
         yield client
 
@@ -55,7 +58,9 @@ def test_notebook_runs(path: Path, kernel: NotebookClient, tmp_path: Path) -> No
     assert os.listdir(tmp_path) == ["soft_fin.csv"], "an example leaves nothing behind"
 
 
-def test_the_script_says_how_it_is_called(monkeypatch: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_script_says_how_it_is_called(
+    monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     for path in set(EXAMPLES) - set(NOTEBOOKS):
         monkeypatch.setattr("sys.argv", [str(path)])
         runpy.run_path(str(path), run_name="__main__")
@@ -66,4 +71,6 @@ def test_the_script_says_how_it_is_called(monkeypatch: Any, capsys: pytest.Captu
 def test_example_is_short_and_says_what_you_will_see(path: Path) -> None:
     text = path.read_text()
     assert len(text.splitlines()) < 70
-    assert text.startswith(('"""', "# %% [markdown]\n# # ")) and "You will see" in text.replace("\n#", "")
+    assert text.startswith(('"""', "# %% [markdown]\n# # ")) and "You will see" in text.replace(
+        "\n#", ""
+    )

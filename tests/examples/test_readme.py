@@ -37,13 +37,17 @@ def test_links_and_files_of_all_pages_exist() -> None:
     for page in PAGES:
         text = page.read_text()
         links = re.findall(r"\]\(([^)#:]*)#?([^):]*)\)", text)
-        for link, anchor in () if ROOT / "docs" in page.parents else links:  # `make docs` checks these
+        for link, anchor in (
+            () if ROOT / "docs" in page.parents else links
+        ):  # `make docs` checks these
             target = page.parent / link if link else page
             if not target.exists() or (anchor and anchor not in _headings(target)):
                 wrong.append(f"{page.name}: {link}#{anchor}")
         wrong += [
             f"{page.name}: {path}"
-            for path in re.findall(r"`((?:finlab|webapp|tests|tools|layouts|examples)/[\w./-]+)`", text)
+            for path in re.findall(
+                r"`((?:finlab|webapp|tests|tools|layouts|examples)/[\w./-]+)`", text
+            )
             if page.name != "CHANGELOG.md" and not (ROOT / path).exists()
         ]
     assert wrong == []
@@ -58,7 +62,9 @@ def test_make_targets_of_all_pages_exist() -> None:
     makefile = (ROOT / "Makefile").read_text()
     gone = {"mutate", "bench", "bench-runtime"}  # which the changelog says
     assert {
-        name for name in targets - gone if not re.search(rf"^{name}\b[^=\n]*:", makefile, re.MULTILINE)
+        name
+        for name in targets - gone
+        if not re.search(rf"^{name}\b[^=\n]*:", makefile, re.MULTILINE)
     } == set()
 
 
@@ -66,7 +72,9 @@ def test_figures_of_pages_are_columns_of_experiments() -> None:
     from finlab.research.evaluation.experiment import load_experiment
 
     marks = [
-        mark for page in PAGES for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
+        mark
+        for page in PAGES
+        for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
     ]
     assert marks
     for name, keys in marks:

@@ -1,4 +1,5 @@
-"""Bags as robots record them, made without ROS: the example turns them into swims that a fit reads."""
+"""Bags as robots record them, made without ROS: the example turns them into swims that a fit
+reads."""
 
 import runpy
 from collections.abc import Callable
@@ -34,11 +35,15 @@ def convert() -> Callable[[Path, Path], int]:
     return made
 
 
-def messages(types: Any, swum: tuple[np.ndarray, np.ndarray], first: int) -> list[tuple[int, str, Any]]:
+def messages(
+    types: Any, swum: tuple[np.ndarray, np.ndarray], first: int
+) -> list[tuple[int, str, Any]]:
     """Time [ns], topic and message; the first command comes some steps after the first odometry."""
     t = SimpleNamespace(**{name.rsplit("/", 1)[1]: made for name, made in types.types.items()})
     stamp = types.types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
-    header = t.Header(stamp=stamp, frame_id="odom", **({"seq": 0} if "seq" in _fields(t.Header) else {}))
+    header = t.Header(
+        stamp=stamp, frame_id="odom", **({"seq": 0} if "seq" in _fields(t.Header) else {})
+    )
     found = []
     for k, (command, said) in enumerate(zip(*swum, strict=True)):
         at = BEGUN + round(k * STEP_S * 1e9)
@@ -66,7 +71,9 @@ def _fields(message: Any) -> set[str]:
 
 def write_bag(path: Path, kind: str, swum: tuple[np.ndarray, np.ndarray], first: int = 0) -> Path:
     """A bag of ROS 1 (`ros1`) or ROS 2 as Humble (`humble`) and Jazzy (`jazzy`) record it."""
-    store = {"ros1": Stores.ROS1_NOETIC, "humble": Stores.ROS2_HUMBLE, "jazzy": Stores.ROS2_JAZZY}[kind]
+    store = {"ros1": Stores.ROS1_NOETIC, "humble": Stores.ROS2_HUMBLE, "jazzy": Stores.ROS2_JAZZY}[
+        kind
+    ]
     types = get_typestore(store)
     encode = types.serialize_ros1 if kind == "ros1" else types.serialize_cdr
     if kind == "ros1":
@@ -86,13 +93,18 @@ def write_bag(path: Path, kind: str, swum: tuple[np.ndarray, np.ndarray], first:
 
 @pytest.mark.parametrize("kind", ["ros1", "humble", "jazzy"])
 def test_a_bag_becomes_the_swim_that_it_recorded(
-    kind: str, swum: tuple[np.ndarray, np.ndarray], convert: Callable[[Path, Path], int], tmp_path: Path
+    kind: str,
+    swum: tuple[np.ndarray, np.ndarray],
+    convert: Callable[[Path, Path], int],
+    tmp_path: Path,
 ) -> None:
     command, measured = swum
     assert convert(write_bag(tmp_path / "bag", kind, swum), tmp_path / "swim.csv") == len(command)
     found = read_swim(tmp_path / "swim.csv", load_layout("A"))
     np.testing.assert_allclose(found.measured, measured[: len(found)], atol=1e-7)
-    np.testing.assert_allclose(found.motion, replay(load_layout("A"), command)[: len(found)], atol=1e-6)
+    np.testing.assert_allclose(
+        found.motion, replay(load_layout("A"), command)[: len(found)], atol=1e-6
+    )
     assert len(found) >= len(command) - 1
 
 

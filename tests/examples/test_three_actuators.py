@@ -15,11 +15,26 @@ PATH = Path(__file__).resolve().parents[2] / "examples" / "12_three_actuators.py
 ROBOT = layout_of(
     "three",
     [
-        {"name": "left", "type": "thruster", "position_m": [-0.8, 0.4, 0.0], "axis": [1.0, 0.0, 0.0]}
+        {
+            "name": "left",
+            "type": "thruster",
+            "position_m": [-0.8, 0.4, 0.0],
+            "axis": [1.0, 0.0, 0.0],
+        }
         | {"force_n": T200_FORCE, "model": T200},
-        {"name": "right", "type": "thruster", "position_m": [-0.8, -0.4, 0.0], "axis": [1.0, 0.0, 0.0]}
+        {
+            "name": "right",
+            "type": "thruster",
+            "position_m": [-0.8, -0.4, 0.0],
+            "axis": [1.0, 0.0, 0.0],
+        }
         | {"force_n": T200_FORCE, "model": T200},
-        {"name": "bow", "type": "azimuth", "position_m": [0.9, 0.0, 0.0], "turn_axis": [0.0, 0.0, 1.0]}
+        {
+            "name": "bow",
+            "type": "azimuth",
+            "position_m": [0.9, 0.0, 0.0],
+            "turn_axis": [0.0, 0.0, 1.0],
+        }
         | {"zero": [1.0, 0.0, 0.0], "force_n": [0.0, T200_FORCE[1]], "model": T200},
     ],
 )

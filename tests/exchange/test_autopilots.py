@@ -17,7 +17,8 @@ from tests.mixed_robots import load, random_robot
 
 D = np.sqrt(0.5)
 DIRECTIONS = [(-D, -D, 0), (-D, D, 0), (D, -D, 0), (D, D, 0), *[(0, 0, -1)] * 4]
-"""Force of each thruster of a BlueROV2 Heavy for a positive output of ArduSub, x forward, y left, z up."""
+"""Force of each thruster of a BlueROV2 Heavy for a positive output of ArduSub, x forward, y left, z
+up."""
 SCRIPT = """#!/bin/sh
 # @name Some robot, with motors in x forward, y right, z down
 . ${R}etc/init.d/rc.uuv_defaults
@@ -42,7 +43,9 @@ def thrusters(number: int) -> Layout:
     return load(random_robot("thrusters", number, 7))
 
 
-def written(layout: Layout, path: Path, to: str | None = None, **unsaid: str) -> tuple[Layout, list[str]]:
+def written(
+    layout: Layout, path: Path, to: str | None = None, **unsaid: str
+) -> tuple[Layout, list[str]]:
     """A layout that went into a file and came back, and the notes of both ways."""
     save_layout(layout, path.with_name("before.json"))
     exchange = Exchange(**unsaid)  # type: ignore[arg-type]
@@ -61,7 +64,9 @@ def test_px4_rotors_push_and_turn_as_its_formula_says(tmp_path: Path) -> None:
     layout = read_any(str(path), Exchange())
     first, second, third = layout.actuators
     assert isinstance(third, Thruster)
-    np.testing.assert_allclose((first.position, first.frame[0]), [(0.5, -0.3, -0.2), (D, D, 0)], atol=1e-15)
+    np.testing.assert_allclose(
+        (first.position, first.frame[0]), [(0.5, -0.3, -0.2), (D, D, 0)], atol=1e-15
+    )
     np.testing.assert_allclose([part.lower[0] for part in layout.actuators], [-40.0, -6.5, 0.0])
     np.testing.assert_allclose([part.upper[0] for part in layout.actuators], [40.0, 6.5, 6.5])
     # CT (p x a - KM a) in x forward, y right, z down; the usual axis is -z, the usual KM 0.05.
@@ -117,7 +122,9 @@ def test_ardusub_frames_have_the_directions_of_the_bluerov2(tmp_path: Path) -> N
 
 def factor_rows(frame: str) -> str:
     """A table of a frame's factors."""
-    rows = [",".join(map(str, [f"motor{i}", *row])) for i, row in enumerate(FRAMES[frame].tolist(), 1)]
+    rows = [
+        ",".join(map(str, [f"motor{i}", *row])) for i, row in enumerate(FRAMES[frame].tolist(), 1)
+    ]
     return "\n".join(["motor,roll,pitch,yaw,throttle,forward,lateral", *rows])
 
 
@@ -128,7 +135,9 @@ def test_factors_survive_the_way_there_and_back(frame: str, name: str, tmp_path:
     source.write_text(factor_rows(frame))
     layout = read_any(str(source), Exchange())
     back, _ = written(layout, tmp_path / name, "ardusub")
-    np.testing.assert_allclose(factors_of(back, Exchange())[1], factors_of(layout, Exchange())[1], atol=1e-12)
+    np.testing.assert_allclose(
+        factors_of(back, Exchange())[1], factors_of(layout, Exchange())[1], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("frame", ["FLU", "FRD"])
@@ -160,14 +169,17 @@ def test_matrices_of_others(name: str, content: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(content)
     exchange = Exchange()
     layout = read_any(str(tmp_path / name), exchange)
-    np.testing.assert_allclose(wrenches(layout), [[1, 0, 0, 0, 0, -0.2], [0, 1, 0, 0, 0, 0.1]], atol=1e-15)
+    np.testing.assert_allclose(
+        wrenches(layout), [[1, 0, 0, 0, 0, -0.2], [0, 1, 0, 0, 0, 0.1]], atol=1e-15
+    )
     np.testing.assert_allclose(layout.position, [[0, 0.2, 0], [0.1, 0, 0]], atol=1e-15)
     assert (layout.lower[0, 0], layout.upper[1, 0]) == (-40.0, 40.0)
     assert any("from -1 to 1" in note for note in exchange.notes)
 
 
 def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
-    """Arms of the matrix that users of ROS 2 load for it: yaw 0.1888 m, roll 0.21805, pitch 0.12."""
+    """Arms of the matrix that users of ROS 2 load for it: yaw 0.1888 m, roll 0.21805, pitch
+    0.12."""
     arms = np.zeros((8, 3))
     arms[:4, 2] = [-0.1888, 0.1888, 0.1888, -0.1888]
     arms[4:, 0] = [0.21805, -0.21805, 0.21805, -0.21805]
@@ -193,7 +205,9 @@ def test_a_thruster_through_the_centre_has_no_factor_of_torque() -> None:
 
 def test_what_has_no_place_is_named(tmp_path: Path) -> None:
     _, notes = written(finlab.load_layout("turtle_hybrid"), tmp_path / "turtle.params")
-    assert notes[0].startswith("PX4 has a place for thrusters alone; left out are front_right (fin), ")
+    assert notes[0].startswith(
+        "PX4 has a place for thrusters alone; left out are front_right (fin), "
+    )
     with pytest.raises(
         LayoutError, match="layout A has no thruster, and A matrix has a place for these alone"
     ):

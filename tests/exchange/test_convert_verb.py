@@ -1,4 +1,5 @@
-"""`finlab layout convert`, and the way of a stranger's robot from its description to its own computer."""
+"""`finlab layout convert`, and the way of a stranger's robot from its description to its own
+computer."""
 
 import json
 from pathlib import Path
@@ -20,7 +21,9 @@ def test_from_a_description_to_the_robot(
     assert main(["layout", "convert", HEAVY, "rov.yaml"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "rov.yaml: bluerov2_heavy with 8 thrusters"
-    assert lines[1] == "- It has no power: that of a T200 at 16 V is taken; write your own as `model`."
+    assert (
+        lines[1] == "- It has no power: that of a T200 at 16 V is taken; write your own as `model`."
+    )
     assert main(["layout", "show", "rov.yaml"]) == 0
     assert "axis (-0.707, -0.707, 0)" in capsys.readouterr().out
     asked = ["--wrench", *map(str, WRENCH), "--json"]

@@ -42,7 +42,9 @@ def test_a_bluerov2_comes_out_as_shipped() -> None:
     layout = read(HEAVY)
     shipped = finlab.load_layout("bluerov2_heavy")
     assert layout.names == tuple(f"thruster{i}" for i in range(1, 9))
-    np.testing.assert_allclose(own_effectiveness(layout)[:, 0], own_effectiveness(shipped)[:, 0], atol=1e-7)
+    np.testing.assert_allclose(
+        own_effectiveness(layout)[:, 0], own_effectiveness(shipped)[:, 0], atol=1e-7
+    )
     np.testing.assert_array_equal([part.force for part in layout.actuators], [(-39.91, 51.44)] * 8)
     told = layout.body
     body = shipped.body
@@ -53,13 +55,17 @@ def test_a_bluerov2_comes_out_as_shipped() -> None:
 
 
 def test_golden_forces_of_a_bluerov2() -> None:
-    """Pseudo-inverse of places that were taken from the robot's public description, by other means."""
+    """Pseudo-inverse of places that were taken from the robot's public description, by other
+    means."""
     inverse = np.linalg.pinv(own_effectiveness(read(HEAVY))[:, 0].T)
     for wrench, forces in (
         ((20, 0, 0, 0, 0, 0), (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661)),
         ((0, 20, 0, 0, 0, 0), (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558)),
         ((0, 0, 0, 0, 0, 2), (-2.9836, 2.9836, 2.9836, -2.9836, 0, 0, 0, 0)),
-        ((30, 15, -20, 0, 1, 3), (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741)),
+        (
+            (30, 15, -20, 0, 1, 3),
+            (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741),
+        ),
     ):
         np.testing.assert_allclose(inverse @ wrench, forces, atol=2e-4)
 
@@ -97,9 +103,14 @@ def test_frames_of_sdf(tmp_path: Path) -> None:
     np.testing.assert_allclose(a.force, [-20.0, 5.0])
     assert a.dead_band == 0.5
     np.testing.assert_allclose((b.position, b.axis), [[0.0, 0.0, 0.3], [0.0, 1.0, 0.0]], atol=1e-12)
-    assert b.force == (-39.91, 51.44) and any("no limits of force" in note for note in exchange.notes)
+    assert b.force == (-39.91, 51.44) and any(
+        "no limits of force" in note for note in exchange.notes
+    )
     assert layout.body == Body(mass_kg=10.0, inertia_kgm2=(1.0, 2.0, 3.0), added_mass=None)
-    assert "added_mass is left out: the file says these alone of six: xx 4.0, rr 0.5." in exchange.notes
+    assert (
+        "added_mass is left out: the file says these alone of six: xx 4.0, rr 0.5."
+        in exchange.notes
+    )
     assert read(path, force=(-1.0, 2.0)).actuators[1].upper[0] == 2.0
 
 
@@ -117,16 +128,22 @@ def test_an_axis_may_be_expressed_in_any_frame(tmp_path: Path) -> None:
         path.write_text(turned.replace('expressed_in="__model__"', f'expressed_in="{frame}"'))
         np.testing.assert_allclose(read(path).actuators[1].frame[0], axis, atol=1e-12)
     path.write_text(SDF.replace("__model__", "nowhere"))
-    with pytest.raises(LayoutError, match="no frame 'nowhere', in which the axis of joint 'b_joint'"):
+    with pytest.raises(
+        LayoutError, match="no frame 'nowhere', in which the axis of joint 'b_joint'"
+    ):
         read(path)
 
 
 @pytest.mark.parametrize("suffix", ["urdf", "sdf"])
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths"])
-def test_any_propellers_survive_the_way_there_and_back(kind: str, suffix: str, tmp_path: Path) -> None:
+def test_any_propellers_survive_the_way_there_and_back(
+    kind: str, suffix: str, tmp_path: Path
+) -> None:
     for number in range(5):
         layout = load(random_robot(kind, number, 35))
-        body = Body(mass_kg=20.0, inertia_kgm2=(1.0, 2.0, 3.0), quadratic_damping=(1, 2, 3, 4, 5, 6))
+        body = Body(
+            mass_kg=20.0, inertia_kgm2=(1.0, 2.0, 3.0), quadratic_damping=(1, 2, 3, 4, 5, 6)
+        )
         layout = replace(layout, body=body)
         back = written(layout, tmp_path / f"robot.{suffix}")
         assert back.names == layout.names
@@ -149,7 +166,9 @@ def test_any_propellers_survive_the_way_there_and_back(kind: str, suffix: str, t
 def test_names_with_signs_of_xml(suffix: str, tmp_path: Path) -> None:
     layout = finlab.load_layout("bluerov2_heavy")
     path = tmp_path / f"robot.{suffix}"
-    odd = replace(layout.replace_actuator(layout.names[0], name="a<\"&{0}'é"), name='<{name}> & "co"')
+    odd = replace(
+        layout.replace_actuator(layout.names[0], name="a<\"&{0}'é"), name='<{name}> & "co"'
+    )
     back = written(odd, path)
     assert (back.name, back.names) == (odd.name, odd.names)
 
@@ -206,7 +225,9 @@ def test_origin_moves_to_the_centre_of_gravity() -> None:
     base = read(TURTLE, fins=FINS, origin="base")
     gravity = read(TURTLE, fins=FINS)
     for a, b in zip(base.fins, gravity.fins, strict=True):
-        np.testing.assert_allclose(np.subtract(a.position, b.position), [0.02, 0.0, -0.01], atol=1e-12)
+        np.testing.assert_allclose(
+            np.subtract(a.position, b.position), [0.02, 0.0, -0.01], atol=1e-12
+        )
     assert gravity.body is not None and base.body is None
     assert gravity.body.mass_kg == 10.0
     np.testing.assert_allclose(gravity.body.inertia_kgm2 or (), [0.1, 0.2, 0.3])
@@ -222,7 +243,9 @@ def test_links_may_be_named_as_thrusters() -> None:
 
 @pytest.mark.parametrize("suffix", ["urdf", "sdf"])
 @pytest.mark.parametrize("name", sorted(FIN_ROBOTS))
-def test_robots_of_fins_survive_the_way_there_and_back(name: str, suffix: str, tmp_path: Path) -> None:
+def test_robots_of_fins_survive_the_way_there_and_back(
+    name: str, suffix: str, tmp_path: Path
+) -> None:
     layout = finlab.load_layout(name)
     back = written(layout, tmp_path / f"robot.{suffix}", fins=layout.names, origin="base")
     for a, b in zip(layout.fins, back.fins, strict=True):
@@ -232,9 +255,7 @@ def test_robots_of_fins_survive_the_way_there_and_back(name: str, suffix: str, t
         assert apart == pytest.approx(0.0, abs=1e-9)
 
 
-PLUGIN = (
-    '<gazebo><plugin name="gz::sim::systems::Thruster"><joint_name>x</joint_name></plugin></gazebo></robot>'
-)
+PLUGIN = '<gazebo><plugin name="gz::sim::systems::Thruster"><joint_name>x</joint_name></plugin></gazebo></robot>'
 
 
 @pytest.mark.parametrize(

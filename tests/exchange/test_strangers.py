@@ -121,14 +121,18 @@ def test_rows_and_frames_may_be_said() -> None:
         layout, _ = read("a.csv", text, rows=rows, force=(-1.0, 1.0))
         size = np.linalg.norm(expected[:, :3], axis=1, keepdims=True)
         np.testing.assert_allclose(columns(layout), expected / size, atol=1e-12)
-    layout, notes = read("a.yaml", "frame: FLU\ntam: {fx: [1], fy: [0], fz: [0], tz: [1]}", frame="FRD")
+    layout, notes = read(
+        "a.yaml", "frame: FLU\ntam: {fx: [1], fy: [0], fz: [0], tz: [1]}", frame="FRD"
+    )
     assert columns(layout)[0, 5] == -1.0 and "--frame FRD was taken" in notes
 
 
 def test_a_boat_commands_the_axes_of_its_rows() -> None:
     layout, notes = read("a.csv", "axis,l,r\nFx,1,1\nTz,-0.4,0.4\n")
     assert layout.axes == ("Fx", "Tz") and "no row Fy, Fz, Tx, Ty" in notes
-    np.testing.assert_allclose(columns(layout), [[1, 0, 0, 0, 0, -0.4], [1, 0, 0, 0, 0, 0.4]], atol=1e-12)
+    np.testing.assert_allclose(
+        columns(layout), [[1, 0, 0, 0, 0, -0.4], [1, 0, 0, 0, 0, 0.4]], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -149,13 +153,25 @@ def test_thrusters_by_place_and_direction(file: str, text: str) -> None:
     layout, _ = read(file, text)
     first = layout.actuators[0]
     assert first.name == "a"
-    np.testing.assert_allclose([first.position, first.frame[0]], [[0.1, 0.2, 0], [0, 0, 1]], atol=1e-9)
+    np.testing.assert_allclose(
+        [first.position, first.frame[0]], [[0.1, 0.2, 0], [0, 0, 1]], atol=1e-9
+    )
     np.testing.assert_allclose([first.lower[0], first.upper[0]], [-9.80665, 9.80665])
 
 
 def test_motors_of_programs_and_lists_are_the_same() -> None:
-    calls = [f"add_motor_raw_6dof({{}}{i}, 0, 0, {yaw}, 0, {ahead}, 0, {i + 1})" for i, (yaw, ahead) in enumerate(
-        [("-SIDE", "cosf(radians(60))"), ("0.25f * 2", "5e-1f"), ("-0.5", "-0.5"), (".5", "-.5")])]  # fmt: skip
+    calls = [
+        f"add_motor_raw_6dof({{}}{i}, 0, 0, {yaw}, 0, {ahead}, 0, {i + 1})"
+        for i, (yaw, ahead) in enumerate(
+            # fmt: skip
+            [
+                ("-SIDE", "cosf(radians(60))"),
+                ("0.25f * 2", "5e-1f"),
+                ("-0.5", "-0.5"),
+                (".5", "-.5"),
+            ]
+        )
+    ]
     cpp = "static const float SIDE = 0.5f;\nvoid add_motor_raw_6dof(int8_t n, float roll);\n/* add_motor_raw_6dof(\n */\n"
     cpp += (
         ";\n".join(call.format("AP_MOTORS_MOT_") for call in calls)
@@ -192,8 +208,12 @@ def test_parameters_of_ardusub_name_a_frame(text: str) -> None:
 
 
 def test_px4_says_what_its_defaults_filled() -> None:
-    _, notes = read("a.params", "CA_ROTOR_COUNT 2\nCA_ROTOR0_CT 4\nCA_ROTOR2_PX 1\nCA_ROTOR2_CT 6.5")
-    assert "No CA_ROTORi_CT of rotors 1: 6.5 is taken" in notes and "not read: CA_ROTOR2_PX." in notes
+    _, notes = read(
+        "a.params", "CA_ROTOR_COUNT 2\nCA_ROTOR0_CT 4\nCA_ROTOR2_PX 1\nCA_ROTOR2_CT 6.5"
+    )
+    assert (
+        "No CA_ROTORi_CT of rotors 1: 6.5 is taken" in notes and "not read: CA_ROTOR2_PX." in notes
+    )
 
 
 def test_models_inside_models_and_names_of_others() -> None:
@@ -206,7 +226,9 @@ def test_models_inside_models_and_names_of_others() -> None:
         read("a.sdf", world, model="c")
     arm = f'<model name="arm"><pose>1 0 0 0 0 1.5707963267948966</pose>{SCREW}{THRUSTER}</model><link name="hull"><inertial><mass>8</mass></inertial></link>'
     layout, notes = read("a.sdf", sdf(arm))
-    assert layout.body is not None and layout.body.mass_kg == 20.0 and layout.body.inertia_kgm2 is None
+    assert (
+        layout.body is not None and layout.body.mass_kg == 20.0 and layout.body.inertia_kgm2 is None
+    )
     assert layout.names == ("arm::screw",) and "no inertia" in notes
     np.testing.assert_allclose(layout.actuators[0].frame[0], [0, 1, 0], atol=1e-12)
     np.testing.assert_allclose(layout.position[0], [0.4, -0.4, 0], atol=1e-12)
@@ -232,12 +254,19 @@ WATER = '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::
 
 
 def test_derivatives_that_are_not_said_stay_unknown() -> None:
-    six = "".join(f"<{tag}>-{i}</{tag}>" for i, tag in enumerate(["xUU", "yVV", "zWW", "kPP", "mQQ", "nRR"]))
-    layout, notes = read("a.sdf", sdf(SCREW + THRUSTER + WATER.format(six + "<xU>-4</xU><xDotV>1</xDotV>")))
+    six = "".join(
+        f"<{tag}>-{i}</{tag}>" for i, tag in enumerate(["xUU", "yVV", "zWW", "kPP", "mQQ", "nRR"])
+    )
+    layout, notes = read(
+        "a.sdf", sdf(SCREW + THRUSTER + WATER.format(six + "<xU>-4</xU><xDotV>1</xDotV>"))
+    )
     body = layout.body
     assert body is not None and body.quadratic_damping == (0, 1, 2, 3, 4, 5)
     assert body.linear_damping is None and body.added_mass is None
-    assert "linear_damping is left out: the file says these alone of six: xU -4" in notes and "xDotV" in notes
+    assert (
+        "linear_damping is left out: the file says these alone of six: xU -4" in notes
+        and "xDotV" in notes
+    )
 
 
 def test_uuv_simulator(tmp_path: Path) -> None:
@@ -275,7 +304,9 @@ def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
         .replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
     )
     path.write_text(
-        text.replace("</robot>", '<xacro:property name="a" value="2"/><link name="b${a*2}"/></robot>')
+        text.replace(
+            "</robot>", '<xacro:property name="a" value="2"/><link name="b${a*2}"/></robot>'
+        )
     )
     assert read_any(str(path), Exchange()).n == 8
     path.write_text(text.replace("</robot>", '<link name="${nobody}"/></robot>'))

@@ -1,4 +1,5 @@
-"""Descriptions that xacro expands: ordinary ones work, a stranger's run nothing and open no files."""
+"""Descriptions that xacro expands: ordinary ones work, a stranger's run nothing and open no
+files."""
 
 import os
 import sys
@@ -226,7 +227,10 @@ def test_an_expression_in_an_included_file_is_judged_there(folder: Path) -> None
         ('<xacro:include filename="folder/secret.xacro"/>', "a file elsewhere"),
         ('<xacro:include filename="$(find b)/c.xacro"/>', r"includes '\$\(find b\)/c.xacro', a"),
         ('<xacro:include filename="*.xacro"/>', "a pattern"),
-        ('<xacro:include filename="none.xacro"/>', "includes 'none.xacro', and there is no such file"),
+        (
+            '<xacro:include filename="none.xacro"/>',
+            "includes 'none.xacro', and there is no such file",
+        ),
         ('<xacro:include filename="a.urdf"/>', "nested too deep"),
         ('<xacro:include filename="entity.xacro"/>', "declares a DOCTYPE or entities"),
         ('<xacro:include filename="pipe.xacro"/>', "no such file"),
@@ -251,7 +255,9 @@ MANY = '<link name="${1}"/>' * 2000
 TWICE = '<xacro:macro name="mNEXT" params=""><xacro:mTHIS/><xacro:mTHIS/></xacro:macro>'
 DOUBLED = "".join(TWICE.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(40))
 LONGER = '<xacro:property name="pNEXT" value="${pTHIS}${pTHIS}"/>'
-LONG_PROPERTIES = "".join(LONGER.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(60))
+LONG_PROPERTIES = "".join(
+    LONGER.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(60)
+)
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,10 @@ NUMBER = re.compile(rb"-?\d+(\.\d+)?")
 
 def changed(rng: np.random.Generator, content: bytes) -> bytes:
     """Content with some bytes or numbers changed, cut, doubled, or something odd put in."""
-    content, numbers = bytearray(content), [found.span() for found in NUMBER.finditer(content[:20_000])]
+    content, numbers = (
+        bytearray(content),
+        [found.span() for found in NUMBER.finditer(content[:20_000])],
+    )
     for _ in range(rng.integers(1, 4)):
         place = int(rng.integers(0, len(content) + 1))
         kind = rng.integers(6)
@@ -143,7 +146,12 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     rig = commands(60)
     write(place / "rig.csv", columns_of(rig, measured(soft(), rig)))
     rng = np.random.default_rng(1)
-    write_swim(place / "swim.csv", PAIR, np.full((330, 2, 3), 0.5), rng.random((330, 12)).cumsum(axis=0) / 99)
+    write_swim(
+        place / "swim.csv",
+        PAIR,
+        np.full((330, 2, 3), 0.5),
+        rng.random((330, 12)).cumsum(axis=0) / 99,
+    )
     with (place / "path.csv").open("w", newline="") as file:
         rows = [[0.1 * k, 0.1 * k, np.sin(k), -1.0] for k in range(60)]
         csv.writer(file).writerows([["t", "x", "y", "z"], *rows])
@@ -186,18 +194,28 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     links = {name: design(robot, 60_000).encode() for name, robot in (("y", PAIR), ("t", layout))}
     fin_table = (place / "fin.csv").read_bytes()
     travelling = packed({"a.yaml": yaml, "tables/fin.csv": fin_table, "h.stl": export("stl")})
-    shapes = {"binary.stl": "stl", "ascii.stl": "stl_ascii"} | {f"hull.{k}": k for k in ("obj", "ply", "glb")}
+    shapes = {"binary.stl": "stl", "ascii.stl": "stl_ascii"} | {
+        f"hull.{k}": k for k in ("obj", "ply", "glb")
+    }
     return [
         Kind("layout.yaml", yaml, load_layout),
         Kind("layout.json", (place / "a.json").read_bytes(), load_layout),
         Kind("bundle.zip", bundle.zip_bytes(), load_robot, repacked),
         Kind("checkpoint.bin", checkpoint, from_parts, signed),
-        *(Kind(name, (place / name).read_bytes(), lambda p: read_any(str(p), Exchange())) for name in forms),
+        *(
+            Kind(name, (place / name).read_bytes(), lambda p: read_any(str(p), Exchange()))
+            for name in forms
+        ),
         Kind("table.csv", fin_table, read_table),
         Kind("rig.csv", (place / "rig.csv").read_bytes(), lambda path: read_measurements([path])),
         Kind("swim.csv", (place / "swim.csv").read_bytes(), lambda path: read_swim(path, PAIR)),
         Kind("log.npz", swim_log(place / "log.npz").read_bytes(), load_log, repacked),
-        Kind("swim.npz", (place / "log.npz").read_bytes(), lambda path: read_swim(path, PAIR), repacked),
+        Kind(
+            "swim.npz",
+            (place / "log.npz").read_bytes(),
+            lambda path: read_swim(path, PAIR),
+            repacked,
+        ),
         Kind("path.csv", (place / "path.csv").read_bytes(), make_trajectory),
         *(Kind(name, export(kind), mesh) for name, kind in shapes.items()),
         Kind("upload.zip", travelling, upload, repacked),
@@ -237,7 +255,8 @@ def test_damaged_files_are_read_or_refused(kinds: list[Kind], count: int, tmp_pa
 
 
 def test_what_is_no_file_is_refused_at_once(kinds: list[Kind], tmp_path: Path) -> None:
-    """Pipes, devices, folders, and names that cannot be: nobody waits, and nothing fills the memory."""
+    """Pipes, devices, folders, and names that cannot be: nobody waits, and nothing fills the
+    memory."""
     readers = {kind.read for kind in kinds if "link" not in kind.name and "upload" not in kind.name}
     os.mkfifo(tmp_path / "pipe")
     for kind in kinds:
@@ -272,9 +291,13 @@ def test_arrays_do_not_unpack_beyond_their_cap(kinds: list[Kind], tmp_path: Path
 
 
 def test_a_large_force_table_is_read_in_time(tmp_path: Path) -> None:
-    grid = np.meshgrid(np.linspace(0, 1.2, 69), np.linspace(0, 9, 70), np.linspace(-3, 3, 70), indexing="ij")
+    grid = np.meshgrid(
+        np.linspace(0, 1.2, 69), np.linspace(0, 9, 70), np.linspace(-3, 3, 70), indexing="ij"
+    )
     rows = np.stack([axis.ravel() for axis in grid] * 2, axis=-1) + 0.1234567890123
-    np.savetxt(tmp_path / "t.csv", rows, fmt="%.9f", delimiter=",", header="A,f,phi,Fx,Fy,Fz", comments="")
+    np.savetxt(
+        tmp_path / "t.csv", rows, fmt="%.9f", delimiter=",", header="A,f,phi,Fx,Fy,Fz", comments=""
+    )
     assert (tmp_path / "t.csv").stat().st_size > 23_000_000
     start = time.thread_time()
     read_table(tmp_path / "t.csv")

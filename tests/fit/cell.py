@@ -28,7 +28,9 @@ def measured(law: FinLaw, command: Array, noise: float = 0.05, seed: int = 1) ->
     """Forces (n, 3) with noise that is a share of each."""
     force = law.force(command)
     size = np.linalg.norm(force, axis=-1, keepdims=True)
-    return np.asarray(force + noise * size * np.random.default_rng(seed).standard_normal(force.shape))
+    return np.asarray(
+        force + noise * size * np.random.default_rng(seed).standard_normal(force.shape)
+    )
 
 
 def samples(command: Array, force: Array) -> Measurements:

@@ -1,4 +1,5 @@
-"""Benches as others write them: workbooks, thrust stands, several voltages, missing units and signs."""
+"""Benches as others write them: workbooks, thrust stands, several voltages, missing units and
+signs."""
 
 import csv
 import sys
@@ -24,7 +25,9 @@ ENDS = (-41.0, 52.0)
 
 def force(volts: float = 16.0) -> Array:
     x = (PWM - 1500.0) / 400.0
-    return np.asarray(np.where(x > 0.0, ENDS[1], -ENDS[0]) * np.sign(x) * np.abs(x) ** 1.6 * volts / 16.0)
+    return np.asarray(
+        np.where(x > 0.0, ENDS[1], -ENDS[0]) * np.sign(x) * np.abs(x) ** 1.6 * volts / 16.0
+    )
 
 
 def power(volts: float = 16.0) -> Array:
@@ -41,7 +44,14 @@ def written(path: Path, columns: dict[str, Array]) -> Path:
 
 def workbook(path: Path, volts: tuple[float, ...], column: bool) -> Path:
     """Sheets of a maker: a page of words, then one table for each voltage, below a title."""
-    header = ["PWM (\u00b5s)", "RPM", "Power\n(W)", "Force (Kg f)", "Efficiency (g/W)", "Voltage (V)"]
+    header = [
+        "PWM (\u00b5s)",
+        "RPM",
+        "Power\n(W)",
+        "Force (Kg f)",
+        "Efficiency (g/W)",
+        "Voltage (V)",
+    ]
     book = openpyxl.Workbook()
     book.active.append(["How this was measured", "in a tank"])
     for v in volts:
@@ -64,11 +74,19 @@ def test_a_workbook_is_read_at_the_voltage_that_is_asked_for(tmp_path: Path, col
     path = workbook(tmp_path / "maker.xlsx", (10.0, 12.0, 16.0), column)
     with pytest.raises(DataError, match="measured at 10, 12, 16 V; say which counts, --voltage 16"):
         fitted(path)
-    for volts in (10.0, 12.0, 16.0, 11.0, 14.0):  # forces of this maker grow with the voltage itself
+    for volts in (
+        10.0,
+        12.0,
+        16.0,
+        11.0,
+        14.0,
+    ):  # forces of this maker grow with the voltage itself
         fit = fitted(path, volts=volts)
         np.testing.assert_allclose(fit.force, np.array(ENDS) * volts / 16.0, rtol=1e-3)
         notes = " ".join(fit.notes)
-        assert "no table in sheet Sheet" in notes and ("interpolated" in notes) == (volts in (11.0, 14.0))
+        assert "no table in sheet Sheet" in notes and ("interpolated" in notes) == (
+            volts in (11.0, 14.0)
+        )
     with pytest.raises(DataError, match="tells nothing of 20 V"):
         fitted(path, volts=20.0)
 
@@ -100,7 +118,9 @@ def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, sh
     np.testing.assert_allclose(fitted(path, volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3)
     sagging = {"PWM (us)": PWM, "Force (N)": force()}
     sagging |= {"Voltage (V)": 16.0 - power() / 130.0, "Current (A)": power() / 15.0}
-    np.testing.assert_allclose(fitted(written(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3)
+    np.testing.assert_allclose(
+        fitted(written(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -115,22 +135,30 @@ def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, sh
         ({"Throttle (%)": (PWM - 1500.0) / 4.0, "Thrust [gf]": 1e3 * force() / N_PER_KGF}, ""),
     ],
 )  # fmt: skip
-def test_headers_units_and_signs_of_others(tmp_path: Path, columns: dict[str, Array], note: str) -> None:
+def test_headers_units_and_signs_of_others(
+    tmp_path: Path, columns: dict[str, Array], note: str
+) -> None:
     fit = fitted(written(tmp_path / "bench.csv", columns | {"Electrical Power (W)": power()}))
     np.testing.assert_allclose(fit.force, ENDS, rtol=1e-3)
     assert note in " ".join(fit.notes) if note else not fit.notes
 
 
-def test_forces_that_contradict_each_other_are_named_and_one_way_is_no_missing_sign(tmp_path: Path) -> None:
+def test_forces_that_contradict_each_other_are_named_and_one_way_is_no_missing_sign(
+    tmp_path: Path,
+) -> None:
     two = {"PWM (us)": PWM, "Thrust (N)": force(), "Thrust (kgf)": force(), "Power (W)": power()}
     with pytest.raises(DataError, match=r"Thrust \(N\) and Thrust \(kgf\), and differ"):
         fitted(written(tmp_path / "two.csv", two))
     ahead = PWM >= 1500.0
     one = {"PWM (us)": PWM[ahead], "Force (N)": force()[ahead], "Power (W)": power()[ahead]}
-    assert fitted(written(tmp_path / "one.csv", one)).force == pytest.approx((0.0, ENDS[1]), rel=1e-3)
+    assert fitted(written(tmp_path / "one.csv", one)).force == pytest.approx(
+        (0.0, ENDS[1]), rel=1e-3
+    )
 
 
-def test_the_command_line_takes_a_voltage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_takes_a_voltage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = workbook(tmp_path / "maker.xlsx", (12.0, 16.0), True)
     command = ["fit", "thruster", str(path), "-o", str(tmp_path / "table.csv")]
     assert main(command) == 2 and "--voltage 16" in capsys.readouterr().err

@@ -1,4 +1,5 @@
-"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, a known law."""
+"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, a known
+law."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -25,13 +26,18 @@ def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
     law = make_law(random_fin_model(rng, "soft" if kind == "table" else kind))
     if kind != "table":
         return law
-    axes = [np.linspace(0, 0.6, 8), np.linspace(0, 2.1, 9), np.linspace(-np.pi, np.pi, 12, endpoint=False)]
+    axes = [
+        np.linspace(0, 0.6, 8),
+        np.linspace(0, 2.1, 9),
+        np.linspace(-np.pi, np.pi, 12, endpoint=False),
+    ]
     force = law.force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     return TableLaw(axes, np.asarray(force * (1.0 + 0.03 * rng.standard_normal(force.shape))), True)
 
 
 def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]:
-    """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one fit."""
+    """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one
+    fit."""
     rng = np.random.default_rng([seed, LAWS.index(kind)])
     law = random_law(kind, rng)
     command = commands(300, seed)
@@ -63,4 +69,6 @@ def test_fitted_fins_miss_as_much_as_they_say(kind: str, tmp_path: Path) -> None
     rows = [miss_and_expected(kind, seed, tmp_path) for seed in (21, 22)]
     miss, expected = (np.concatenate(part) for part in zip(*rows, strict=True))
     assert 0.5 < ratio(miss, expected) < 2.0
-    assert (np.abs(np.log(np.sqrt(np.mean(miss**2, axis=0) / np.mean(expected**2, axis=0)))) < 1.1).all()
+    assert (
+        np.abs(np.log(np.sqrt(np.mean(miss**2, axis=0) / np.mean(expected**2, axis=0)))) < 1.1
+    ).all()

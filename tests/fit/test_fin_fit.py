@@ -48,7 +48,9 @@ def test_forces_are_near_the_truth_and_the_band_holds_it(fit: FinFit) -> None:
     force, deviation = fit.predict(TEST)
     inside = np.abs(force - LAW.force(TEST))[:, 1:] <= 1.96 * deviation[:, 1:]
     assert 0.85 < inside.mean() <= 1.0
-    assert deviation[:, 1:].mean() < 0.03 * fit.largest, "a band as wide as the water is no knowledge"
+    assert deviation[:, 1:].mean() < 0.03 * fit.largest, (
+        "a band as wide as the water is no knowledge"
+    )
 
 
 def test_power_and_lean(fit: FinFit) -> None:
@@ -56,7 +58,9 @@ def test_power_and_lean(fit: FinFit) -> None:
     assert power is not None
     assert np.abs(power - LAW.power(TEST)).max() < 0.05 * LAW.power(TEST).max()
     assert fit.deflection == pytest.approx(0.12, abs=0.03)
-    assert fit.predict(np.array([[0.0, 1.0, 0.3], [0.4, 0.0, 1.0]]))[0] == pytest.approx(0.0), "at rest"
+    assert fit.predict(np.array([[0.0, 1.0, 0.3], [0.4, 0.0, 1.0]]))[0] == pytest.approx(0.0), (
+        "at rest"
+    )
 
 
 def test_outliers_are_named_and_no_good_sample_with_them(fit: FinFit) -> None:
@@ -117,7 +121,10 @@ def test_one_zero_direction_speaks_for_all() -> None:
     told = samples(command, measured(law, command, 0.02))
     found = fit_fin(type(told)(command, told.force, None, told.places, (), turned=False))
     truth = law.force(TEST)
-    error = np.linalg.norm(found.predict(TEST)[0] - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
+    error = (
+        np.linalg.norm(found.predict(TEST)[0] - truth, axis=-1)
+        / np.linalg.norm(truth, axis=-1).max()
+    )
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
@@ -129,7 +136,9 @@ def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch
     assert "100 of 130 samples, drawn at random" in " ".join(found.notes)
 
 
-def eight_directions(n: int = 300, along_shaft: float = 0.15, noise: float = 0.03) -> tuple[Array, Array]:
+def eight_directions(
+    n: int = 300, along_shaft: float = 0.15, noise: float = 0.03
+) -> tuple[Array, Array]:
     """Commands of a rig that turns in eighths, and forces with a part along the shaft."""
     rng = np.random.default_rng(1)
     command = commands(n)
@@ -147,7 +156,9 @@ def test_a_fit_takes_seconds_on_one_thread_and_says_what_it_does() -> None:
 
     def progress(words: str) -> None:
         told.append(words)
-        threads.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        threads.update(
+            pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
+        )
 
     began = time.thread_time()
     fit_fin(samples(*eight_directions()), progress=progress)

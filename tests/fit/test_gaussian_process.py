@@ -1,4 +1,5 @@
-"""The kernel of a fin's forces, the Gaussian process beside its textbook formulas, and singular matrices."""
+"""The kernel of a fin's forces, the Gaussian process beside its textbook formulas, and singular
+matrices."""
 
 import numpy as np
 import pytest
@@ -30,7 +31,9 @@ def test_predictions_are_those_of_a_conditioned_normal_distribution() -> None:
 def test_a_value_left_out_is_predicted_by_a_process_without_it() -> None:
     error, deviation = GaussianProcess(KERNEL, INPUTS, VALUES, VARIANCE).left_out()
     others = np.arange(30) != 7
-    mean, own = GaussianProcess(KERNEL, INPUTS[others], VALUES[others], VARIANCE[others]).predict(INPUTS[7:8])
+    mean, own = GaussianProcess(KERNEL, INPUTS[others], VALUES[others], VARIANCE[others]).predict(
+        INPUTS[7:8]
+    )
     np.testing.assert_allclose(error[7], VALUES[7] - mean[0], rtol=1e-6)
     np.testing.assert_allclose(deviation[7] ** 2, own[0] ** 2 + VARIANCE[7], rtol=1e-6)
 
@@ -48,7 +51,8 @@ def test_the_gradient_is_that_of_the_covariance() -> None:
     k, gradient = KERNEL.with_gradient(FEW, FEW)
     np.testing.assert_allclose(np.diag(k), KERNEL.variance(FEW))
     differences = approx_fprime(
-        np.log(KERNEL), lambda logs: float(np.vdot(weights, ThrustKernel(*np.exp(logs)).covariance(FEW, FEW)))
+        np.log(KERNEL),
+        lambda logs: float(np.vdot(weights, ThrustKernel(*np.exp(logs)).covariance(FEW, FEW))),
     )
     np.testing.assert_allclose(gradient(weights), differences, atol=1e-6)
 

@@ -55,7 +55,9 @@ def test_units_stand_in_the_header(
     np.testing.assert_allclose(found.force, plain.force, rtol=1e-6, atol=1e-12)
 
 
-def test_one_zero_direction_is_filled_by_symmetry_and_said(tmp_path: Path, columns: Columns) -> None:
+def test_one_zero_direction_is_filled_by_symmetry_and_said(
+    tmp_path: Path, columns: Columns
+) -> None:
     without = {k: v for k, v in columns.items() if k not in ("phi", "Fx")}
     found = read(tmp_path, without)
     assert not found.turned and "symmetry" in found.notes[0] and "along the shaft" in found.notes[1]

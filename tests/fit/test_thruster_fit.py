@@ -1,4 +1,5 @@
-"""Thrusters from bench tables: the T200 by its maker, noisy benches of known thrusters, wrong files."""
+"""Thrusters from bench tables: the T200 by its maker, noisy benches of known thrusters, wrong
+files."""
 
 import json
 from collections.abc import Callable
@@ -28,9 +29,12 @@ def true_force(command: Array) -> Array:
 
 
 def bench(n: int, noise: float, seed: int = 0, repeats: int = 1) -> Bench:
-    """Rows of that thruster at random commands, forces and powers with noise that is a share of each."""
+    """Rows of that thruster at random commands, forces and powers with noise that is a share of
+    each."""
     rng = np.random.default_rng(seed)
-    command = np.repeat(np.sort(np.append(rng.uniform(-1.0, 1.0, n - 3), [-1.0, 0.0, 1.0])), repeats)
+    command = np.repeat(
+        np.sort(np.append(rng.uniform(-1.0, 1.0, n - 3), [-1.0, 0.0, 1.0])), repeats
+    )
     force = true_force(command)
     power = np.where(force > 0.0, 1.0, 1.4) * np.abs(force) ** 1.55
     seen = [values * (1.0 + noise * rng.standard_normal(len(command))) for values in (force, power)]
@@ -119,7 +123,8 @@ def robot_with(fit: ThrusterFit, table: Path) -> Path:
     keys = yaml.safe_load("\n".join(layout_lines(fit, table)))
     one = {"type": "thruster", "axis": [1, 0, 0], **keys}
     actuators = [
-        {"name": name, **one, "position_m": [0, y, 0]} for name, y in (("left", 0.2), ("right", -0.2))
+        {"name": name, **one, "position_m": [0, y, 0]}
+        for name, y in (("left", 0.2), ("right", -0.2))
     ]
     path = table.with_name("robot.yaml")
     robot = {"format": "finlab-layout", "version": 2, "name": "two", "actuators": actuators}

@@ -38,9 +38,11 @@ def wide() -> Layout:
 
 
 def largest_by_polygons(sets: ForceSets, direction: Array, corners: int, outer: bool) -> float:
-    """Largest scaled wrench exactly along a unit direction (6,), each disc a polygon inside or around it.
+    """Largest scaled wrench exactly along a unit direction (6,), each disc a polygon inside or
+    around it.
 
-    A linear programme that shares nothing with the solver under test. Sectors up to half a turn, one robot.
+    A linear programme that shares nothing with the solver under test. Sectors up to half a turn,
+    one robot.
     """
     n = sets.radius.shape[1]
     angles = 2 * np.pi * np.arange(corners) / corners

@@ -1,4 +1,5 @@
-"""Attainable sets; reach of robots of any actuators against linear programs over a plant written apart."""
+"""Attainable sets; reach of robots of any actuators against linear programs over a plant written
+apart."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -37,7 +38,8 @@ def outside(body: AttainableSet, points: Array) -> float:
 
 @pytest.mark.parametrize("kind", ["force", "torque"])
 def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts, kind: str) -> None:
-    # Sums of planar forces that leave no other wrench, made by projecting random ones and shrinking them.
+    # Sums of planar forces that leave no other wrench, made by projecting random ones and shrinking
+    # them.
     layout = shipped("mixed")
     sets = force_sets(layout)
     own = OWN[kind]
@@ -154,7 +156,9 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
 @pytest.mark.parametrize(
     ("name", "flow"), [("turtle_hybrid", None), ("catamaran", None), ("torpedo", AT_SPEED)]
 )
-def test_no_command_goes_beyond_and_the_best_are_as_good(name: str, flow: tuple[float, ...] | None) -> None:
+def test_no_command_goes_beyond_and_the_best_are_as_good(
+    name: str, flow: tuple[float, ...] | None
+) -> None:
     layout = replace(load_layout(name), axes=WRENCH)
     plant = Plant(layout)
     sets = force_sets(layout, flow=flow)
@@ -176,7 +180,9 @@ def test_no_command_goes_beyond_and_the_best_are_as_good(name: str, flow: tuple[
 def test_a_thruster_that_pulls_only_and_an_azimuth_that_cannot_stop() -> None:
     model = PowerLaw(1.0)
     pull = Thruster("pull", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-30.0, 0.0), model)
-    tilt = Azimuth("tilt", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (5.0, 20.0), model, (-0.5, 0.5))
+    tilt = Azimuth(
+        "tilt", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (5.0, 20.0), model, (-0.5, 0.5)
+    )
     layout = Layout("two", (pull, tilt))
     low, high = axis_ranges(layout, np.zeros(6))
     assert (low[0], high[0]) == pytest.approx((5.0 * np.cos(0.5) - 30.0, 20.0), abs=1e-3)

@@ -24,7 +24,9 @@ def fins(half: float, rows: int = 200) -> ForceSets:
     rng = np.random.default_rng(0)
     effectiveness = np.zeros((rows, 1, 2, 6))
     effectiveness[:, 0, 0, 0] = effectiveness[:, 0, 1, 1] = 1.0
-    return sectors(effectiveness, np.full((rows, 1), 3.0), rng.uniform(-np.pi, np.pi, (rows, 1)), half)
+    return sectors(
+        effectiveness, np.full((rows, 1), 3.0), rng.uniform(-np.pi, np.pi, (rows, 1)), half
+    )
 
 
 def pulls(rows: int = 200) -> Array:
@@ -53,9 +55,14 @@ def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
 @pytest.mark.parametrize("turn", [0.0, 1.0])
 def test_a_polygon_reaches_to_its_best_corner(turn: float) -> None:
     corners = np.array([[3.0, 1.0], [2.0, 4.0], [1.0, 1.0], [2.5, -0.5]])
-    line = np.array([[-1.0, 0.0], [2.0, 0.0]]) @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    line = np.array([[-1.0, 0.0], [2.0, 0.0]]) @ [
+        [np.cos(turn), np.sin(turn)],
+        [-np.sin(turn), np.cos(turn)],
+    ]
     for polygon in (corners, line):
-        sets = assembled([[Shape(np.eye(2, 3), 1.0, 0.0, 0.0, (polygon,))]], np.eye(3, 6)[None, None])
+        sets = assembled(
+            [[Shape(np.eye(2, 3), 1.0, 0.0, 0.0, (polygon,))]], np.eye(3, 6)[None, None]
+        )
         pull = pulls()[:, 0]
         reach, force = sets.tile(200).farthest(np.pad(pull, ((0, 0), (0, 4))))
         np.testing.assert_allclose(reach, (polygon @ pull.T).max(axis=0), rtol=1e-12, atol=1e-12)
@@ -67,7 +74,9 @@ def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
     """Its polygon, and those of both halves of a wide arc, beside the forces of many commands."""
     numbers = {"k": 3.0, "p": 1.5, "x0": 0.9, "q": 4.0, "e": 0.2, "phi_e": 1.0, "d": 0.1}
     limits = Limits(zero_direction=(0.3 - half, 0.3 + half))
-    fin = Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, FinModelSpec("soft", tuple(sorted(numbers.items()))))
+    fin = Fin(
+        "fin", (0.0, 0.0, 0.0), 0.0, limits, FinModelSpec("soft", tuple(sorted(numbers.items())))
+    )
     layout = Layout("one", (fin,))
     axes = [np.linspace(low, high, 20) for low, high in zip(fin.lower, fin.upper, strict=True)]
     axes[2] = np.linspace(*limits.zero_direction, 501)
@@ -77,12 +86,20 @@ def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     sets = force_sets(layout)
     parts = convex_parts(sets)
-    ahead = [sets.middle[0, 0], *parts.middle[:, 0]] if len(parts.radius) > 1 else [sets.middle[0, 0]]
-    for number, part in enumerate([sets, *(parts.take(np.array([k])) for k in range(len(ahead) - 1))]):
-        turned = (np.arctan2(force[:, 1], force[:, 0]) - ahead[number] + np.pi) % (2.0 * np.pi) - np.pi
+    ahead = (
+        [sets.middle[0, 0], *parts.middle[:, 0]] if len(parts.radius) > 1 else [sets.middle[0, 0]]
+    )
+    for number, part in enumerate(
+        [sets, *(parts.take(np.array([k])) for k in range(len(ahead) - 1))]
+    ):
+        turned = (np.arctan2(force[:, 1], force[:, 0]) - ahead[number] + np.pi) % (
+            2.0 * np.pi
+        ) - np.pi
         own = force[(np.abs(turned) <= part.half[0, 0] + 1e-6) | (force == 0.0).all(-1)]
         reach = part.tile(60).farthest(np.pad(normal, ((0, 0), (1, 3))))[0]
-        np.testing.assert_allclose(reach, (own @ normal.T).max(axis=0), atol=2e-3 * sets.radius[0, 0])
+        np.testing.assert_allclose(
+            reach, (own @ normal.T).max(axis=0), atol=2e-3 * sets.radius[0, 0]
+        )
 
 
 def five_fins(half: float) -> ForceSets:

@@ -20,7 +20,8 @@ BOTH_WAYS = np.concatenate([np.eye(6), -np.eye(6)])
 
 
 def test_layout_b_in_closed_form(shipped: Layouts) -> None:
-    # Fins at the ends of a cross with arms d push forward in twos, up in fours, and all around for yaw.
+    # Fins at the ends of a cross with arms d push forward in twos, up in fours, and all around for
+    # yaw.
     layout = shipped("B")
     arm = max(np.linalg.norm(fin.position) for fin in layout.fins)
     held = authority(layout)
@@ -33,7 +34,9 @@ def test_layout_b_in_closed_form(shipped: Layouts) -> None:
 def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
     sets = force_sets(shipped(name))
     mixture = np.random.default_rng(0).standard_normal((3, 6))
-    directions = np.concatenate([BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)])
+    directions = np.concatenate(
+        [BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)]
+    )
     found, gap = max_wrench_along_exactly(sets, directions)
     assert gap < 2e-5
     for direction, value in zip(directions, found[0], strict=True):
@@ -72,9 +75,12 @@ def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
 
 
 def _commands(layout: Layout, thrust: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Commands at full amplitude whose frequency gives the thrusts; both laws grow with its square."""
+    """Commands at full amplitude whose frequency gives the thrusts; both laws grow with its
+    square."""
     upper = layout.upper
-    full = np.linalg.norm(Plant(layout).body_forces(np.where([True, True, False], upper, 0.0)), axis=-1)
+    full = np.linalg.norm(
+        Plant(layout).body_forces(np.where([True, True, False], upper, 0.0)), axis=-1
+    )
     return np.stack([upper[:, 0], upper[:, 1] * np.sqrt(thrust / full), angle], axis=-1)
 
 
@@ -91,7 +97,8 @@ def test_no_sampled_command_goes_beyond(shipped: Layouts, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["A", "restricted", "mixed"])
 def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) -> None:
-    # What fins do adds up, so the best of each fin's commands, all tried, make up the best of all of them.
+    # What fins do adds up, so the best of each fin's commands, all tried, make up the best of all
+    # of them.
     layout = shipped(name)
     plant = Plant(layout)
     drawn = np.random.default_rng(3).standard_normal((30, 6))
@@ -109,7 +116,9 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
 def robots(half: float, scale: float) -> ForceSets:
     rng = np.random.default_rng(5)
     effectiveness = scale * rng.standard_normal((40, 5, 2, 6))
-    return sectors(effectiveness, rng.uniform(0.5, 3.0, (40, 5)), rng.uniform(-3.0, 3.0, (40, 5)), half)
+    return sectors(
+        effectiveness, rng.uniform(0.5, 3.0, (40, 5)), rng.uniform(-3.0, 3.0, (40, 5)), half
+    )
 
 
 @pytest.mark.parametrize(("half", "scale"), crossed(HALVES, [1e-3, 1.0, 1e3], every=2))
@@ -130,7 +139,9 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
     assert (np.linalg.norm(found.force, axis=-1) <= sets.radius * (1.0 + 1e-9)).all()
     if half <= np.pi / 2:
         angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.middle
-        assert (np.cos(angle) >= np.cos(half) - 1e-6)[np.linalg.norm(found.force, axis=-1) > 1e-3].all()
+        assert (np.cos(angle) >= np.cos(half) - 1e-6)[
+            np.linalg.norm(found.force, axis=-1) > 1e-3
+        ].all()
 
 
 @pytest.mark.filterwarnings("error")
@@ -143,7 +154,9 @@ def test_robots_without_anything_to_push_with() -> None:
         sets._replace(effectiveness=np.repeat(sets.effectiveness[:, :1], 5, axis=1)),
     ):
         found = max_wrench_along(dead, ray)
-        assert found.size == pytest.approx(np.zeros(40), abs=1e-6) and np.isfinite(found.normal).all()
+        assert (
+            found.size == pytest.approx(np.zeros(40), abs=1e-6) and np.isfinite(found.normal).all()
+        )
         assert largest(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max() == -np.inf
 
 
@@ -151,7 +164,8 @@ CORNERS = 96
 
 
 def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...]) -> np.ndarray:
-    """Ranges (6, 2) [N, N m] with each fin's disc as a polygon within it; NaN where there are none."""
+    """Ranges (6, 2) [N, N m] with each fin's disc as a polygon within it; NaN where there are
+    none."""
     sets = force_sets(layout, lost)
     n = sets.radius.shape[1]
     turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)

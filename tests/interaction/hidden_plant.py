@@ -1,7 +1,8 @@
-"""A plant of another family than the formula of jets, written apart from the library; loops, no arrays.
+"""A plant of another family than the formula of jets, written apart from the library; loops, no
+arrays.
 
-Jets are cones with a flat core and swirl, losses multiply, hulls are pushed off along their normals, housings
-drag.
+Jets are cones with a flat core and swirl, losses multiply, hulls are pushed off along their
+normals, housings drag.
 """
 
 import math
@@ -22,7 +23,8 @@ def _jet(force: np.ndarray, diameter: float) -> tuple[float, np.ndarray, float]:
 
 
 def _velocity(way: np.ndarray, course: np.ndarray, speed: float, diameter: float) -> np.ndarray:
-    """Velocity at a way from a jet's disc: a cone that widens by 0.11, with a cosine rim, and swirl."""
+    """Velocity at a way from a jet's disc: a cone that widens by 0.11, with a cosine rim, and
+    swirl."""
     along = float(way @ course)
     if along <= 0.0:
         return np.zeros(3)
@@ -79,7 +81,8 @@ def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
 
 
 def _on_hull(place: np.ndarray, course: np.ndarray, thrust: float, half: np.ndarray) -> np.ndarray:
-    """A jet that comes within a rim of the hull pushes it along the jet and a little off along its normal."""
+    """A jet that comes within a rim of the hull pushes it along the jet and a little off along its
+    normal."""
     z = place / half
     q = course / half
     towards = -float(z @ q) / float(np.linalg.norm(q))

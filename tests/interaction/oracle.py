@@ -1,4 +1,5 @@
-"""The formula of jets of docs/theory/interaction.md, one pair after the other: an oracle for the core."""
+"""The formula of jets of docs/theory/interaction.md, one pair after the other: an oracle for the
+core."""
 
 import numpy as np
 

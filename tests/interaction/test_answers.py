@@ -1,4 +1,5 @@
-"""Answers where jets meet: exact by the plant, as cheap as many starts find, within what policies promise."""
+"""Answers where jets meet: exact by the plant, as cheap as many starts find, within what policies
+promise."""
 
 from dataclasses import replace
 
@@ -12,7 +13,12 @@ from finlab import Allocator, Azimuth, Layout, PowerLaw
 from finlab.arrays import Array
 from finlab.interaction.jets import Jets
 from finlab.physics import Plant
-from finlab.research.random_layouts import random_azimuth, random_jet_robot, random_shaft_fin, random_thruster
+from finlab.research.random_layouts import (
+    random_azimuth,
+    random_jet_robot,
+    random_shaft_fin,
+    random_thruster,
+)
 
 KINDS = {
     "thrusters": [random_thruster],
@@ -47,7 +53,13 @@ def test_answers_are_exact_by_the_plant(kind: str, seed: int) -> None:
 def pods(places: list[tuple[float, float]]) -> Layout:
     parts = [
         Azimuth(
-            f"p{i}", (x, y, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 50.0), PowerLaw(1.0), diameter=0.1
+            f"p{i}",
+            (x, y, 0.0),
+            (0.0, 0.0, 1.0),
+            (1.0, 0.0, 0.0),
+            (0.0, 50.0),
+            PowerLaw(1.0),
+            diameter=0.1,
         )
         for i, (x, y) in enumerate(places)
     ]

@@ -1,4 +1,5 @@
-"""The formula of jets beside published tests, its derivatives beside differences, and what speed takes."""
+"""The formula of jets beside published tests, its derivatives beside differences, and what speed
+takes."""
 
 import math
 
@@ -62,7 +63,8 @@ def test_the_core_says_what_the_formula_says(seed: int) -> None:
 
 
 def differs(known: Interaction, force: Array, inflow: Array | None = None) -> float:
-    """By how much derivatives by forces (n, 3) differ at most from differences, exact answers included."""
+    """By how much derivatives by forces (n, 3) differ at most from differences, exact answers
+    included."""
     offset, slope = known.effect(force, inflow)
     assert_allclose(offset, known.offset(force, inflow), atol=1e-12)
     steps = 1e-5 * np.eye(force.size).reshape(*force.shape, *force.shape)
@@ -93,7 +95,8 @@ def test_a_jet_on_the_hull_pushes_back() -> None:
 
 
 def open_water(force: float, speed: float, kt: float, none_at: float) -> float:
-    """Thrust at a speed of advance along Kt = Kt0 (1 - J / J0), at the rate that gives `force` at rest."""
+    """Thrust at a speed of advance along Kt = Kt0 (1 - J / J0), at the rate that gives `force` at
+    rest."""
     rate = math.sqrt(force / (1000.0 * kt * D**4))
     return 1000.0 * rate**2 * D**4 * kt * (1.0 - speed / (rate * D * none_at))
 
@@ -102,7 +105,13 @@ def open_water(force: float, speed: float, kt: float, none_at: float) -> float:
 @pytest.mark.parametrize(("kt", "none_at"), [(0.4, 0.8), (0.3, 1.1), (0.5, 0.6)])
 def test_speed_takes_what_the_open_water_line_says(force: float, kt: float, none_at: float) -> None:
     one = Thruster(
-        "stern", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-50.0, 50.0), LAW, diameter=D, open_water=(kt, none_at)
+        "stern",
+        (0.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (-50.0, 50.0),
+        LAW,
+        diameter=D,
+        open_water=(kt, none_at),
     )
     plant = Plant(Layout("one", (one,), interaction=Jets()))
     got = plant.wrench(np.array([[force, 0.0, 0.0]]), flow=np.array([1.0, 0, 0, 0, 0, 0]))[0]

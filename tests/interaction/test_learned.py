@@ -1,4 +1,5 @@
-"""Networks that learn what jets take from forward data: better than the laws on robots never seen."""
+"""Networks that learn what jets take from forward data: better than the laws on robots never
+seen."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -52,7 +53,9 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
             for target in targets:
                 result = allocator.allocate(target)
                 errors.append(
-                    np.linalg.norm((wrenches(layout, result.command[None]) - target) / yardstick(layout))
+                    np.linalg.norm(
+                        (wrenches(layout, result.command[None]) - target) / yardstick(layout)
+                    )
                 )
                 if robot is known:
                     expected.append(result.expected_error)
@@ -92,7 +95,9 @@ def test_a_stranger_s_layout_opens_no_file_of_ours(network: Learned, tmp_path: P
         adopted(layout, {}, tmp_path, "robot.yaml")
     content = Path(network.path).read_bytes()
     opened = adopted(layout, {network.path: content}, tmp_path, "robot.yaml").layout
-    assert opened.interaction is not None and Path(opened.interaction.path).parent.parent == tmp_path
+    assert (
+        opened.interaction is not None and Path(opened.interaction.path).parent.parent == tmp_path
+    )
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 100, b'{"a": 1}'])
@@ -104,6 +109,8 @@ def test_damaged_files_are_refused(content: bytes, tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named() -> None:
-    layout = replace(finlab.load_layout("bluerov2"), interaction=Learned("/nowhere/net.safetensors"))
+    layout = replace(
+        finlab.load_layout("bluerov2"), interaction=Learned("/nowhere/net.safetensors")
+    )
     with pytest.raises(CheckpointError, match="/nowhere/net.safetensors"):
         finlab.Allocator(layout)

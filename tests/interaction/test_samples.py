@@ -37,7 +37,9 @@ def write_table(samples: Samples, path: Path) -> None:
         writer.writerow([*names, "Fx", "Fy", "Fz", "Tx", "Ty", "Tz"])
         for command, wrench in zip(samples.command, samples.wrench, strict=True):
             parts = zip(layout.actuators, command, strict=True)
-            writer.writerow([*(v for part, row in parts for v in row[: len(part.NUMBERS)]), *wrench])
+            writer.writerow(
+                [*(v for part, row in parts for v in row[: len(part.NUMBERS)]), *wrench]
+            )
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,9 @@ def test_files_give_back_what_was_written(samples: list[Samples], tmp_path: Path
 
 
 @pytest.mark.parametrize("kept", [("layouts", "command"), ("command", "wrench")])
-def test_what_is_missing_is_named(samples: list[Samples], tmp_path: Path, kept: tuple[str, ...]) -> None:
+def test_what_is_missing_is_named(
+    samples: list[Samples], tmp_path: Path, kept: tuple[str, ...]
+) -> None:
     write_samples(tmp_path / "all.npz", samples)
     with np.load(tmp_path / "all.npz") as file:
         np.savez(tmp_path / "less.npz", **{name: file[name] for name in kept})
@@ -86,7 +90,9 @@ def test_twenty_samples_fit_the_constants(samples: list[Samples]) -> None:
         plant = Plant(robot)
         scale = yardstick(one.layout)
         truth = other(one.layout, command)
-        error, laws = ((Plant(layout).wrench(command) - truth) / scale for layout in (robot, one.layout))
+        error, laws = (
+            (Plant(layout).wrench(command) - truth) / scale for layout in (robot, one.layout)
+        )
         assert np.linalg.norm(error) <= np.linalg.norm(laws) / 3.0
         assert plant.interaction is not None
         force = body_force(plant.force(command), robot.frames)
@@ -101,7 +107,11 @@ def test_the_verbs_go_from_a_table_to_an_answer(samples: list[Samples], tmp_path
     write_table(Samples(one.layout, one.command[:20], one.wrench[:20]), tmp_path / "tank.csv")
     run = ["fit", "interaction", "robot.yaml", "tank.csv", "-o", "known.yaml"]
     done = subprocess.run(
-        [sys.executable, "-m", "finlab", *run], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-m", "finlab", *run],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "laws alone miss" in done.stdout and "type: jets" in done.stdout
     target = other(one.layout, one.command[-1:])[0]
@@ -109,7 +119,9 @@ def test_the_verbs_go_from_a_table_to_an_answer(samples: list[Samples], tmp_path
     for name in ("robot.yaml", "known.yaml"):
         allocator = finlab.Allocator(finlab.load_layout(tmp_path / name))
         command = allocator.allocate(target).command
-        errors.append(np.linalg.norm((other(one.layout, command[None])[0] - target) / allocator.scale))
+        errors.append(
+            np.linalg.norm((other(one.layout, command[None])[0] - target) / allocator.scale)
+        )
     assert errors[1] < 0.5 * errors[0]
 
 

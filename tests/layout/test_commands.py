@@ -1,4 +1,5 @@
-"""Commands as users see them: of each type of actuator, of tables, and of a robot that pushes nothing."""
+"""Commands as users see them: of each type of actuator, of tables, and of a robot that pushes
+nothing."""
 
 import math
 

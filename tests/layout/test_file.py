@@ -52,7 +52,9 @@ def edited(*path, value):
 
 def changed(key, value):
     """The same at a key path in the words of a refusal."""
-    return edited(*(int(part) if part.isdigit() else part for part in re.findall(r"\w+", key)), value=value)
+    return edited(
+        *(int(part) if part.isdigit() else part for part in re.findall(r"\w+", key)), value=value
+    )
 
 
 BAD = [
@@ -89,7 +91,11 @@ BAD = [
     ("actuators[0].servo", [1, 2], "expected keys and values"),
     ("actuators[0].servo.speed", 3, "unknown key"),
     ("actuators[0].servo.speed_limit_rad_s", 0, "must lie within"),
-    ("actuators[0].limits.amplitude_rad", [0.6, 0.05], "minimum 0.6 is above maximum 0.05; swap them"),
+    (
+        "actuators[0].limits.amplitude_rad",
+        [0.6, 0.05],
+        "minimum 0.6 is above maximum 0.05; swap them",
+    ),
     ("actuators[0].limits.amplitude_rad", [], "2 values, got 0"),
     ("actuators[0].limits.amplitude_rad[1]", 2, "must lie within"),
     ("actuators[0].limits.amplitude_rad", [0, 0], "the maximum must be at least 0.0001"),
@@ -117,7 +123,11 @@ CHANGED += [
         edited("actuators", 0, "model", value={"type": "table"}),
         "required key is missing",
     ),
-    ("body.added_mass[5]", edited("body", "added_mass", value=[1, 2, 3, 4, 5, -6]), "must lie within"),
+    (
+        "body.added_mass[5]",
+        edited("body", "added_mass", value=[1, 2, 3, 4, 5, -6]),
+        "must lie within",
+    ),
     ("body.inertia_kgm2[0]", edited("body", "inertia_kgm2", value=[0, 1, 1]), "must lie within"),
     ("body.hull.mesh", edited("body", "hull", value={"mesh": "hull.exe"}), "expected a .stl"),
 ]
@@ -235,7 +245,9 @@ def test_numbers_written_in_any_usual_way_are_numbers(tmp_path):
 
 
 def test_limits_of_zero_width_are_allowed():
-    data = edited("actuators", 0, "limits", value={"frequency_hz": [2, 2], "zero_direction_rad": [0, 0]})
+    data = edited(
+        "actuators", 0, "limits", value={"frequency_hz": [2, 2], "zero_direction_rad": [0, 0]}
+    )
     assert parse_layout(data).fins[0].limits.frequency == (2.0, 2.0)
 
 

@@ -11,7 +11,8 @@ from finlab.layout.effectiveness import force_effectiveness
 from finlab.research.random_layouts import TRAINING_BOX, random_layout
 
 THREE = Layout(
-    "three", tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"]))
+    "three",
+    tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"])),
 )
 
 
@@ -44,7 +45,9 @@ def test_layouts_are_values():
 
 def test_numpy_numbers_become_plain_ones():
     fin = Fin("f", np.array([0.1, 0.2, 0.3]), np.float64(1.0), Limits(np.array([0.1, 0.2])))
-    assert all(type(value) is float for value in (*fin.position, fin.mounting_angle, *fin.limits.amplitude))
+    assert all(
+        type(value) is float for value in (*fin.position, fin.mounting_angle, *fin.limits.amplitude)
+    )
 
 
 def test_force_columns_are_force_and_moment_of_a_newton():
@@ -83,7 +86,9 @@ def test_random_layouts_keep_to_box_counts_and_limits():
     arc = width < 2 * math.pi - 1e-9
     assert arc.mean() == pytest.approx(1 / 3, abs=0.03)
     assert width[arc].min() >= math.pi / 2 - 1e-9 and width[arc].max() <= 1.5 * math.pi + 1e-9
-    assert (np.abs(upper[:, 2]) <= math.pi + 1e-9).all() and (np.abs(lower[:, 2]) <= math.pi + 1e-9).all()
+    assert (np.abs(upper[:, 2]) <= math.pi + 1e-9).all() and (
+        np.abs(lower[:, 2]) <= math.pi + 1e-9
+    ).all()
 
 
 def test_random_layouts_outside_a_box_have_a_fin_there():

@@ -1,4 +1,5 @@
-"""Thrusters, azimuths and rudders in a file: what is read, what is refused and why, and what is written."""
+"""Thrusters, azimuths and rudders in a file: what is read, what is refused and why, and what is
+written."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -92,16 +93,29 @@ def test_degrees_become_radians() -> None:
         ),
         (
             {**THRUSTER, "model": {**TABLE, "rows": [[0, 0, 0], [1, 20, 9], [2, 40, 10]]}},
-            "model.rows: the power must grow ever faster with the force, but forward it lies 4 W above",
+            "model.rows: the power must grow ever faster with the force, but forward it lies 4 W "
+            "above",
         ),
-        ({**THRUSTER, "model": TABLE, "force_n": [-45, 50]}, "force_n: the table ends at -40 and 52 N"),
-        ({**AZIMUTH, "force_n": [-20, 0]}, "force_n: expected a most force above 0 and above the least"),
-        ({**AZIMUTH, "arc_deg": [20, -20]}, "arc_deg: must rise, by at most one turn, got 20 and -20"),
+        (
+            {**THRUSTER, "model": TABLE, "force_n": [-45, 50]},
+            "force_n: the table ends at -40 and 52 N",
+        ),
+        (
+            {**AZIMUTH, "force_n": [-20, 0]},
+            "force_n: expected a most force above 0 and above the least",
+        ),
+        (
+            {**AZIMUTH, "arc_deg": [20, -20]},
+            "arc_deg: must rise, by at most one turn, got 20 and -20",
+        ),
         ({**AZIMUTH, "type": "tilt"}, "arc_deg: is missing: the arc of a tilt"),
         ({**AZIMUTH, "zero": [0, 0, 1]}, "zero: must stand across turn_axis, got 0 degrees"),
         ({**RUDDER, "deflection_deg": [5, 5]}, "deflection_deg: expected a least below"),
         ({**RUDDER, "aspect_ratio": None}, "aspect_ratio: expected a number, got None"),
-        ({**RUDDER, "type": "jet"}, "type: expected one of fin, thruster, azimuth, tilt, rudder, got 'jet'"),
+        (
+            {**RUDDER, "type": "jet"},
+            "type: expected one of fin, thruster, azimuth, tilt, rudder, got 'jet'",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_sentence_with_the_key(data: dict[str, Any], sentence: str) -> None:
@@ -113,14 +127,26 @@ def test_what_is_wrong_is_one_sentence_with_the_key(data: dict[str, Any], senten
 @pytest.mark.parametrize(
     ("kind", "arguments", "sentence"),
     [
-        (Thruster, {"force": (3.0, 2.0)}, "force of thruster 'own': must include 0, .* got 3 and 2"),
-        (Thruster, {"position": (0.0, 0.0)}, "position of thruster 'own': expected a list of 3 values"),
+        (
+            Thruster,
+            {"force": (3.0, 2.0)},
+            "force of thruster 'own': must include 0, .* got 3 and 2",
+        ),
+        (
+            Thruster,
+            {"position": (0.0, 0.0)},
+            "position of thruster 'own': expected a list of 3 values",
+        ),
         (Thruster, {"dead_band": 99.0}, "dead_band of thruster 'own': leaves no force"),
         (Azimuth, {"arc": (1.0, -1.0)}, "arc of azimuth 'own': must rise, by at most one turn"),
         (Tilt, {"arc": (-3.1415926, 3.1415926)}, "arc of tilt 'own': is missing"),
         (Rudder, {"deflection": (0.1, 0.1)}, "deflection of rudder 'own': expected a least below"),
         (Rudder, {"shaft": (0.0, 0.0, 0.5)}, "shaft of rudder 'own': expected a unit vector"),
-        (Fin, {"mounting_angle": None}, "mounting_angle of fin 'own': is missing; give it, or shaft"),
+        (
+            Fin,
+            {"mounting_angle": None},
+            "mounting_angle of fin 'own': is missing; give it, or shaft",
+        ),
         (Fin, {"mounting_angle": 9e9}, "mounting_angle of fin 'own': must lie within"),
     ],
 )
@@ -141,9 +167,13 @@ def test_in_a_file_the_same_refusal_names_the_key_and_the_actuator() -> None:
 
 
 def test_a_table_comes_from_a_csv_file(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text("power_w,command,force_n\n380,1100,-40\n0,1500,0\n300,1900,52\n")
+    (tmp_path / "t.csv").write_text(
+        "power_w,command,force_n\n380,1100,-40\n0,1500,0\n300,1900,52\n"
+    )
     actuator = _read({**THRUSTER, "model": {"type": "table", "path": "t.csv"}}, tmp_path)
-    assert actuator.model == PowerTable(((1100.0, -40.0, 380.0), (1500.0, 0.0, 0.0), (1900.0, 52.0, 300.0)))
+    assert actuator.model == PowerTable(
+        ((1100.0, -40.0, 380.0), (1500.0, 0.0, 0.0), (1900.0, 52.0, 300.0))
+    )
     (tmp_path / "t.csv").write_text("command,force_n\n1,2\n")
     with pytest.raises(LayoutError, match=r"model\.path: .*t.csv: has no column power_w"):
         _read({**THRUSTER, "model": {"type": "table", "path": "t.csv"}}, tmp_path)
@@ -151,4 +181,6 @@ def test_a_table_comes_from_a_csv_file(tmp_path: Path) -> None:
 
 def test_lift_of_an_aspect_ratio() -> None:
     foil = _read(RUDDER)
-    assert foil.slope == pytest.approx(2.61, abs=0.005)  # Whicker-Fehlner at the aspect ratio of REMUS
+    assert foil.slope == pytest.approx(
+        2.61, abs=0.005
+    )  # Whicker-Fehlner at the aspect ratio of REMUS

@@ -47,7 +47,9 @@ def test_read_as_printed_in_the_body_frame_layouts_b_and_d_could_not_do_what_the
 
     def rows(name, thrust_axis_offset_deg):
         numbers = np.array(AS_PRINTED[name], dtype=float)
-        columns = force_effectiveness(numbers[:, :3], np.radians(numbers[:, 3] + thrust_axis_offset_deg))
+        columns = force_effectiveness(
+            numbers[:, :3], np.radians(numbers[:, 3] + thrust_axis_offset_deg)
+        )
         return columns[:, 1:].reshape(-1, 6).T
 
     # alpha as the direction of the horizontal force: that axis lies 90 degrees ahead of the shaft.

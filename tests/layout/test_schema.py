@@ -11,7 +11,9 @@ from finlab.assets import shipped_layouts
 from tests.layout.test_file import BAD, GOOD
 from tools.schemas import PACKAGE, schemas
 
-VALIDATOR = jsonschema.Draft202012Validator(json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
+VALIDATOR = jsonschema.Draft202012Validator(
+    json.loads((PACKAGE / "layout/layout.schema.json").read_text())
+)
 BEYOND_A_SCHEMA = (
     ".nan",
     ".inf",

@@ -45,7 +45,9 @@ def test_bundles_take_it_along(slow: Layout, tmp_path: Path) -> None:
     assert [fin["name"] for fin in robot["layout"]["actuators"] if "servo" in fin] == ["back_left"]
 
 
-@pytest.mark.parametrize("field", ["amplitude_pole", "frequency_pole", "direction_pole", "speed_limit"])
+@pytest.mark.parametrize(
+    "field", ["amplitude_pole", "frequency_pole", "direction_pole", "speed_limit"]
+)
 def test_a_servo_has_positive_numbers(field: str) -> None:
     for wrong in (0.0, -1.0, float("nan"), 2000.0, "fast"):
         with pytest.raises(LayoutError, match=f"^{field}: "):

@@ -13,9 +13,14 @@ AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
 
 
 def columns(layout):
-    """Wrenches (6, k) of 1 N along all directions in which the actuators push, rudders by their lift when
-    the water comes from ahead."""
-    pushes = {"fin": slice(1, 3), "azimuth": slice(1, 3), "thruster": slice(0, 1), "rudder": slice(2, 3)}
+    """Wrenches (6, k) of 1 N along all directions in which the actuators push, rudders by their
+    lift when the water comes from ahead."""
+    pushes = {
+        "fin": slice(1, 3),
+        "azimuth": slice(1, 3),
+        "thruster": slice(0, 1),
+        "rudder": slice(2, 3),
+    }
     own = zip(layout.actuators, own_effectiveness(layout), strict=True)
     return np.concatenate([axes[pushes[part.type]] for part, axes in own]).T
 
@@ -94,7 +99,8 @@ def test_ucat_is_layout_a_with_a_body():
     assert ucat.body.mass_kg == 19.0
     assert ucat.body.hull.shape == "ucat"
     assert all(
-        len(getattr(ucat.body, key)) == 6 for key in ("added_mass", "linear_damping", "quadratic_damping")
+        len(getattr(ucat.body, key)) == 6
+        for key in ("added_mass", "linear_damping", "quadratic_damping")
     )
 
 
@@ -107,7 +113,14 @@ def test_turtle_hybrid_is_ucat_with_two_thrusters():
 
 def test_bluerov2_heavy_has_the_geometry_of_its_source():
     # Thrusts of least square, worked out from the source's table by hand.
-    share = np.linalg.pinv(columns(load_layout("bluerov2_heavy"))) @ [30.0, 15.0, -20.0, 0.0, 1.0, 3.0]
+    share = np.linalg.pinv(columns(load_layout("bluerov2_heavy"))) @ [
+        30.0,
+        15.0,
+        -20.0,
+        0.0,
+        1.0,
+        3.0,
+    ]
     expected = [-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741]
     np.testing.assert_allclose(share, expected, atol=1e-4)
 

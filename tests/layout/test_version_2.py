@@ -35,7 +35,13 @@ GOOD = {
     "name": "all types",
     "actuators": [
         {"name": "side", "type": "fin", "position_m": [0.2, -0.1, 0], "mounting_angle_deg": -60.0},
-        {"name": "tail", "type": "fin", "position_m": [-0.4, 0, 0], "shaft": [0, 0, 1], "zero": [1, 0, 0]},
+        {
+            "name": "tail",
+            "type": "fin",
+            "position_m": [-0.4, 0, 0],
+            "shaft": [0, 0, 1],
+            "zero": [1, 0, 0],
+        },
         LIFT,
         {**AZIMUTH, "name": "pod"},
         {**TILT, "name": "nose"},
@@ -63,7 +69,14 @@ def test_all_types_are_read_and_written(tmp_path):
     path = tmp_path / "robot.yaml"
     path.write_text(plain_yaml(GOOD))
     layout = load_layout(path)
-    assert [part.type for part in layout.actuators] == ["fin", "fin", "thruster", "azimuth", "tilt", "rudder"]
+    assert [part.type for part in layout.actuators] == [
+        "fin",
+        "fin",
+        "thruster",
+        "azimuth",
+        "tilt",
+        "rudder",
+    ]
     assert (layout.n, layout.n_fins, layout.is_of_fins) == (6, 2, False)
     assert layout.names == ("side", "tail", "lift", "pod", "nose", "rudder")
     assert layout.lower.shape == layout.upper.shape == layout.position.shape == (6, 3)
@@ -72,7 +85,9 @@ def test_all_types_are_read_and_written(tmp_path):
     written = layout_to_dict(layout)
     assert written["version"] == 2 and parse_layout(json.loads(json.dumps(written))) == layout
     jsonschema.validate(GOOD, json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
-    np.testing.assert_allclose(layout.frames @ layout.frames.swapaxes(1, 2), [np.eye(3)] * 6, atol=1e-15)
+    np.testing.assert_allclose(
+        layout.frames @ layout.frames.swapaxes(1, 2), [np.eye(3)] * 6, atol=1e-15
+    )
     assert np.linalg.det(layout.frames) == pytest.approx(1.0)
     assert layout.without(["side", "lift"]).names == ("tail", "pod", "nose", "rudder")
     assert layout.replace_actuator("lift", force=(0.0, 9.0)).upper[2, 0] == 9.0
@@ -83,10 +98,18 @@ def test_a_file_of_version_1_is_refused_with_how_to_convert_it(version):
     """What the sentence says to do is done here, and the file is read."""
     fin = {"name": "side", "position_m": [0.2, -0.1, 0], "mounting_angle_deg": -60.0}
     old = {"format": "finlab-layout", **version, "name": "old", "fins": [fin]}
-    said = "version: version 1, .* write version: 2, actuators: in place of fins:, and type: fin in each"
+    said = (
+        "version: version 1, .* write version: 2, actuators: in place of fins:, and type: fin in "
+        "each"
+    )
     with pytest.raises(LayoutError, match=said):
         parse_layout(old)
-    new = {"format": "finlab-layout", "version": 2, "name": "old", "actuators": [{**fin, "type": "fin"}]}
+    new = {
+        "format": "finlab-layout",
+        "version": 2,
+        "name": "old",
+        "actuators": [{**fin, "type": "fin"}],
+    }
     layout = parse_layout(new)
     assert layout.names == ("side",) and layout_to_dict(layout)["version"] == 2
     assert parse_layout(layout_to_dict(layout)) == layout
@@ -125,7 +148,9 @@ def test_fins_with_any_shaft_push_as_a_formula_of_its_own_says():
     zero = np.cross(shaft, rng.normal(size=(n, 3)))
     zero /= np.linalg.norm(zero, axis=1, keepdims=True)
     place = rng.uniform(-0.3, 0.3, (n, 3))
-    fins = [Fin(f"f{i}", tuple(place[i]), shaft=tuple(shaft[i]), zero=tuple(zero[i])) for i in range(n)]
+    fins = [
+        Fin(f"f{i}", tuple(place[i]), shaft=tuple(shaft[i]), zero=tuple(zero[i])) for i in range(n)
+    ]
     layout = Layout("any", tuple(fins))
     command = rng.uniform(layout.lower, layout.upper, (7, n, 3))
     a, f, phi = np.moveaxis(command, -1, 0)[..., None]
@@ -147,12 +172,28 @@ def test_the_effectiveness_is_force_and_lever():
 BAD = [
     ("actuators[2].name", edited(2, name="tail"), "'tail' is already the name of actuator 2"),
     ("actuators", {**GOOD, "actuators": []}, "a list of 1 to 64 values, got 0"),
-    ("actuators", {**GOOD, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]}, "values, got 65"),
+    (
+        "actuators",
+        {**GOOD, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]},
+        "values, got 65",
+    ),
     ("fins", {**GOOD, "fins": []}, "unknown key"),
-    ("version", {**GOOD, "version": 1}, "version 1, with fins:, is no longer read; write version: 2"),
+    (
+        "version",
+        {**GOOD, "version": 1},
+        "version 1, with fins:, is no longer read; write version: 2",
+    ),
     ("version", {**GOOD, "version": 3}, "reads version 2, got 3"),
-    ("version", {key: value for key, value in GOOD.items() if key != "version"}, "required key is missing"),
-    ("actuators[0].type", edited(0, type="paddle"), "expected one of fin, thruster, azimuth, tilt, rudder"),
+    (
+        "version",
+        {key: value for key, value in GOOD.items() if key != "version"},
+        "required key is missing",
+    ),
+    (
+        "actuators[0].type",
+        edited(0, type="paddle"),
+        "expected one of fin, thruster, azimuth, tilt, rudder",
+    ),
     ("actuators[0].type", edited(0, type=...), "required key is missing"),
     ("actuators[0].mounting_angle_deg", edited(0, mounting_angle_deg=...), "or shaft and zero"),
     ("actuators[0].shaft", edited(0, shaft=[1, 0, 0], zero=[0, 1, 0]), "not both"),
@@ -162,18 +203,28 @@ BAD = [
     ("actuators[1].shaft", edited(1, shaft=[0, 0, 0.9]), "a unit vector, got one of length 0.9"),
     ("actuators[1].shaft", edited(1, shaft=[0, 0, 0]), "a unit vector, got one of length 0"),
     ("actuators[1].shaft[2]", edited(1, shaft=[0, 0, math.nan]), ""),
-    ("actuators[1].zero", edited(1, zero=[0.6, 0, 0.8]), "must stand across shaft, got 36.87 degrees"),
+    (
+        "actuators[1].zero",
+        edited(1, zero=[0.6, 0, 0.8]),
+        "must stand across shaft, got 36.87 degrees",
+    ),
     ("actuators[1].zero", edited(1, zero=[1, 0]), "a list of 3 values, got 2"),
     ("actuators[2].axis", edited(2, axis=[0, 1, 1]), "a unit vector, got one of length 1.41421"),
     ("actuators[2].axis", edited(2, axis=...), "required key is missing"),
     ("actuators[2].force_n", edited(2, force_n=[3, 2]), ""),
-    ("actuators[2].model.exponent", edited(2, model={**LIFT["model"], "exponent": 1.0}), "must lie within"),
+    (
+        "actuators[2].model.exponent",
+        edited(2, model={**LIFT["model"], "exponent": 1.0}),
+        "must lie within",
+    ),
     ("actuators[3].turn_axis", edited(3, turn_axis=[0, 0, 2]), ""),
     ("actuators[5].deflection_deg", edited(5, deflection_deg=[25, -25]), "25 and -25"),
 ]
 
 
-@pytest.mark.parametrize(("key", "data", "why"), BAD, ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD)])
+@pytest.mark.parametrize(
+    ("key", "data", "why"), BAD, ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD)]
+)
 def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_path):
     path = tmp_path / "bad.yaml"
     path.write_text(plain_yaml(data))
@@ -199,7 +250,9 @@ def test_what_works_for_fins_only_says_so():
         layout.only("simulate")
     tail = layout.without(["side", "lift", "pod", "nose", "rudder"])
     tail.only("simulate")
-    with pytest.raises(LayoutError, match="the app works for .* 'tail' .* has a shaft of its own direction"):
+    with pytest.raises(
+        LayoutError, match="the app works for .* 'tail' .* has a shaft of its own direction"
+    ):
         tail.only("the app", horizontal=True)
     with pytest.raises(LayoutError, match="'tail'"):
         _ = tail.mounting_angle
@@ -213,7 +266,10 @@ def test_damage_leaves_the_other_actuators_as_they_are():
     assert damaged.upper[[0, 2, 3], [0, 0, 1]].tolist() == [0.3, 25.72, 10.0]
     assert damaged.lower[2, 0] == pytest.approx(-19.955)
     assert (damaged.lower[4, 0], damaged.upper[4, 0]) == (0.1, 0.1)
-    assert (damaged.actuators[1], damaged.actuators[5]) == (layout.actuators[1], layout.actuators[5])
+    assert (damaged.actuators[1], damaged.actuators[5]) == (
+        layout.actuators[1],
+        layout.actuators[5],
+    )
 
 
 @pytest.mark.parametrize(
@@ -227,7 +283,10 @@ def test_damage_leaves_the_other_actuators_as_they_are():
             {"running": {"pod": (0.1, 1.0, 0.0)}},
             r"'pod': running: .* azimuths have \(angle \[rad\], force \[N\]\), 2 in all, got 3",
         ),
-        ({"running": {"side": (0.1, 1.0)}}, r"'side': running: expected the command that fins have .* got 2"),
+        (
+            {"running": {"side": (0.1, 1.0)}},
+            r"'side': running: expected the command that fins have .* got 2",
+        ),
         ({"running": {"pod": (0.1, 30.0)}}, "'pod': expected a force from 0 to 20 N.*, got 30 N"),
         (
             {"weak": {"lift": 0.5}, "running": {"lift": (30.0,)}},
@@ -255,12 +314,15 @@ def test_any_actuator_may_be_uncertain(i: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("share", -0.1), ("floor_n", math.inf), ("common", ""), ("correlation", 1.1), ("x", 1)]
+    ("key", "value"),
+    [("share", -0.1), ("floor_n", math.inf), ("common", ""), ("correlation", 1.1), ("x", 1)],
 )
 def test_uncertainty_that_cannot_be_is_refused_with_its_key(key: str, value: object) -> None:
     data = copy.deepcopy(GOOD)
     data["actuators"][2]["uncertainty"] = {**UNCERTAIN, key: value}
-    with pytest.raises(LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key} of thruster 'lift': "):
+    with pytest.raises(
+        LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key} of thruster 'lift': "
+    ):
         parse_layout(data)
 
 

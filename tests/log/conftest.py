@@ -1,4 +1,5 @@
-"""A dive of an eight-thruster robot whose yaw is out of reach for a while, as autopilots would log it."""
+"""A dive of an eight-thruster robot whose yaw is out of reach for a while, as autopilots would log
+it."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,11 +21,12 @@ FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 ROOT = np.sqrt(0.5)
 LEVER, ROLL, PITCH = 0.24 * ROOT, 0.22, 0.12
 """Arms of yaw, roll and pitch [m]."""
-# PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and pitch by
-# sqrt(2) times the larger entry, yaw by its own.
+# PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and
+# pitch by sqrt(2) times the larger entry, yaw by its own.
 PX4_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, PITCH * ROOT, PITCH * ROOT, LEVER])
 SUB_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, ROLL, PITCH, LEVER])
-"""Wrench of a setpoint of 1 on each axis by the rules of both autopilots, worked out for this robot."""
+"""Wrench of a setpoint of 1 on each axis by the rules of both autopilots, worked out for this
+robot."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,15 @@ class Dive:
 
 
 def even_robot() -> Layout:
-    """The BlueROV2 Heavy with thrusters that push alike both ways, its centre amid its horizontal ones."""
+    """The BlueROV2 Heavy with thrusters that push alike both ways, its centre amid its horizontal
+    ones."""
     robot = load_layout("bluerov2_heavy")
     places = [(*np.sign(part.position[:2]), part) for part in robot.actuators]
     parts = (
         replace(
-            part, force=(-FULL, FULL), position=(0.14 * x, 0.1 * y, 0.0) if i < 4 else (0.12 * x, 0.22 * y, 0)
+            part,
+            force=(-FULL, FULL),
+            position=(0.14 * x, 0.1 * y, 0.0) if i < 4 else (0.12 * x, 0.22 * y, 0),
         )
         for i, (x, y, part) in enumerate(places)
     )
@@ -63,8 +68,8 @@ def columns(robot: Layout) -> np.ndarray:
 
 
 def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) [s] and demands (n, 6) [N, N m]: easy ones, and for a sixth of the time more of surge and
-    yaw than goes together."""
+    """Times (n,) [s] and demands (n, 6) [N, N m]: easy ones, and for a sixth of the time more of
+    surge and yaw than goes together."""
     time = 4.0 + dt * np.arange(n)
     demand = np.zeros((n, 6))
     demand[:, 0] = 20.0 + 5.0 * np.sin(time / 7)
@@ -76,10 +81,14 @@ def asked(n: int, dt: float, surge: float, yaw: float) -> tuple[np.ndarray, np.n
 
 
 def px4_dive(
-    path: Path, n: int = 3000, dt: float = 0.02, outputs: str = "shares", speed: np.ndarray | None = None
+    path: Path,
+    n: int = 3000,
+    dt: float = 0.02,
+    outputs: str = "shares",
+    speed: np.ndarray | None = None,
 ) -> Dive:
-    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and levers. ESCs say
-    the speed (n, 8) of motors, if it is given."""
+    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and
+    levers. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
     force = Allocator(robot, "px4").allocate_batch(demand).command[..., 0]
@@ -93,16 +102,26 @@ def px4_dive(
         "vehicle_torque_setpoint": (time, {"xyz": setpoint[:, 3:]}),
     }
     if outputs == "pulses":
-        topics["actuator_outputs"] = (time, {"output": np.pad(1500 + 400 * force / FULL, ((0, 0), (0, 8)))})
+        topics["actuator_outputs"] = (
+            time,
+            {"output": np.pad(1500 + 400 * force / FULL, ((0, 0), (0, 8)))},
+        )
         for i in range(1, 9):
-            parameters |= {f"PWM_MAIN_FUNC{i}": 100 + i, f"PWM_MAIN_MIN{i}": 1100, f"PWM_MAIN_MAX{i}": 1900}
+            parameters |= {
+                f"PWM_MAIN_FUNC{i}": 100 + i,
+                f"PWM_MAIN_MIN{i}": 1100,
+                f"PWM_MAIN_MAX{i}": 1900,
+            }
     elif outputs:
         control = np.full((n, 12), np.nan)
         control[:, :8] = force / FULL
         topics["actuator_motors"] = (time + 0.001, {"control": control})
     left = (demand - given) / PX4_UNIT * FRD
     late = time > time[n // 3]
-    topics["failure_detector_status"] = (time, {"motor_failure_mask": np.where(late, 4, 0).astype(np.uint16)})
+    topics["failure_detector_status"] = (
+        time,
+        {"motor_failure_mask": np.where(late, 4, 0).astype(np.uint16)},
+    )
     escs = {"esc_count": np.full(n, 8, np.uint16)}
     escs["esc_online_flags"] = np.where(late, 0x7F, 0xFF).astype(np.uint16)
     topics["esc_status"] = (time, escs if speed is None else escs | {"esc.esc_rpm": speed})
@@ -112,8 +131,8 @@ def px4_dive(
 
 
 def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | None = None) -> Dive:
-    """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are the sum of
-    factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
+    """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are
+    the sum of factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
@@ -139,9 +158,16 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
         "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
     }
     if speed is not None:
-        motors = {"TimeUS": np.repeat(us, 8), "Instance": np.tile(np.arange(8), n), "RPM": speed.ravel()}
+        motors = {
+            "TimeUS": np.repeat(us, 8),
+            "Instance": np.tile(np.arange(8), n),
+            "RPM": speed.ravel(),
+        }
         messages["ESC"] = ("QBe", motors)
-    parameters = {"FRAME_CONFIG": 2.0, **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)}}
+    parameters = {
+        "FRAME_CONFIG": 2.0,
+        **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
+    }
     parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
     return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)
 

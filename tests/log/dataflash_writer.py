@@ -5,15 +5,26 @@ from pathlib import Path
 
 import numpy as np
 
-KINDS = {"Q": "<u8", "f": "<f4", "H": "<u2", "N": "S16", "Z": "S64", "B": "u1", "e": "<i4", "c": "<i2"}
+KINDS = {
+    "Q": "<u8",
+    "f": "<f4",
+    "H": "<u2",
+    "N": "S16",
+    "Z": "S64",
+    "B": "u1",
+    "e": "<i4",
+    "c": "<i2",
+}
 """Letter of a column's type -> numpy's."""
 
 
 def write_dataflash(
-    path: Path, messages: Mapping[str, tuple[str, Mapping[str, np.ndarray]]], parameters: Mapping[str, float]
+    path: Path,
+    messages: Mapping[str, tuple[str, Mapping[str, np.ndarray]]],
+    parameters: Mapping[str, float],
 ) -> Path:
-    """Writes messages by name, each with the letters of its columns and the columns, TimeUS first, in order
-    of time, after all parameters."""
+    """Writes messages by name, each with the letters of its columns and the columns, TimeUS first,
+    in order of time, after all parameters."""
     stamps = np.zeros(len(parameters))
     names = np.array([*parameters], "S16")
     values = np.array([*parameters.values()])
@@ -21,7 +32,9 @@ def write_dataflash(
     content = _packed(128, ["BBnNZ", "Type,Length,Name,Format,Columns"], b"FMT", 89)
     rows: list[tuple[float, bytes]] = []
     for number, (name, (letters, columns)) in enumerate(every.items(), 1):
-        kind = np.dtype([("head", "S3"), *zip(columns, (KINDS[letter] for letter in letters), strict=True)])
+        kind = np.dtype(
+            [("head", "S3"), *zip(columns, (KINDS[letter] for letter in letters), strict=True)]
+        )
         content += _packed(number, [letters, ",".join(columns)], name.encode(), kind.itemsize)
         table = np.zeros(len(columns["TimeUS"]), kind)
         table["head"] = bytes([0xA3, 0x95, number])

@@ -1,4 +1,5 @@
-"""Logs whose losses are known are judged: how much, when, which axis, why, and what would have held it."""
+"""Logs whose losses are known are judged: how much, when, which axis, why, and what would have held
+it."""
 
 import json
 import time
@@ -73,7 +74,10 @@ def test_the_geometry_comes_from_the_log(px4: Dive, sub: Dive) -> None:
 def replace_names(judged: Judgement) -> Judgement:
     """Parameters have no names of thrusters."""
     parts = (replace(part, name=f"front_{i}") for i, part in enumerate(judged.robot.actuators))
-    spells = (replace(each, limits=("front_0 at full thrust",) * len(each.limits)) for each in judged.spells)
+    spells = (
+        replace(each, limits=("front_0 at full thrust",) * len(each.limits))
+        for each in judged.spells
+    )
     robot = replace(judged.robot, actuators=tuple(parts))
     return replace(judged, robot=robot, spells=tuple(spells))
 
@@ -101,7 +105,9 @@ def test_the_robots_health_is_told(px4: Dive) -> None:
 
 
 @pytest.mark.parametrize("rest", [0.0, np.nan])
-def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: float, px4: Dive) -> None:
+def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(
+    rest: float, px4: Dive
+) -> None:
     log = read_log(px4.path, px4.robot)
     name = px4.robot.names[1]
     easy = slice(0, len(log) // 2 - 10)
@@ -114,7 +120,11 @@ def test_a_thruster_at_rest_all_along_is_named_and_replays_do_without_it(rest: f
     np.testing.assert_allclose(
         judged.missing, some["span"] @ np.abs(force) * np.abs(columns(px4.robot)[1]), 1e-3
     )
-    assert judged.held_by is not None and judged.held_by.lost == name and f"without {name}" in judged.sentence
+    assert (
+        judged.held_by is not None
+        and judged.held_by.lost == name
+        and f"without {name}" in judged.sentence
+    )
 
 
 @pytest.mark.parametrize("write", [px4_dive, sub_dive])

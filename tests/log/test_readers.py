@@ -40,8 +40,14 @@ def write_bag(path: Path, dive: Dive, topics: tuple[str, ...] = ("/wrench",)) ->
 
         for at, wrench, force in zip(dive.time - dive.time[0], dive.demand, forces, strict=True):
             for topic in topics:
-                put(topic, at, t["Wrench"](force=t["Vector3"](*wrench[:3]), torque=t["Vector3"](*wrench[3:])))
-            told = t["Float64MultiArray"](layout=t["MultiArrayLayout"](dim=[], data_offset=0), data=force)
+                put(
+                    topic,
+                    at,
+                    t["Wrench"](force=t["Vector3"](*wrench[:3]), torque=t["Vector3"](*wrench[3:])),
+                )
+            told = t["Float64MultiArray"](
+                layout=t["MultiArrayLayout"](dim=[], data_offset=0), data=force
+            )
             put("/forces", at + 1e-4, told)
     return path
 
@@ -68,7 +74,9 @@ def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["px4", "sub"])
-def test_damaged_logs_end_in_a_sentence(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_damaged_logs_end_in_a_sentence(
+    kind: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     dive: Dive = request.getfixturevalue(kind)
     content = dive.path.read_bytes()[:60_000]
     rng = np.random.default_rng(0)
@@ -99,7 +107,9 @@ def test_a_log_of_ardusub_that_ends_in_zeros_is_read_in_silence(
 
 
 @pytest.mark.parametrize("kind", ["px4", "sub"])
-def test_a_log_that_is_cut_says_so(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_a_log_that_is_cut_says_so(
+    kind: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     dive: Dive = request.getfixturevalue(kind)
     assert not any("It ends" in note for note in read_log(dive.path, dive.robot).notes)
     (tmp_path / "cut").write_bytes(dive.path.read_bytes()[:150_001])
@@ -123,13 +133,19 @@ def test_a_demand_that_is_not_logged_is_not_judged(sub: Dive, tmp_path: Path) ->
 
 
 def test_another_vehicle_of_ardupilot_is_refused(sub: Dive, tmp_path: Path) -> None:
-    (tmp_path / "a.bin").write_bytes(sub.path.read_bytes().replace(b"Leak Detected", b"ArduCopter V4"))
+    (tmp_path / "a.bin").write_bytes(
+        sub.path.read_bytes().replace(b"Leak Detected", b"ArduCopter V4")
+    )
     with pytest.raises(FinlabError, match="a log of ArduCopter, expected one of ArduSub"):
         read_log(tmp_path / "a.bin", sub.robot)
 
 
 def test_what_is_no_log_is_said(tmp_path: Path) -> None:
-    for name, content in (("a.bin", b"hello"), ("a.mcap", b"hello"), ("a.ulg", b"ULog\x01\x125" + b"\0" * 9)):
+    for name, content in (
+        ("a.bin", b"hello"),
+        ("a.mcap", b"hello"),
+        ("a.ulg", b"ULog\x01\x125" + b"\0" * 9),
+    ):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(FinlabError, match=name):
             read_log(tmp_path / name)

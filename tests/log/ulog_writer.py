@@ -12,8 +12,8 @@ def write_ulog(
     topics: Mapping[str, tuple[np.ndarray, Mapping[str, np.ndarray]]],
     parameters: Mapping[str, float | int],
 ) -> Path:
-    """Writes topics, each by its times [s] and columns (N,) or (N, k), and parameters. A column `part.key`
-    (N, k) is that of k messages inside the topic's."""
+    """Writes topics, each by its times [s] and columns (N,) or (N, k), and parameters. A column
+    `part.key` (N, k) is that of k messages inside the topic's."""
     log = ULog(None)
     log._initial_parameters = dict(parameters)
     for number, (name, (time, columns)) in enumerate(topics.items()):
@@ -30,7 +30,9 @@ def write_ulog(
             fields.append((kind, 0 if array.ndim == 1 else array.shape[1], part))
             end = f".{inner}" if inner else ""
             rows = enumerate(array.T)
-            values += [(key, array)] if array.ndim == 1 else [(f"{part}[{i}]{end}", c) for i, c in rows]
+            values += (
+                [(key, array)] if array.ndim == 1 else [(f"{part}[{i}]{end}", c) for i, c in rows]
+            )
         text = ";".join(f"{kind}[{n}] {key}" if n else f"{kind} {key}" for kind, n, key in fields)
         log._message_formats[name] = ULog.MessageFormat(f"{name}:{text};".encode(), None)
         about = bytes([0, *number.to_bytes(2, "little")]) + name.encode()

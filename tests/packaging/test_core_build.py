@@ -33,12 +33,18 @@ def python(project: Path, *argv: str, **variables: str) -> subprocess.CompletedP
     clean = {key: value for key, value in os.environ.items() if key not in ("CC", "FINLAB_TARGET")}
     words = [sys.executable, *argv]
     variables = clean | variables
-    return subprocess.run(words, cwd=project, env=variables, capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        words, cwd=project, env=variables, capture_output=True, text=True, timeout=120
+    )
 
 
-def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(project: Path) -> None:
+def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(
+    project: Path,
+) -> None:
     assert python(project, "-m", "hatchling", "build").returncode == 0
-    archive = str(next(project.glob("dist/*.tar.gz")))  # Python before 3.11.4 knows no filter for it
+    archive = str(
+        next(project.glob("dist/*.tar.gz"))
+    )  # Python before 3.11.4 knows no filter for it
     assert python(project, "-m", "tarfile", "-e", archive, "unpacked").returncode == 0
     source = next(project.glob("unpacked/*"))
     assert not list(source.rglob("libfinlab.*"))
@@ -55,12 +61,17 @@ def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(
 
 
 def test_what_does_not_compile_is_said_in_the_words_of_the_compiler(project: Path) -> None:
-    (project / "finlab" / "core" / "src" / "wrong.c").write_text("int wrong(void) { return nowhere; }\n")
+    (project / "finlab" / "core" / "src" / "wrong.c").write_text(
+        "int wrong(void) { return nowhere; }\n"
+    )
     for argv in (["hatch_build.py"], ["-m", "hatchling", "build", "-t", "wheel"]):
         done = python(project, *argv)
         assert done.returncode == 1 and "nowhere" in done.stderr and "Traceback" not in done.stderr
         assert "install a C compiler" in done.stderr
-    assert "name one of x86_64-linux-gnu" in python(project, "hatch_build.py", FINLAB_TARGET="pdp11").stderr
+    assert (
+        "name one of x86_64-linux-gnu"
+        in python(project, "hatch_build.py", FINLAB_TARGET="pdp11").stderr
+    )
 
 
 def test_only_without_a_compiler_another_is_fetched(project: Path) -> None:
@@ -74,10 +85,14 @@ def test_library_that_is_missing_broken_or_of_other_sources_is_refused(
 ) -> None:
     load = library.library.__wrapped__
     monkeypatch.setattr(library, "VERSION", 99)
-    with pytest.raises(FinlabError, match=r"has version \d+, and this finlab needs 99; run `make setup`"):
+    with pytest.raises(
+        FinlabError, match=r"has version \d+, and this finlab needs 99; run `make setup`"
+    ):
         load()
     monkeypatch.setattr(library, "PATH", project / "finlab" / "core" / library.PATH.name)
-    with pytest.raises(FinlabError, match=r"cannot be loaded \(.*\); run `make setup` or `pip install \.`"):
+    with pytest.raises(
+        FinlabError, match=r"cannot be loaded \(.*\); run `make setup` or `pip install \.`"
+    ):
         load()
     library.PATH.unlink()
     with pytest.raises(FinlabError, match=r"core .*libfinlab\.\w+ is missing; run `make setup`"):

@@ -1,4 +1,5 @@
-"""The wheel carries everything a user needs, and works from any folder. Building needs no network."""
+"""The wheel carries everything a user needs, and works from any folder. Building needs no
+network."""
 
 import ast
 import email
@@ -39,7 +40,9 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     What it requires is linked from this environment, so that no network is needed.
     """
     folder = tmp_path_factory.mktemp("bare") / "venv"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120)
+    subprocess.run(
+        [sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120
+    )
     site = next(folder.glob("lib/python3*/site-packages"))
     for name in with_requirements(CORE):
         found = metadata.distribution(name)
@@ -61,7 +64,9 @@ def with_requirements(names: set[str]) -> set[str]:
     while waiting:
         seen.add(name := waiting.pop())
         lines = map(Requirement, metadata.distribution(name).requires or ())
-        needed = {normal(line.name) for line in lines if line.marker is None or line.marker.evaluate()}
+        needed = {
+            normal(line.name) for line in lines if line.marker is None or line.marker.evaluate()
+        }
         waiting |= needed - seen
     return seen
 

@@ -31,7 +31,9 @@ def with_uncertainty(layout: Layout, rng: np.random.Generator) -> Layout:
     return replace(layout, actuators=tuple(parts))
 
 
-def sampled_miss(layout: Layout, force: Array, effectiveness: Array, rng: np.random.Generator) -> Array:
+def sampled_miss(
+    layout: Layout, force: Array, effectiveness: Array, rng: np.random.Generator
+) -> Array:
     """Standard deviation (6,) of the wrench where forces (n, 3) err at random."""
     shared = {name: rng.standard_normal((DRAWS, 2)) for name in ("bench", "tank")}
     miss = np.zeros((DRAWS, 6))
@@ -41,7 +43,10 @@ def sampled_miss(layout: Layout, force: Array, effectiveness: Array, rng: np.ran
             continue
         own = rng.standard_normal((DRAWS, 2))
         if told.common:
-            own = np.sqrt(1 - told.correlation) * own + np.sqrt(told.correlation) * shared[told.common]
+            own = (
+                np.sqrt(1 - told.correlation) * own
+                + np.sqrt(told.correlation) * shared[told.common]
+            )
         size = np.linalg.norm(force[i])
         own = own * np.sqrt((told.share * size) ** 2 + told.floor**2)
         along = force[i] / size
@@ -52,7 +57,9 @@ def sampled_miss(layout: Layout, force: Array, effectiveness: Array, rng: np.ran
     return np.asarray(np.sqrt(np.mean(miss**2, axis=0)))
 
 
-@pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins any shaft", "rudders", "mixed", "all"])
+@pytest.mark.parametrize(
+    "kind", ["thrusters", "azimuths", "fins any shaft", "rudders", "mixed", "all"]
+)
 def test_the_expected_miss_is_that_of_sampled_errors(kind: str) -> None:
     rng = np.random.default_rng(11)
     layout = with_uncertainty(load(random_robot(kind, 1, 5)), rng)
@@ -92,14 +99,18 @@ def test_answers_tell_it_for_one_and_for_many_and_what_to_measure_next() -> None
 @pytest.mark.parametrize("grid", [(5, 5, 8), (8, 9, 12), (13, 13, 18)])
 @pytest.mark.parametrize("noise", [0.0, 0.03])
 @pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
-def test_a_table_knows_the_error_of_its_grid(grid: tuple[int, ...], noise: float, kind: str) -> None:
+def test_a_table_knows_the_error_of_its_grid(
+    grid: tuple[int, ...], noise: float, kind: str
+) -> None:
     rng = np.random.default_rng(3)
     ends = ((0.05, 0.6), (0.1, 2.1))
     axes = [np.linspace(*end, count) for end, count in zip(ends, grid, strict=False)]
     axes.append(np.linspace(-np.pi, np.pi, grid[2], endpoint=False))
     law = make_law(FinModelSpec(kind))
     force = law.force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
-    table = TableLaw(axes, np.asarray(force * (1.0 + noise * rng.standard_normal(force.shape))), True)
+    table = TableLaw(
+        axes, np.asarray(force * (1.0 + noise * rng.standard_normal(force.shape))), True
+    )
     command = np.array([0.05, 0.1, -np.pi]) + rng.random((500, 3)) * [0.55, 2.0, 2 * np.pi]
     error = (table.force(command) - law.force(command))[:, 1:]
     ratio = error / grid_uncertainty(table).deviation(command)[:, :1]
@@ -111,7 +122,9 @@ def test_deviations_in_a_table_reach_the_answer(tmp_path: Path) -> None:
     axes = (np.linspace(0, 0.6, 9), np.linspace(0, 2.1, 9), np.linspace(-3, 3, 19))
     write_table(path, make_law(FinModelSpec("drag")), *axes)
     lines = path.read_text().splitlines()
-    path.write_text("\n".join([f"{lines[0]},sFx,sFy,sFz", *(f"{line},0,0.2,0.2" for line in lines[1:])]))
+    path.write_text(
+        "\n".join([f"{lines[0]},sFx,sFy,sFz", *(f"{line},0,0.2,0.2" for line in lines[1:])])
+    )
     layout = load_layout("A").replace_actuator(
         "front_left", model=FinModelSpec("table", (("path", str(path)),))
     )
@@ -127,16 +140,26 @@ def test_rows_of_a_thrusters_table_tell_how_far_apart_they_are() -> None:
     def table(count: int, noise: float) -> PowerTable:
         rng = np.random.default_rng(2)
         command = np.linspace(-1.0, 1.0, count)
-        force = np.sort(50.0 * command * np.abs(command) * (1.0 + noise * rng.standard_normal(count)))
+        force = np.sort(
+            50.0 * command * np.abs(command) * (1.0 + noise * rng.standard_normal(count))
+        )
         return PowerTable(tuple(zip(command, force, np.abs(force) ** 1.5, strict=True)))
 
-    coarse, fine, noisy = (thrust_table_error(table(*each))[0] for each in ((11, 0), (101, 0), (101, 0.02)))
+    coarse, fine, noisy = (
+        thrust_table_error(table(*each))[0] for each in ((11, 0), (101, 0), (101, 0.02))
+    )
     assert fine < 0.1 * coarse and 0.01 < noisy < 0.03
 
 
 def test_a_grid_of_two_lines_says_that_it_cannot_tell() -> None:
-    axes = [np.array([0.1, 0.6]), np.linspace(0.1, 2.1, 5), np.linspace(-np.pi, np.pi, 12, endpoint=False)]
-    force = make_law(FinModelSpec("drag")).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+    axes = [
+        np.array([0.1, 0.6]),
+        np.linspace(0.1, 2.1, 5),
+        np.linspace(-np.pi, np.pi, 12, endpoint=False),
+    ]
+    force = make_law(FinModelSpec("drag")).force(
+        np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    )
     assert grid_uncertainty(TableLaw(axes, force, True)).error.few == (0,)
 
 

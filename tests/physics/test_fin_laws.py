@@ -1,4 +1,5 @@
-"""The laws of single fins: numbers, directions, derivatives, precision, for arrays, tensors and symbols."""
+"""The laws of single fins: numbers, directions, derivatives, precision, for arrays, tensors and
+symbols."""
 
 import math
 
@@ -18,7 +19,9 @@ SPECS = [
     FinModelSpec("drag"),
     FinModelSpec("lighthill"),
     FinModelSpec("soft"),
-    FinModelSpec("soft", (("d", 0.1), ("e", 0.2), ("k", 2.0), ("p", 1.7), ("phi_e", 2.0), ("q", 3.0))),
+    FinModelSpec(
+        "soft", (("d", 0.1), ("e", 0.2), ("k", 2.0), ("p", 1.7), ("phi_e", 2.0), ("q", 3.0))
+    ),
 ]
 DRAG, LIGHTHILL, SOFT, UNEVEN = (make_law(spec) for spec in SPECS)
 LAWS = [DRAG, LIGHTHILL, SOFT, UNEVEN]
@@ -61,7 +64,9 @@ def test_soft_thrust_is_the_contract_by_hand():
     by_hand = 2.0 * x**1.7 / (1 + (x / 1.3) ** 3) * (1 + 0.2 * math.cos(0.7 - 2.0))
     assert UNEVEN.thrust(0.5, 1.2, 0.7) == pytest.approx(by_hand, rel=1e-14)
     force = UNEVEN.force(np.array([0.5, 1.2, 0.7]))
-    np.testing.assert_allclose(force, by_hand * np.array([0.0, math.cos(0.8), math.sin(0.8)]), atol=1e-14)
+    np.testing.assert_allclose(
+        force, by_hand * np.array([0.0, math.cos(0.8), math.sin(0.8)]), atol=1e-14
+    )
 
 
 @every_law
@@ -110,7 +115,10 @@ def test_every_parameter_of_a_description_reaches_its_law(name):
     for key, rule in FIN_MODELS[name].items():
         other = make_law(FinModelSpec(name, ((key, rule.default + 0.1),)))
         changed = np.abs(other.force(u) - make_law(FinModelSpec(name)).force(u)).max() > 1e-6
-        assert changed or (name, key) == ("soft", "phi_e")  # the angle of an unevenness that is zero
+        assert changed or (name, key) == (
+            "soft",
+            "phi_e",
+        )  # the angle of an unevenness that is zero
     doubled = make_law(FinModelSpec("drag", (("area", 0.04),)))
     np.testing.assert_allclose(doubled.force(u), 2.0 * DRAG.force(u))
 
@@ -130,7 +138,9 @@ def integrated(blade: Blade, amplitude: float, frequency: float) -> float:
     turn = 2.0 * np.pi * (np.arange(400_000) + 0.5) / 400_000
     rate = 2.0 * np.pi * frequency
     speed = amplitude * rate * np.cos(turn)
-    torque = -blade.inertia * amplitude * rate**2 * np.sin(turn) + blade.drag * speed * np.abs(speed)
+    torque = -blade.inertia * amplitude * rate**2 * np.sin(turn) + blade.drag * speed * np.abs(
+        speed
+    )
     return float(np.maximum(torque * speed, 0.0).mean())
 
 
@@ -141,7 +151,8 @@ def test_power_is_what_driving_takes_over_a_beat(blade: Blade, beat: tuple[float
 
 
 def test_the_plate_of_the_robot() -> None:
-    """Its own inertia, that of the water within the circle of its width, and drag of a flat plate."""
+    """Its own inertia, that of the water within the circle of its width, and drag of a flat
+    plate."""
     blade = Blade()
     assert blade.own_inertia == OWN_INERTIA
     water = np.linspace(0.0, 0.2, 100_001)

@@ -1,4 +1,5 @@
-"""The plant against the contract's formula written out in numpy, and what it makes of odd commands."""
+"""The plant against the contract's formula written out in numpy, and what it makes of odd
+commands."""
 
 import math
 
@@ -28,7 +29,9 @@ def wrench_by_hand(layout, command):
             mass = math.pi / 4 * p["density"] * p["width"] ** 2
             thrust = 0.5 * mass * p["length"] ** 2 * rate**2 * amplitude * j1(amplitude)
         horizontal = np.array([-math.sin(fin.mounting_angle), math.cos(fin.mounting_angle), 0.0])
-        force = thrust * (math.cos(direction) * horizontal + math.sin(direction) * np.array([0.0, 0.0, 1.0]))
+        force = thrust * (
+            math.cos(direction) * horizontal + math.sin(direction) * np.array([0.0, 0.0, 1.0])
+        )
         total += np.concatenate([force, np.cross(fin.position, force)])
     return total
 
@@ -76,7 +79,9 @@ def test_a_row_of_nan_is_a_failed_fin():
 def of_four_kinds(tmp_path):
     """A robot whose fins follow four kinds of law, two of them the same with other numbers."""
     grid = np.linspace(0.0, 0.7, 8), np.linspace(0.0, 2.4, 8), np.linspace(-math.pi, math.pi, 25)
-    write_table(tmp_path / "fin.csv", make_law(FinModelSpec("soft", (("d", 0.1), ("e", 0.2)))), *grid)
+    write_table(
+        tmp_path / "fin.csv", make_law(FinModelSpec("soft", (("d", 0.1), ("e", 0.2)))), *grid
+    )
     specs = [
         FinModelSpec("drag", (("area", 0.01),)),
         FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),)),
@@ -129,7 +134,9 @@ def test_wrench_and_watts_of_random_robots(kind: str, number: int) -> None:
     plant = Plant(load(own.layout))
     commands = np.stack([own.draw(rng, share) for share in (0.0, 0.1, 0.5, 1.0)])
     wrench = own.wrench(commands)
-    np.testing.assert_allclose(plant.wrench(commands, flow=own.flow), wrench, atol=1e-9 * own.scales.max())
+    np.testing.assert_allclose(
+        plant.wrench(commands, flow=own.flow), wrench, atol=1e-9 * own.scales.max()
+    )
     watts = plant.power(commands, flow=own.flow).sum(axis=-1)
     np.testing.assert_allclose(watts, [own.power(each) for each in commands], rtol=1e-9, atol=1e-12)
 
@@ -149,4 +156,6 @@ def test_dead_bands() -> None:
     own = OwnPlant(with_dead_bands(bluerov2_heavy(), rng))
     commands = np.zeros((100, 8, 3))
     commands[:, :, 0] = rng.uniform(-1.5, 1.5, (100, 8))
-    np.testing.assert_allclose(Plant(load(own.layout)).wrench(commands), own.wrench(commands), atol=1e-9)
+    np.testing.assert_allclose(
+        Plant(load(own.layout)).wrench(commands), own.wrench(commands), atol=1e-9
+    )

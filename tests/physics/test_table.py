@@ -1,4 +1,5 @@
-"""The table of forces: faithful to what it was made from, smooth, periodic, and strict about its file."""
+"""The table of forces: faithful to what it was made from, smooth, periodic, and strict about its
+file."""
 
 import math
 import os
@@ -93,7 +94,12 @@ def test_a_table_that_was_written_anew_is_read_anew(tmp_path):
 
 def test_a_layout_may_use_a_table(tmp_path):
     write_table(tmp_path / "fin.csv", DRAG, AMPLITUDE, FREQUENCY, CIRCLE)
-    fin = Fin("a", (0.2, 0.1, 0.0), 0.7, model=FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),)))
+    fin = Fin(
+        "a",
+        (0.2, 0.1, 0.0),
+        0.7,
+        model=FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),)),
+    )
     command = [[0.4, 1.1, 0.9]]
     exact = Plant(Layout("drag", (Fin("a", (0.2, 0.1, 0.0), 0.7),))).wrench(command)
     np.testing.assert_allclose(Plant(Layout("table", (fin,))).wrench(command), exact, atol=0.01)
@@ -133,8 +139,14 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
         ([HEADER], "no rows"),
         ([HEADER, "1,2,3,4"], "line 2 has 4 values"),
         ([HEADER, "1,2,x,4,5,6"], "line 2, column phi, holds 'x', which is not a number"),
-        ([HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"], "line 9, column Fx, holds 'nan', which is not finite"),
-        ([HEADER, *BLOCK[:-1]], "do not fill the grid of 2 amplitudes, 2 frequencies and 2 zero directions"),
+        (
+            [HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"],
+            "line 9, column Fx, holds 'nan', which is not finite",
+        ),
+        (
+            [HEADER, *BLOCK[:-1]],
+            "do not fill the grid of 2 amplitudes, 2 frequencies and 2 zero directions",
+        ),
         ([HEADER, *BLOCK[:-1]], "the row A = 0.2, f = 2, phi = 1 is missing"),
         ([HEADER, *BLOCK[:-1], "0.2,2,1,,1,2"], "line 9, column Fx, is empty; leave no gaps"),
         ([HEADER, *BLOCK, BLOCK[0]], "appears in two rows, lines 2 and 10"),
@@ -142,8 +154,14 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
             scaled(amplitude=57.3),
             "column A has 11.46, expected half amplitudes in rad (not peak to peak), 0 to 1.571",
         ),
-        (scaled(amplitude=10.0), "column A has 2, expected half amplitudes in rad (not peak to peak)"),
-        (scaled(frequency=60.0), "f has 120, expected frequencies in Hz (not beats per minute), 0 to 20"),
+        (
+            scaled(amplitude=10.0),
+            "column A has 2, expected half amplitudes in rad (not peak to peak)",
+        ),
+        (
+            scaled(frequency=60.0),
+            "f has 120, expected frequencies in Hz (not beats per minute), 0 to 20",
+        ),
         (scaled(direction=57.3), "span 57.3 rad, expected at most one turn (6.283)"),
         (scaled(amplitude=-1.0), "column A has -0.1, expected half amplitudes"),
         (scaled(frequency=-1.0), "column f has -1, expected frequencies"),
@@ -153,10 +171,16 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
         (scaled(direction=1e-9), "two values of column phi are 1e-09 apart"),
         (scaled(power=math.nan), "line 2, column P, holds 'nan', which is not finite"),
         (scaled(power=math.inf), "line 2, column P, holds 'inf', which is not finite"),
-        (scaled(power=-1.0), "column P has -1, expected the mean power in W that drives it, 0 to 1e+06"),
+        (
+            scaled(power=-1.0),
+            "column P has -1, expected the mean power in W that drives it, 0 to 1e+06",
+        ),
         (scaled(power=0.0), "column P is 0 everywhere; leave it out"),
         ([HEADER, *BLOCK[:4]], "column A has one value"),
-        ([HEADER, *BLOCK, *(row.replace(",1,0,1,2", ",7,0,1,2") for row in BLOCK[1::2])], "span 7 rad"),
+        (
+            [HEADER, *BLOCK, *(row.replace(",1,0,1,2", ",7,0,1,2") for row in BLOCK[1::2])],
+            "span 7 rad",
+        ),
     ],
 )
 def test_a_bad_table_is_refused_with_file_and_place(lines, why, tmp_path):
@@ -169,7 +193,8 @@ def test_a_bad_table_is_refused_with_file_and_place(lines, why, tmp_path):
 
 
 def circle_with_power(path, force_at_end, extra):
-    """A table around the circle, whose end has another force, and extra power, beside its beginning."""
+    """A table around the circle, whose end has another force, and extra power, beside its
+    beginning."""
     angles = np.linspace(-math.pi, math.pi, 9)
     last = np.arange(9) == 8
     rows = [
@@ -189,7 +214,8 @@ def test_a_circle_is_closed_by_its_forces_whatever_the_power(tmp_path):
     np.testing.assert_allclose(law.power(at), [5.0, 5.0])
     np.testing.assert_allclose(law.force(at), [[0.0, -2.0, 0.0]] * 2, atol=1e-12)
     assert read_table(circle_with_power(tmp_path / "t.csv", 0.09, 0.0)).periodic
-    # Large powers do not excuse forces that differ by more than a twentieth of the largest force, 2 N.
+    # Large powers do not excuse forces that differ by more than a twentieth of the largest force, 2
+    # N.
     with pytest.raises(DataError, match="one turn later differ"):
         read_table(circle_with_power(tmp_path / "t.csv", 0.15, 0.0))
 
@@ -197,7 +223,9 @@ def test_a_circle_is_closed_by_its_forces_whatever_the_power(tmp_path):
 def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     """A cubic through 0, 0, 1 dips; its slope is then told as that of zero."""
     power = [0.0, 0.0, 0.0, 1.0, 1.0]
-    rows = [f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)]
+    rows = [
+        f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)
+    ]
     (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
     law = read_table(tmp_path / "t.csv")
     at = np.zeros((401, 3))
@@ -221,7 +249,9 @@ def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, goo
     ]
     (tmp_path / "t.csv").write_text("\n".join([HEADER, *rows]))
     if good:
-        assert read_table(tmp_path / "t.csv").force(np.array([[1.0, 2.0, 0.0]]))[0, 1] == pytest.approx(2.0)
+        assert read_table(tmp_path / "t.csv").force(np.array([[1.0, 2.0, 0.0]]))[
+            0, 1
+        ] == pytest.approx(2.0)
         return
     with pytest.raises(DataError, match="one turn later differ"):
         read_table(tmp_path / "t.csv")
@@ -258,7 +288,9 @@ def test_tables_are_read_out_of_an_archive(soft_table: Path, tmp_path: Path) -> 
             archive.writestr(name, part)
     inside = tmp_path / "x.zip" / table_name(content)
     assert archive_around(inside) == str(tmp_path / "x.zip") and archive_around(soft_table) is None
-    assert archive_around(tmp_path / "y.zip" / table_name(content)) is None, "there is no such archive"
+    assert archive_around(tmp_path / "y.zip" / table_name(content)) is None, (
+        "there is no such archive"
+    )
     assert archive_around(tmp_path / "x.zip" / "other" / "x.csv") is None
     command = np.array([[0.4, 1.1, 0.3]])
     np.testing.assert_array_equal(

@@ -1,4 +1,5 @@
-"""Parts of work give the same rows in this process, in several, and on a cluster that loses a worker."""
+"""Parts of work give the same rows in this process, in several, and on a cluster that loses a
+worker."""
 
 import json
 import multiprocessing
@@ -34,7 +35,8 @@ def slow_square(folder: Path, number: int) -> int:
 
 @pytest.fixture
 def cluster() -> Iterator[tuple[str, list[int]]]:
-    """A scheduler in this process and two workers in their own: its address, and their process ids."""
+    """A scheduler in this process and two workers in their own: its address, and their process
+    ids."""
     distributed = pytest.importorskip("distributed")
     alone = {"n_workers": 0, "scheduler_port": 0, "dashboard_address": None, "silence_logs": 50}
     with distributed.LocalCluster(**alone) as scheduler, distributed.Client(scheduler) as client:
@@ -43,7 +45,9 @@ def cluster() -> Iterator[tuple[str, list[int]]]:
         command += ["--nthreads", "1", "--no-dashboard"]
         path = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
         environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": path}
-        workers = [subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) for _ in range(2)]
+        workers = [
+            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) for _ in range(2)
+        ]
         try:
             client.wait_for_workers(2, timeout=60)
             yield address, [worker.pid for worker in workers]
@@ -59,7 +63,9 @@ def plain(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def test_processes_answer_in_order(tmp_path: Path) -> None:
-    assert list(map_parts(partial(slow_square, tmp_path), range(9), jobs=2)) == [k * k for k in range(9)]
+    assert list(map_parts(partial(slow_square, tmp_path), range(9), jobs=2)) == [
+        k * k for k in range(9)
+    ]
     assert len({path.name.split("-")[1] for path in tmp_path.iterdir()} - {str(os.getpid())}) > 0
 
 
@@ -79,7 +85,9 @@ def test_what_is_not_waited_for_is_ended() -> None:
     assert set(multiprocessing.active_children()) <= others
 
 
-def test_a_lost_worker_costs_its_parts_again(cluster: tuple[str, list[int]], tmp_path: Path) -> None:
+def test_a_lost_worker_costs_its_parts_again(
+    cluster: tuple[str, list[int]], tmp_path: Path
+) -> None:
     address, pids = cluster
     with on_cluster(address):
         results = map_parts(partial(slow_square, tmp_path), range(40))
@@ -108,7 +116,10 @@ def test_rows_are_those_of_one_process(
 
 @pytest.mark.parametrize(
     ("address", "message"),
-    [("tcp://127.0.0.1:9", "no Dask scheduler answers at"), ("nonsense://x", "no Dask scheduler answers at")],
+    [
+        ("tcp://127.0.0.1:9", "no Dask scheduler answers at"),
+        ("nonsense://x", "no Dask scheduler answers at"),
+    ],
 )
 def test_nobody_at_the_address_is_one_sentence(
     address: str, message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -126,5 +137,6 @@ def test_without_the_package_it_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert main(["bench", "qp", "--quick", "--cluster", "tcp://127.0.0.1:9"]) == 2
     assert (
-        "distributed is not installed; run: pip install 'finlab-marine[cluster]'" in capsys.readouterr().err
+        "distributed is not installed; run: pip install 'finlab-marine[cluster]'"
+        in capsys.readouterr().err
     )

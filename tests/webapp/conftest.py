@@ -1,4 +1,5 @@
-"""What the tests of the app share: a thread, a session and a swim; the process that reads files is ready."""
+"""What the tests of the app share: a thread, a session and a swim; the process that reads files is
+ready."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,5 @@
-"""A browser's ear: connects to a viser server as its page does, and keeps the messages that come."""
+"""A browser's ear: connects to a viser server as its page does, and keeps the messages that
+come."""
 
 import threading
 import time
@@ -32,7 +33,9 @@ class Listener:
     def __init__(self, server: viser.ViserServer) -> None:
         """Connect, and begin to listen on a thread."""
         protocol = Subprotocol(f"viser-v{viser.__version__}")
-        self._socket = connect(f"ws://127.0.0.1:{server.get_port()}", subprotocols=[protocol], max_size=None)
+        self._socket = connect(
+            f"ws://127.0.0.1:{server.get_port()}", subprotocols=[protocol], max_size=None
+        )
         self.heard: list[Heard] = []
         self.bytes = 0
         """Of all that came, as it was sent."""

@@ -1,4 +1,5 @@
-"""Stand-ins: an allocator without a trained network, a silent page, a bell without a page, a user's hand."""
+"""Stand-ins: an allocator without a trained network, a silent page, a bell without a page, a user's
+hand."""
 
 import time
 from collections import deque
@@ -48,7 +49,11 @@ class StandIn(LeastErrorMethod):
     settings: StandInSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+        self,
+        layout: Layout,
+        settings: Settings,
+        scale: Array,
+        weights: TrainedWeights | None = None,
     ) -> None:
         """Settings as method `mdn` has them; the temperature widens the samples."""
         super().__init__(layout, settings, scale, weights)
@@ -61,13 +66,17 @@ class StandIn(LeastErrorMethod):
         refined, sampled, chosen = self._drawn(targets, seed)
         samples = self._ranked(sampled, targets[0], chosen)
         candidates = self._ranked(refined, targets[0], np.arange(N_REFINED))
-        return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
+        return Solution(
+            candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples
+        )
 
     def _drawn(self, targets: Array, seed: int) -> tuple[Array, Array, NDArray[np.int64]]:
         """Refined commands, samples about them, and about which each is."""
         layout = self.layout
         methods = (self._inner, self._other)
-        starts = [methods[k % 2]._solve(targets, seed=seed, previous=None) for k in range(N_REFINED)]
+        starts = [
+            methods[k % 2]._solve(targets, seed=seed, previous=None) for k in range(N_REFINED)
+        ]
         refined = np.concatenate([start.command for start in starts])
         rng = np.random.default_rng(seed)
         chosen = rng.integers(0, N_REFINED, self.settings.n_candidates)
@@ -105,7 +114,8 @@ def load_stand_in(method: str = "dual", *, checkpoint: Any = None) -> MethodChoi
 
 
 class SilentClient:
-    """Stands for a browser: the server's own scene and panel, and a camera that takes everything."""
+    """Stands for a browser: the server's own scene and panel, and a camera that takes
+    everything."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.scene = server.scene
@@ -197,7 +207,8 @@ class LoneBell(Bell):
 
 
 def context_of(pool: Pool, session: Any = None, solver: Solver | None = None) -> Context:
-    """Tasks that do all their work on one pool, with the stand-in allocator unless told otherwise."""
+    """Tasks that do all their work on one pool, with the stand-in allocator unless told
+    otherwise."""
     pools = Pools(answers=pool, swims=pool, brief=pool, long=pool)
     return Context(session, solver or Solver(load=load_stand_in), pools, LoneBell())
 

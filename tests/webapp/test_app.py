@@ -86,7 +86,9 @@ def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
     ranges = jobs.ranging.question
     search = jobs.answering.search.question
     assert ranges is not None and ranges.target[0] == 0.9 and jobs.analyst.question is None
-    assert search is not None and search.kind == "", "the answer is proved, its modes are not looked for"
+    assert search is not None and search.kind == "", (
+        "the answer is proved, its modes are not looked for"
+    )
     do(lambda: session.show_task("Design"))
     do(lambda: session.set_target(0, 0.8))
     assert jobs.ranging.question is ranges and jobs.answering.search.question is search
@@ -111,7 +113,9 @@ def test_refusals_become_notes_and_lose_nothing(server: viser.ViserServer, view:
     assert "Fx" in view.client.notes[0]
 
 
-def test_solver_errors_become_notes_and_the_page_goes_on(server: viser.ViserServer, view: View) -> None:
+def test_solver_errors_become_notes_and_the_page_goes_on(
+    server: viser.ViserServer, view: View
+) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "ipopt")))
     until(lambda: view.jobs.answering.seen().error is not None)
     assert view.client.notes == ["No answer: ipopt is out of order in this test"]
@@ -151,7 +155,9 @@ def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: V
 
 def test_sharing_is_off(server: viser.ViserServer, app: App) -> None:
     handlers = server._websock_server._incoming_handlers
-    assert _messages.ShareUrlRequest not in handlers and _messages.ShareUrlDisconnect not in handlers
+    assert (
+        _messages.ShareUrlRequest not in handlers and _messages.ShareUrlDisconnect not in handlers
+    )
 
 
 def test_store_keeps_tabs_apart_and_finds_work_again() -> None:

@@ -70,14 +70,20 @@ def test_a_method_that_fails_keeps_nobody_else_waiting(worker: Pool) -> None:
 
 
 def test_the_table_tells_what_is_kept_least() -> None:
-    answers = {method: Allocator(UCAT, method).allocate(PRESETS["Turn"]) for method in ("qp", "dual")}
+    answers = {
+        method: Allocator(UCAT, method).allocate(PRESETS["Turn"]) for method in ("qp", "dual")
+    }
     answers["mdn"] = Allocator(UCAT, StandIn).allocate(PRESETS["Turn"])
     table = comparison_table(Run(State(UCAT), tuple(answers.items())), False)
-    assert three_digits(answers["dual"].power) in table and three_digits(answers["qp"].effort) in table
+    assert (
+        three_digits(answers["dual"].power) in table and three_digits(answers["qp"].effort) in table
+    )
     assert "<td>mdn</td><td>effort</td>" in table and "<td>dual</td><td>watts</td>" in table
 
 
-@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+@pytest.mark.skipif(
+    "default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree"
+)
 def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None:
     solver = Solver()
     state = State(UCAT, target=PRESETS["Turn"], method="mdn")
@@ -85,7 +91,9 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     samples = reply.answer.samples
     modes = solver.modes(reply)
     assert samples is not None and modes.ways[0] == samples
-    assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
+    assert modes.shown[0].mode.sources[0].startswith("component "), (
+        "the answer comes from the network"
+    )
     led = {samples.source[k] for k in range(len(samples)) if modes.ends[k] == 0}
     assert led and led <= set(modes.shown[0].mode.sources)
     dear = replace(samples, effort=np.full(len(samples), 1e4))
@@ -95,7 +103,9 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     assert {named.badge for named in modes.shown} == {"network"}
 
 
-@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+@pytest.mark.skipif(
+    "default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree"
+)
 def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> None:
     solver = Solver()
     state = State(UCAT, target=PRESETS["Turn"])
@@ -103,7 +113,9 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
     modes = solver.modes(reply)
     first, *others = (named.mode for named in modes.shown)
     assert [named.badge for named in modes.shown] == ["optimum", *["network"] * len(others)]
-    assert source_words(first.sources) == "the answer" and first.power == pytest.approx(reply.answer.power)
+    assert source_words(first.sources) == "the answer" and first.power == pytest.approx(
+        reply.answer.power
+    )
     assert others and all(mode.err_norm < 1e-3 and mode.power >= first.power for mode in others)
     assert mode_plot(modes, 0, None, 200).count("class='mode'") == len(modes.shown)
     end = modes.ways[-1]
@@ -129,7 +141,9 @@ def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     assert vars(few.settings)["temperature"] == 1.5
     assert solver.allocator(replace(state, temperature=None)) is shipped
     assert vars(shipped.settings)["temperature"] != 1.5
-    assert solver.allocator(replace(state, method="sqp")) is solver.allocator(State(UCAT, method="sqp"))
+    assert solver.allocator(replace(state, method="sqp")) is solver.allocator(
+        State(UCAT, method="sqp")
+    )
 
 
 def test_an_allocator_is_kept_until_its_robot_changes() -> None:
@@ -170,7 +184,9 @@ def test_a_trained_network_is_offered_and_answers(mine: str, layout_a: Layout) -
     state = State(layout_a, target=TARGET, method="paper")
     assert list(solver.networks()) == ["paper", mine] and solver.first_network == "paper"
     chosen = state.with_setting("network", mine)
-    answers = [solver.solve(s).checkpoint for s in (state, chosen, state.with_setting("network", "paper"))]
+    answers = [
+        solver.solve(s).checkpoint for s in (state, chosen, state.with_setting("network", "paper"))
+    ]
     assert answers == ["paper", "mine", "paper"]
     assert solver.solve(replace(chosen, method="mdn")).checkpoint == "default"
     with pytest.raises(FinlabError, match="network: expected one of"):

@@ -1,4 +1,5 @@
-"""What is said of a robot that was not drawn: weak and stuck fins, mass and damping, typed or estimated."""
+"""What is said of a robot that was not drawn: weak and stuck fins, mass and damping, typed or
+estimated."""
 
 import math
 from dataclasses import replace
@@ -139,7 +140,11 @@ def test_the_page_may_send_anything(session: Session) -> None:
     ):
         with pytest.raises(FinlabError):
             change()
-    assert session.state == before and session.draft == SearchRequest() and session.swim == SwimSettings()
+    assert (
+        session.state == before
+        and session.draft == SearchRequest()
+        and session.swim == SwimSettings()
+    )
 
 
 def test_a_plan_is_made_of_the_settings(session: Session) -> None:
@@ -187,7 +192,9 @@ def test_a_given_mass_stays_and_buoyancy_tells_the_volume(hulled: Session) -> No
     assert hulled.history.past[0][0] == "Mass of the robot"
 
 
-def test_the_inertia_of_ucats_hull_is_near_that_of_its_drawings_and_a_bare_hull_drags_less() -> None:
+def test_the_inertia_of_ucats_hull_is_near_that_of_its_drawings_and_a_bare_hull_drags_less() -> (
+    None
+):
     layout = load_layout("ucat")
     known = layout.body
     found = estimated(layout).body
@@ -211,7 +218,10 @@ def test_the_water_is_that_of_the_fins(hulled: Session) -> None:
 def test_forgetting_leaves_the_hull(hulled: Session) -> None:
     hulled.estimate()
     hulled.forget_dynamics()
-    assert all(getattr(body(hulled), key) is None for key in DYNAMICS) and body(hulled).hull is not None
+    assert (
+        all(getattr(body(hulled), key) is None for key in DYNAMICS)
+        and body(hulled).hull is not None
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""Designs in links: whole there and back, treated like any upload, refused when they are too large."""
+"""Designs in links: whole there and back, treated like any upload, refused when they are too
+large."""
 
 import base64
 import re
@@ -40,13 +41,17 @@ def test_a_design_comes_back_whole(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
     text = files.packed(layout)
     assert files.unpacked(text).layout == layout and len(text) < files.MAX_LINK
-    assert text.replace("-", "a").replace("_", "a").isalnum(), "nothing that an address would have to escape"
+    assert text.replace("-", "a").replace("_", "a").isalnum(), (
+        "nothing that an address would have to escape"
+    )
 
 
 def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "fin.csv"
     turn = np.linspace(-np.pi, np.pi, 9)
-    write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
+    write_table(
+        path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn
+    )
     model = stored_table(path.read_bytes(), files.table_folder())
     session = Session(load_layout("pair"))
     session.set_model([session.state.layout.names[0]], model=model)
@@ -61,7 +66,9 @@ def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
     session.import_hull(files.stored_hull("hull.stl", rough.export(file_type="stl")))
-    with pytest.raises(FinlabError, match=r"with its files needs [\d,]+ characters, .* share the ZIP"):
+    with pytest.raises(
+        FinlabError, match=r"with its files needs [\d,]+ characters, .* share the ZIP"
+    ):
         files.packed(session.state.layout)
 
 
@@ -69,7 +76,8 @@ WHOLE = files.packed(load_layout("ucat"))
 
 
 @pytest.mark.parametrize(
-    "text", ["", "y", "y!!!", "q" + "A" * 20, "yAAAA", files.ARCHIVE + "AAAA", "y" + "é" * 8, WHOLE[:-9]]
+    "text",
+    ["", "y", "y!!!", "q" + "A" * 20, "yAAAA", files.ARCHIVE + "AAAA", "y" + "é" * 8, WHOLE[:-9]],
 )
 def test_what_is_no_design_is_refused_with_a_sentence(text: str) -> None:
     with pytest.raises(FinlabError) as told:
@@ -132,7 +140,9 @@ def test_saving_sends_the_design_and_notes_it() -> None:
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
 
 
-def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     mine = Session(load_layout("octo"))
     theirs = Session(load_layout("ucat"))
     browser = Browser()

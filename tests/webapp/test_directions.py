@@ -22,7 +22,8 @@ MIRRORED = np.concatenate([POLAR, AXIAL])
 
 
 def wrenches(layout: Layout, names: tuple[str, ...], flow: Array) -> Array:
-    """What an actuator can do at a few hundred commands, sorted so that their order does not count."""
+    """What an actuator can do at a few hundred commands, sorted so that their order does not
+    count."""
     plant = plant_of(Layout("part", tuple(layout.part(name) for name in names)))
     share = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
     return np.asarray(plant.wrench(plant.lower + share * plant.width, flow=flow))
@@ -56,7 +57,9 @@ def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None
             assert session.state.layout == layout
 
 
-@pytest.mark.parametrize("layout", [FISH, *map(load_layout, ROBOTS)], ids=lambda layout: layout.name)
+@pytest.mark.parametrize(
+    "layout", [FISH, *map(load_layout, ROBOTS)], ids=lambda layout: layout.name
+)
 def test_the_image_does_the_mirrored_thing(layout: Layout) -> None:
     for part in layout.actuators:
         other = Layout("image", (part.image(),))
@@ -92,9 +95,13 @@ def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -
         session.point(name, tuple(way.tolist()))
         part = session.state.layout.part(name)
         assert part.direction == pytest.approx(tuple(way / np.linalg.norm(way)))
-        np.testing.assert_allclose(np.array(part.frame) @ np.array(part.frame).T, np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(
+            np.array(part.frame) @ np.array(part.frame).T, np.eye(3), atol=1e-9
+        )
         if isinstance(part, Fin):
-            assert (part.mounting_angle is not None) == (way[2] == 0.0), "horizontal ones keep their angle"
+            assert (part.mounting_angle is not None) == (way[2] == 0.0), (
+                "horizontal ones keep their angle"
+            )
     with pytest.raises(FinlabError, match="expected a vector with a length"):
         session.point(name, (0.0, 0.0, 0.0))
 

@@ -14,7 +14,14 @@ from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.swim.hull import hull_of
-from finlab.swim.hull.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, simplified, turned
+from finlab.swim.hull.mesh_file import (
+    MAX_BYTES,
+    MAX_FACES,
+    MeshReport,
+    read_mesh,
+    simplified,
+    turned,
+)
 from tests.webapp.stand_in import turn_fin
 from webapp.markup.score_card import warnings
 from webapp.session import Session, layout_edits
@@ -26,7 +33,10 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.select("front_left")
     session.mirror()
     assert session.state.layout.n_fins == 4, "its image stands there already"
-    assert session.state.links == (("front_left", "front_right"),) and session.selected == "front_right"
+    assert (
+        session.state.links == (("front_left", "front_right"),)
+        and session.selected == "front_right"
+    )
     session.end_drag("front_left", (0.2, 0.18, 0.01))
     turn_fin(session, "front_left", 0.5)
     twin = session.state.layout.fins[0]
@@ -109,7 +119,12 @@ def test_bad_meshes_are_refused_in_words() -> None:
         ("x.stl", b"", 1.0, "x.stl"),
         ("x.glb", b"glTF nonsense", 1.0, "GLB"),
         ("x.obj", b"v 0 0 nan\n", 1.0, "x.obj"),
-        ("x.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 1.0, "1 of its 3 corners are not finite"),
+        (
+            "x.obj",
+            b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+            1.0,
+            "1 of its 3 corners are not finite",
+        ),
         (
             "x.obj",
             b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
@@ -148,7 +163,11 @@ def test_a_hull_from_a_file_is_turned_scaled_and_simplified(
     hull = stored_hull("ball.stl", ball.export(file_type="stl"))
     session.import_hull(hull)
     drawn = hull_of(session.state.layout)
-    assert drawn.report is not None and drawn.report.is_watertight and drawn.report.triangles <= MAX_FACES
+    assert (
+        drawn.report is not None
+        and drawn.report.is_watertight
+        and drawn.report.triangles <= MAX_FACES
+    )
     assert drawn.half == pytest.approx((0.3, 0.1, 0.05), rel=1e-2)
     about_z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for change, half in (
@@ -180,7 +199,9 @@ def test_new_fins_and_copies_stand_apart(session: Session) -> None:
     for _ in range(3):
         session.select("front_left")
         session.duplicate()
-    heights = [fin.position[2] for fin in session.state.layout.fins if fin.name.startswith("front_left")]
+    heights = [
+        fin.position[2] for fin in session.state.layout.fins if fin.name.startswith("front_left")
+    ]
     assert heights == pytest.approx([0.0, 0.05, 0.1, 0.15])
     while session.state.layout.n_fins < MAX_ACTUATORS:
         session.add("fin")

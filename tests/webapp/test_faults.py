@@ -1,4 +1,5 @@
-"""Faults are put wherever an answer is made while a layout is opened: no figure of the robot before stays.
+"""Faults are put wherever an answer is made while a layout is opened: no figure of the robot before
+stays.
 
 What a page shows then is compared with a page that has never seen another robot.
 """
@@ -106,7 +107,8 @@ class Tab:
             time.sleep(0.01)
 
     def figures(self) -> list[str]:
-        """The markup that can be seen in any task, in order, without what no two runs have in common."""
+        """The markup that can be seen in any task, in order, without what no two runs have in
+        common."""
         markup = []
         for act in self.ways:
             self.on_loop(partial(self.view.do, act))
@@ -144,7 +146,9 @@ def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Pools]:
     workers = Pools()
-    with pytest.MonkeyPatch.context() as patch:  # nobody types here, so nothing need come to rest first
+    with (
+        pytest.MonkeyPatch.context() as patch
+    ):  # nobody types here, so nothing need come to rest first
         for name in ("jobs.CARD_REST_S", "jobs.REST_S", "answering.SEARCH_REST_S"):
             patch.setattr(f"webapp.tasks.{name}", 0.01)
         yield workers
@@ -164,7 +168,10 @@ def tab(workers: Pools) -> Iterator[Tab]:
     sampled(
         [
             pytest.param(place, kind(WORDS))
-            for kind, places in ((RuntimeError, COMPUTED + DRAWN), (FinlabError, (COMPUTED[0], DRAWN[2])))
+            for kind, places in (
+                (RuntimeError, COMPUTED + DRAWN),
+                (FinlabError, (COMPUTED[0], DRAWN[2])),
+            )
             for place in places
         ],
         every=6,

@@ -43,7 +43,9 @@ def intents() -> Iterator[tuple[type, str]]:
 
 def handles(server: viser.ViserServer) -> list[Any]:
     """Every widget of the page that does anything."""
-    found = [h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()]
+    found = [
+        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
+    ]
     return [handle for handle in found if getattr(handle._impl, "update_cb", ())]
 
 
@@ -81,7 +83,10 @@ def faults(view: View) -> list[str]:
 
 
 def test_every_widget_survives_a_fault_in_what_it_does(
-    server: viser.ViserServer, app: App, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    server: viser.ViserServer,
+    app: App,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     client: Any = SilentClient(server)
     session = Session(load_layout("ucat"))
@@ -142,7 +147,9 @@ def test_every_widget_survives_a_fault_in_what_is_written(
             on_loop(server, lambda: view.session.show_task(task))  # New goes to another one
             if not isinstance(handle, viser.GuiUploadButtonHandle):
                 use(server, view, handle, others(handle)[0])
-                on_loop(server, lambda: view.do(lambda: view.session.show_task(task)))  # New shows another
+                on_loop(
+                    server, lambda: view.do(lambda: view.session.show_task(task))
+                )  # New shows another
         assert any(WORDS in note for note in faults(view))
     view.client.notes.clear()
     on_loop(server, lambda: view.do(view.session.start_over))
@@ -188,7 +195,9 @@ def test_another_slot_is_cancelled_and_a_stale_answer_is_never_taken(worker: Poo
         return not slot.busy
 
     until(ended)
-    assert answers <= {None, 2} and slot.answer == 2 and seen[-1] is False and seen.count(False) == 1
+    assert (
+        answers <= {None, 2} and slot.answer == 2 and seen[-1] is False and seen.count(False) == 1
+    )
 
 
 def test_a_question_waits_until_it_rests_and_what_was_asked_costs_nothing(worker: Pool) -> None:
@@ -215,6 +224,9 @@ def test_a_fault_does_not_end_the_thread(worker: Pool, capsys: pytest.CaptureFix
     for slot in (bad, refused, good):
         slot.ask("a")
     until(lambda: not any(slot.busy for slot in (bad, refused, good)))
-    assert (bad.error, refused.error) == ("it failed: division by zero", "not so") and good.answer == "A"
+    assert (bad.error, refused.error) == (
+        "it failed: division by zero",
+        "not so",
+    ) and good.answer == "A"
     printed = capsys.readouterr().err
     assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"

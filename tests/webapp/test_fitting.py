@@ -1,4 +1,5 @@
-"""A file of measurements dropped on a fin: the fit, undo, refusals; layouts that carry their tables."""
+"""A file of measurements dropped on a fin: the fit, undo, refusals; layouts that carry their
+tables."""
 
 import io
 import threading
@@ -62,7 +63,9 @@ class Opened:
         return [fin.model.type for fin in self.session.state.layout.fins]
 
 
-def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Path, worker: Pool) -> None:
+def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(
+    tmp_path: Path, worker: Pool
+) -> None:
     opened = Opened(worker)
     before = opened.session.state
     fitting = opened.fitting
@@ -119,7 +122,9 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Pool) -> None:
     opened.fitting.start("front_left", "fin.csv", table_bytes(path))
     until(lambda: opened.models == ["drag", "table", "table", "drag"])
     found = opened.fitting.answer
-    assert found is not None and found.fit is None and "fin.csv is a finished table" in fit_card(found)
+    assert (
+        found is not None and found.fit is None and "fin.csv is a finished table" in fit_card(found)
+    )
     assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
     words = model_card(opened.session.state.layout.fins[1])
     assert "<b>table</b>, fitted to 69 samples" in words and "all round" in words
@@ -289,8 +294,14 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ({"a.yaml": b"x", "b.yaml": b"y"}, "2 of them layouts; expected a bundle, or one layout file"),
-        ({"a.yaml": b"x", "../out.csv": b"y"}, "holds '../out.csv', expected a layout file, CSV tables"),
+        (
+            {"a.yaml": b"x", "b.yaml": b"y"},
+            "2 of them layouts; expected a bundle, or one layout file",
+        ),
+        (
+            {"a.yaml": b"x", "../out.csv": b"y"},
+            "holds '../out.csv', expected a layout file, CSV tables",
+        ),
         ({"a.yaml": b"x", "run.py": b"y"}, "holds 'run.py'"),
         ({"a.yaml": b"name: 3"}, "robot.zip/a.yaml: "),
     ],

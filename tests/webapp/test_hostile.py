@@ -1,4 +1,5 @@
-"""Pages, files and names that no honest page would send: nothing breaks, all is refused or escaped."""
+"""Pages, files and names that no honest page would send: nothing breaks, all is refused or
+escaped."""
 
 import asyncio
 import base64
@@ -51,11 +52,14 @@ GARBAGE: tuple[Any, ...] = (
 
 
 def taken(handle: Any, value: Any) -> bool:
-    """Put a value into an input as viser does with one from a page: cast to its type, if it can be."""
+    """Put a value into an input as viser does with one from a page: cast to its type, if it can
+    be."""
     now = handle._impl.value
     try:
         if isinstance(now, tuple):
-            handle._impl.value = tuple(type(now[0])(part) for part in value) if now else tuple(value)
+            handle._impl.value = (
+                tuple(type(now[0])(part) for part in value) if now else tuple(value)
+            )
         else:
             handle._impl.value = type(now)(value)
     except (TypeError, ValueError, OverflowError):
@@ -68,7 +72,9 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
 ) -> None:
     view.session.select("front_left")
     before = view.session.state.layout
-    handles = [h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()]
+    handles = [
+        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
+    ]
     heard = 0
     for handle in handles:
         if isinstance(handle, viser.GuiUploadButtonHandle):
@@ -85,7 +91,9 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
     kept = repr((session.state, session.display, session.draft, session.swim))
     assert "alert" not in kept and "xxx" not in kept and "=nan" not in kept
     states = [state for _, state in view.session.history.past]
-    assert any(set(before.names) <= set(state.layout.names) for state in states), "buttons may well add fins"
+    assert any(set(before.names) <= set(state.layout.names) for state in states), (
+        "buttons may well add fins"
+    )
     assert "Traceback" not in capsys.readouterr().err
     assert not any("fault" in note for note in view.client.notes)
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.7)))
@@ -100,10 +108,18 @@ def link(text: str) -> str:
 
 @pytest.mark.parametrize(
     "text",
-    ["a: " + "1:" * 400_000 + "1", "[" * 100_000, "&a [*a]", "x: 1\n" * 300_000, "a: " + "9" * 900_000],
+    [
+        "a: " + "1:" * 400_000 + "1",
+        "[" * 100_000,
+        "&a [*a]",
+        "x: 1\n" * 300_000,
+        "a: " + "9" * 900_000,
+    ],
     ids=["base sixty", "deep", "circle", "repeated", "number"],
 )
-def test_hostile_links_leave_the_page_quick(server: viser.ViserServer, view: View, text: str) -> None:
+def test_hostile_links_leave_the_page_quick(
+    server: viser.ViserServer, view: View, text: str
+) -> None:
     before = view.session.state.layout
     on_loop(server, lambda: view.do(partial(view.designs.open_link, link(text))))
     slowest = 0.0
@@ -117,11 +133,15 @@ def test_hostile_links_leave_the_page_quick(server: viser.ViserServer, view: Vie
     assert view.session.state.layout == before and slowest < 1.0
 
 
-def test_what_waits_gives_way_to_a_newer_one_of_its_kind(server: viser.ViserServer, view: View) -> None:
+def test_what_waits_gives_way_to_a_newer_one_of_its_kind(
+    server: viser.ViserServer, view: View
+) -> None:
     found: list[int] = []
 
     def ask() -> None:
-        view.do(lambda: view.deferred.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open"))
+        view.do(
+            lambda: view.deferred.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open")
+        )
         for count in range(1, 9):
             view.do(lambda count=count: view.deferred.make(lambda: count, found.append, "save"))
 
@@ -156,7 +176,9 @@ def test_each_file_goes_to_whom_it_is_for() -> None:
 
 @pytest.mark.parametrize("name", ["notes.docx", "robot", ".yaml", "robot.yaml.exe", ""])
 def test_what_cannot_be_opened_is_told_with_what_can(name: str) -> None:
-    with pytest.raises(FinlabError, match=r"cannot be opened; expected a design \(YAML, JSON, ZIP\)"):
+    with pytest.raises(
+        FinlabError, match=r"cannot be opened; expected a design \(YAML, JSON, ZIP\)"
+    ):
         Taken().opening.open(name, b"")
 
 
@@ -197,7 +219,11 @@ def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: V
         on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
         until(lambda: not view.busy and not view.jobs.analyst.busy)
         found = [ESCAPED.finditer(text) for text in contents(server)]
-        wrong = {text.string[max(0, text.start() - 60) : text.end() + 30] for part in found for text in part}
+        wrong = {
+            text.string[max(0, text.start() - 60) : text.end() + 30]
+            for part in found
+            for text in part
+        }
         assert wrong == set(), task
 
 

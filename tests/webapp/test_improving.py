@@ -29,7 +29,9 @@ def test_search_is_cancelled_and_what_it_found_is_offered(worker: Pool) -> None:
     improver.start(State(NO_YAW), request)
     with pytest.raises(FinlabError, match="running already"):
         improver.start(State(NO_YAW), request)
-    until(lambda: improver.progress is not None and improver.progress.best > improver.progress.before)
+    until(
+        lambda: improver.progress is not None and improver.progress.best > improver.progress.before
+    )
     improver.stop()
     until(lambda: improver.answer is not None)
     assert improver.answer is not None and improver.answer.cancelled and not improver.busy
@@ -92,7 +94,8 @@ def test_analyst_answers_only_the_question_that_stays(worker: Pool) -> None:
 
 
 def test_what_is_proposed_can_be_built(worker: Pool) -> None:
-    """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that stay."""
+    """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that
+    stay."""
     ucat = load_layout(shipped_layouts()["ucat"])
     inside = replace(ucat, actuators=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
     assert (
@@ -111,7 +114,9 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
     layout = found.layout
     assert warnings(layout) == ()
     assert room.broken(layout.position[None], layout.frames[None])[0] == 0.0
-    assert [set(pair) for pair in mirror_pairs(layout)] == [set(pair) for pair in mirror_pairs(stuck)]
+    assert [set(pair) for pair in mirror_pairs(layout)] == [
+        set(pair) for pair in mirror_pairs(stuck)
+    ]
     tail = layout.fins[-1]
     assert tail.position[1] == 0.0 and tail.mounting_angle == math.pi
     for fin in layout.fins:
@@ -121,7 +126,9 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
         )
     afterwards = find(Question(layout, (), layout, "none")).card
     assert afterwards.authority.weakest == found.card_after.authority.weakest
-    assert [loss.weakest for loss in afterwards.losses] == [loss.weakest for loss in found.card_after.losses]
+    assert [loss.weakest for loss in afterwards.losses] == [
+        loss.weakest for loss in found.card_after.losses
+    ]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""Several actuators selected and changed in one step: names, limits, models, order, and fins of any law."""
+"""Several actuators selected and changed in one step: names, limits, models, order, and fins of any
+law."""
 
 import math
 from dataclasses import replace
@@ -56,7 +57,10 @@ def test_selection_grows_and_shrinks(session: Session) -> None:
 def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> None:
     choose(session, *FRONT)
     session.place_selected((0.2, *fin(session, "front_left").position[1:]))
-    assert [fin(session, name).position for name in FRONT] == [(0.2, -0.1502, 0.0), (0.2, 0.1502, 0.0)]
+    assert [fin(session, name).position for name in FRONT] == [
+        (0.2, -0.1502, 0.0),
+        (0.2, 0.1502, 0.0),
+    ]
     session.history.end_merge()
     session.set_value("amplitude", (0.1, 0.5))
     session.choose_model("lighthill")
@@ -99,13 +103,18 @@ def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> 
         (lambda s: s.set_value("area", -0.1), "must lie within"),
         (lambda s: s.set_value("area", float("nan")), "must lie within"),
         (lambda s: s.place_selected((55.0, 0.0, 0.0)), "x of front_right"),
-        (lambda s: s.rename("front_right", "front_left"), "there is an actuator 'front_left' already"),
+        (
+            lambda s: s.rename("front_right", "front_left"),
+            "there is an actuator 'front_left' already",
+        ),
         (lambda s: s.rename("front_right", "  "), "name"),
         (lambda s: s.rename("front_right", "x" * 65), "name"),
         (lambda s: s.rename("nobody", "x"), "has no fin"),
     ],
 )
-def test_what_makes_no_sense_is_refused_and_changes_nothing(session: Session, act, says: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_makes_no_sense_is_refused_and_changes_nothing(
+    session: Session, act, says: str
+) -> None:  # type: ignore[no-untyped-def]
     session.select("front_right")
     before = session.state
     with pytest.raises(FinlabError, match=says):
@@ -122,7 +131,10 @@ def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> 
     state = session.state
     assert state.failed == ("bow <b>",) and ("bow <b>", "front_right") in state.links
     assert session.selected == "bow <b>"
-    assert "<b>" not in actuator_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
+    assert (
+        "<b>"
+        not in actuator_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
+    )
     session.undo()
     assert session.selected == "front_left" and session.state.failed == ("front_left",)
 
@@ -139,7 +151,8 @@ def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
 SOLVER = Solver()
 Target = tuple[float, float, float, float, float, float]
 needs_network = pytest.mark.skipif(
-    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+    not {"default", "paper"} <= set(shipped_checkpoints()),
+    reason="no trained checkpoints in the tree",
 )
 
 
@@ -152,13 +165,16 @@ def reachable(layout: Layout) -> Target:
 
 @pytest.fixture
 def tabled(tmp_path: Path) -> Layout:
-    """U-CAT with fins that follow a table: soft ones, neither aligned nor the same in all directions."""
+    """U-CAT with fins that follow a table: soft ones, neither aligned nor the same in all
+    directions."""
     law = make_law(FinModelSpec("soft", (("d", 0.1), ("e", 0.15))))
     grid = np.linspace(0.05, 0.6, 9), np.linspace(0.1, 2.1, 9), np.linspace(-np.pi, np.pi, 25)
     write_table(tmp_path / "fin.csv", law, *grid)
     spec = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
     ucat = load_layout("ucat")
-    return replace(ucat, name="tabled", actuators=tuple(replace(fin, model=spec) for fin in ucat.fins))
+    return replace(
+        ucat, name="tabled", actuators=tuple(replace(fin, model=spec) for fin in ucat.fins)
+    )
 
 
 @pytest.mark.parametrize("name", FIN_ROBOTS)
@@ -177,7 +193,9 @@ def test_only_paper_warns_of_fins() -> None:
         answer = SOLVER.solve(replace(state, method=method))
         assert answer.err_norm < 1e-4 and answer.unknown_fins == ()
     warned = SOLVER.solve(replace(state, method="paper"))
-    assert verdict_sentence(warned, True) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
+    assert (
+        verdict_sentence(warned, True) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
+    )
 
 
 def test_a_table_fin_goes_through_the_whole_app(
@@ -212,7 +230,8 @@ def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(table
 
 @needs_network
 def test_one_error_everywhere() -> None:
-    """Status line, candidates, modes and file of a method with a learned model: all by the fins' own laws."""
+    """Status line, candidates, modes and file of a method with a learned model: all by the fins'
+    own laws."""
     layout = load_layout("ucat")
     state = State(layout, target=PRESETS["Turn"], method="paper")
     solver = Solver()
@@ -232,4 +251,7 @@ def test_one_error_everywhere() -> None:
         assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
     assert modes[0].err_norm == pytest.approx(answer.err_norm, rel=1e-9)
     record = allocation_record(answer)
-    assert record["err_norm"] == answer.err_norm and record["unallocated"] == answer.unallocated.tolist()
+    assert (
+        record["err_norm"] == answer.err_norm
+        and record["unallocated"] == answer.unallocated.tolist()
+    )

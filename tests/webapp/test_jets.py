@@ -1,4 +1,5 @@
-"""Jets on the page: the switch, cones and arrows in the view, and the answer that leaves jets out."""
+"""Jets on the page: the switch, cones and arrows in the view, and the answer that leaves jets
+out."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -39,7 +40,9 @@ def test_the_switch_can_be_undone_and_remembers_the_robots_own(layout: Layout) -
     assert session.state.layout == layout and session.history.undo_name is None
     session.open_layout(HEAVY)
     session.set_jets(True)
-    assert session.state.layout.interaction == Jets(), "another robot's constants are not this one's"
+    assert session.state.layout.interaction == Jets(), (
+        "another robot's constants are not this one's"
+    )
 
 
 def test_jets_travel_in_files_and_links() -> None:
@@ -67,7 +70,9 @@ def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
 def tab() -> Iterator[Tab]:
     workers = Pools()
     tab = Tab(workers, HEAVY, Solver())
-    tab.on_loop(lambda: tab.view.do(partial(tab.view.session.ask_for, [str(value) for value in AHEAD])))
+    tab.on_loop(
+        lambda: tab.view.do(partial(tab.view.session.ask_for, [str(value) for value in AHEAD]))
+    )
     tab.settle()
     yield tab
     tab.close()
@@ -76,8 +81,12 @@ def tab() -> Iterator[Tab]:
 
 def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     session = tab.view.session
-    assert not [name for name in tab.server.scene._handle_from_node_name if name.startswith("/robot/jets")]
-    switch = next(handle for handle in handles(tab.server) if getattr(handle, "label", "") == "Count jets")
+    assert not [
+        name for name in tab.server.scene._handle_from_node_name if name.startswith("/robot/jets")
+    ]
+    switch = next(
+        handle for handle in handles(tab.server) if getattr(handle, "label", "") == "Count jets"
+    )
     use(tab.server, tab.view, switch, True)
     tab.settle()
     nodes = tab.server.scene._handle_from_node_name
@@ -87,7 +96,9 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
         jet = nodes[f"/robot/jets/{i}"]
         assert jet.visible and np.allclose(jet.position, HEAVY.position[i])
         middle = jet.vertices.mean(axis=0)
-        assert middle @ force == pytest.approx(-np.linalg.norm(middle) * np.linalg.norm(force), rel=1e-3)
+        assert middle @ force == pytest.approx(
+            -np.linalg.norm(middle) * np.linalg.norm(force), rel=1e-3
+        )
     taken = [nodes[f"/robot/taken/{i}"].visible for i in range(HEAVY.n)]
     assert taken == [True] * 4 + [False] * 4, "jets of the lifting ones meet nothing"
     assert "taken by jets" in " ".join(tab.figures())
@@ -106,10 +117,14 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     tab.on_loop(lambda: tab.view.do(session.undo))
     use(tab.server, tab.view, switch, False)
     tab.settle()
-    assert len(nodes) == made and not any(n.visible for name, n in nodes.items() if "/jets/" in name)
+    assert len(nodes) == made and not any(
+        n.visible for name, n in nodes.items() if "/jets/" in name
+    )
     assert "taken by jets" not in " ".join(tab.figures())
     tab.open(replace(load_layout("torpedo"), interaction=Jets()))
-    assert not any(nodes[f"/robot/jets/{i}"].visible for i in range(1, HEAVY.n)), "rudders have no jets"
+    assert not any(nodes[f"/robot/jets/{i}"].visible for i in range(1, HEAVY.n)), (
+        "rudders have no jets"
+    )
 
 
 def test_a_jet_is_as_wide_as_the_formula_says() -> None:

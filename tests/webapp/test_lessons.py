@@ -79,7 +79,13 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
     session.show_drawer("Reach")
 
     def all_there_is() -> tuple[object, ...]:
-        return session.state, session.display, session.desk, session.selected, session.history.undo_name
+        return (
+            session.state,
+            session.display,
+            session.desk,
+            session.selected,
+            session.history.undo_name,
+        )
 
     before = all_there_is()
     session.guide.open(LESSONS[0].name)

@@ -1,4 +1,5 @@
-"""A log that is dropped on the page: what is said of it, its moments on the robot, and what is refused."""
+"""A log that is dropped on the page: what is said of it, its moments on the robot, and what is
+refused."""
 
 from pathlib import Path
 
@@ -48,12 +49,16 @@ def test_a_moment_of_it_is_put_on_the_robot(judged: tuple[Session, LogReading]) 
     assert session.state.layout == log.robot and session.history.undo_name == "Robot of dive.ulg"
     np.testing.assert_allclose(session.state.target[5], 18.0, rtol=1e-3)
     assert reading.moment is not None and spell.start <= reading.moment <= spell.end
-    assert "chosen" in _losses(log, reading.moment) and "currentColor" in log_plots(log, reading.moment)
+    assert "chosen" in _losses(log, reading.moment) and "currentColor" in log_plots(
+        log, reading.moment
+    )
     session.undo()
     assert session.state.layout.name == "ucat"
 
 
-def test_what_is_no_log_is_refused_in_a_sentence(judged: tuple[Session, LogReading], tmp_path: Path) -> None:
+def test_what_is_no_log_is_refused_in_a_sentence(
+    judged: tuple[Session, LogReading], tmp_path: Path
+) -> None:
     session = Session(load_layout("ucat"))
     reading = LogReading(context_of(Direct(), session))
     reading.open("dive.ulg", b"no log")

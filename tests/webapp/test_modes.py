@@ -36,7 +36,9 @@ def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
 
 def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ...]:
     command = np.array(commands)
-    lower, upper = (np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi]))
+    lower, upper = (
+        np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi])
+    )
     with np.errstate(invalid="ignore"):
         force = np.nan_to_num(np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2)
     return named_modes(find_modes(candidates(*commands), force, lower, upper), "network")
@@ -74,7 +76,9 @@ def test_no_more_are_shown_than_have_colours() -> None:
 
 def found(method: str = "mdn") -> Modes:
     solver = Solver(load=load_stand_in)
-    return solver.modes(solver.reply(State(load_layout("ucat"), target=PRESETS["Turn"], method=method)))
+    return solver.modes(
+        solver.reply(State(load_layout("ucat"), target=PRESETS["Turn"], method=method))
+    )
 
 
 def test_samples_and_modes_are_drawn_and_listed() -> None:
@@ -82,7 +86,9 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     samples, middle, end = modes.ways
     assert len(modes.ends) == len(samples) == len(end)
     for source, place in zip(samples.source, modes.ends, strict=True):
-        assert place < 0 or source in modes.shown[place].mode.sources, "the mode that its component led to"
+        assert place < 0 or source in modes.shown[place].mode.sources, (
+            "the mode that its component led to"
+        )
     still = mode_plot(modes, 0, None, 200)
     moving = mode_plot(modes, 0, 1, 200)
     assert still.count("data-press='mode'") == len(modes.shown)
@@ -96,15 +102,27 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     assert table.count(">network</span>") == len(modes.shown)
     assert "2 more are" in mode_table(replace(modes, count=modes.count + 2), 0)
     assert mode_table(NO_MODES, 0) == mode_plot(NO_MODES, 0, None, 200) == ""
-    assert "samples of the network" in step_words(modes, 0) and "median error" in step_words(modes, None)
+    assert "samples of the network" in step_words(modes, 0) and "median error" in step_words(
+        modes, None
+    )
 
 
 def test_figures_keep_their_width() -> None:
     assert {len(small(v)) for v in (0.0, 3.1e-5, 0.099, 2e5)} == {8}
     assert [small(v) for v in (0.1, 1.2345, 16.24, 9999.0)] == ["0.100", "1.23", "16.2", "9999"]
-    assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == ["2.32", "0.0410", "0.100", "0.00"]
+    assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == [
+        "2.32",
+        "0.0410",
+        "0.100",
+        "0.00",
+    ]
     assert three_digits(float("nan")) == small(float("nan")) == "–"
-    assert [error_digits(v) for v in (0.0, 5.4e-16, 2e-9, 16.24)] == ["≤ 1e−9", "≤ 1e−9", "2.00e−09", "16.2"]
+    assert [error_digits(v) for v in (0.0, 5.4e-16, 2e-9, 16.24)] == [
+        "≤ 1e−9",
+        "≤ 1e−9",
+        "2.00e−09",
+        "16.2",
+    ]
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
 
 
@@ -152,13 +170,17 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float) -> None:
     modes = found()
     first = modes.shown[0].mode
-    effort = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
+    effort = np.append(
+        0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread
+    )
     shown = tuple(
-        NamedMode(replace(first, effort=float(value)), f"{k}", "network") for k, value in enumerate(effort)
+        NamedMode(replace(first, effort=float(value)), f"{k}", "network")
+        for k, value in enumerate(effort)
     )
     plot = mode_plot(replace(modes, shown=shown, ends=(0,) * len(modes.ends)), 3, None, 200)
     across = [
-        float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
+        float(x)
+        for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
     ]
     labels = re.findall(r"<text x='([\d.]+)' y='([\d.]+)' class='digit'[^>]*>(\d+)<", plot)
     # the best one is on top

@@ -1,4 +1,5 @@
-"""Ways along the null space: rows, sliders and the robot say the same, and a table of them can be saved."""
+"""Ways along the null space: rows, sliders and the robot say the same, and a table of them can be
+saved."""
 
 import csv
 import io
@@ -23,7 +24,9 @@ BLUEROV = load_layout("bluerov2_heavy")
 ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
 
 
-@pytest.mark.parametrize("layout", [HYBRID, BLUEROV, load_layout("ucat")], ids=lambda layout: layout.name)
+@pytest.mark.parametrize(
+    "layout", [HYBRID, BLUEROV, load_layout("ucat")], ids=lambda layout: layout.name
+)
 def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: Layout) -> None:
     answer = Solver().solve(State(layout, target=ASKED))
     (alone,) = null_modes(answer, ()).shown
@@ -31,7 +34,9 @@ def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: L
     modes = null_modes(answer, (0.0, 4.0))
     optimum, other, mean = modes.shown
     assert other.mode.err_norm < 1e-6 and other.mode.power > 1.01 * optimum.mode.power
-    assert (mean.mode.err_norm > 1e-3) is (layout is not BLUEROV), "commands of thrusters are their forces"
+    assert (mean.mode.err_norm > 1e-3) is (layout is not BLUEROV), (
+        "commands of thrusters are their forces"
+    )
     assert ("class='missing'" in mode_table(modes, 1)) is (layout is not BLUEROV)
     assert ("<th>effort" in mode_table(modes, 1)) is layout.is_of_fins
     assert modes.null is not None

@@ -1,4 +1,5 @@
-"""Robots with thrusters, azimuths and rudders are shown in every task; what is for fins only says so."""
+"""Robots with thrusters, azimuths and rudders are shown in every task; what is for fins only says
+so."""
 
 import json
 from collections.abc import Iterator
@@ -62,7 +63,9 @@ def tab() -> Iterator[Tab]:
 
 
 @pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)
-def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_task_shows_the_robot(
+    tab: Tab, layout: Layout, capsys: pytest.CaptureFixture[str]
+) -> None:
     tab.client.notes.clear()
     tab.open(layout)
     session = tab.view.session
@@ -70,10 +73,14 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     tab.settle()
     told = " ".join(tab.figures())
     assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
-    assert f"{layout.n} of {layout.n} actuators" in told and "Exact" in told and "proved least" in told
+    assert (
+        f"{layout.n} of {layout.n} actuators" in told and "Exact" in told and "proved least" in told
+    )
     assert all(name in told for name in layout.names) and "cannot be shown" not in told
     assert "Start lets this robot swim" in told and "finlab allocate`" not in told
-    assert "weakest direction" in told and "axes independent" in told, "reach and score are of any robot"
+    assert "weakest direction" in told and "axes independent" in told, (
+        "reach and score are of any robot"
+    )
     nodes = tab.nodes()
     assert all(f"/robot/fins/{k}/turn/blade" in nodes for k in range(layout.n))
     assert f"/robot/fins/{layout.n}/turn/blade" not in nodes
@@ -81,13 +88,19 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     tab.on_loop(lambda: tab.view.do(lambda: session.toggle_failure(first)))
     tab.settle()
     assert "lost" in " ".join(tab.figures()) and tab.client.notes == []
-    for act in (partial(session.add, "tilt"), partial(session.drag, first, (0.1, 0.0, 0.0)), session.undo):
+    for act in (
+        partial(session.add, "tilt"),
+        partial(session.drag, first, (0.1, 0.0, 0.0)),
+        session.undo,
+    ):
         tab.on_loop(partial(tab.view.do, act))
     tab.settle()
     assert "tilt" in " ".join(tab.figures()) and tab.client.notes == []
 
 
-def test_a_method_for_fins_says_so_and_watts_go_on(tab: Tab, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_method_for_fins_says_so_and_watts_go_on(
+    tab: Tab, capsys: pytest.CaptureFixture[str]
+) -> None:
     session = tab.view.session
     tab.open(HYBRID)
     tab.on_loop(lambda: tab.view.do(lambda: session.keep_least("effort")))
@@ -133,11 +146,17 @@ def test_each_actuator_has_a_row_with_its_type_and_force() -> None:
 
 
 def test_reach_of_thrusters_is_the_sum_of_what_each_gives() -> None:
-    upward = [part for part in BLUEROV.actuators if isinstance(part, Thruster) and abs(part.axis[2]) > 0.9]
+    upward = [
+        part for part in BLUEROV.actuators if isinstance(part, Thruster) and abs(part.axis[2]) > 0.9
+    ]
     most = sum(max(part.force[1] * part.axis[2], part.force[0] * part.axis[2]) for part in upward)
-    least = sum(max(-part.force[1] * part.axis[2], -part.force[0] * part.axis[2]) for part in upward)
+    least = sum(
+        max(-part.force[1] * part.axis[2], -part.force[0] * part.axis[2]) for part in upward
+    )
     assert axis_reach(BLUEROV)[2] == pytest.approx(max(most, least))
-    assert axis_reach(FISH)[1] > 0.0 and full_thrust(FISH)[1] == 0.0, "a rudder at rest gives nothing"
+    assert axis_reach(FISH)[1] > 0.0 and full_thrust(FISH)[1] == 0.0, (
+        "a rudder at rest gives nothing"
+    )
 
 
 def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
@@ -176,7 +195,9 @@ def test_a_box_is_empty_where_nothing_is_said_and_zero_empties_it(tab: Tab) -> N
     assert np.isnan(box.value)
     use(tab.server, tab.view, box, 30.0)
     pod = session.state.layout.actuators[session.state.layout.index("pod")]
-    assert isinstance(pod, Azimuth) and pod.turn_rate == pytest.approx(np.pi / 6) and box.value == 30.0
+    assert (
+        isinstance(pod, Azimuth) and pod.turn_rate == pytest.approx(np.pi / 6) and box.value == 30.0
+    )
     tab.settle()  # else the page may write the box once more
     use(tab.server, tab.view, box, 0.0)
     tab.settle()

@@ -136,7 +136,9 @@ def test_starting_over_is_as_at_first_sight_and_can_be_undone(session: Session) 
     first = session.state
     session.open_layout(load_layout(shipped_layouts()["B"]))
     session.start_over()
-    assert session.state == first and session.saved == first.layout, "nothing of it counts as edited"
+    assert session.state == first and session.saved == first.layout, (
+        "nothing of it counts as edited"
+    )
     session.undo()
     assert session.state.layout.name == "B"
 

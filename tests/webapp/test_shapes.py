@@ -1,4 +1,5 @@
-"""Meshes are closed and face outwards; reserved hues stay apart; marks of sliders do not overlap."""
+"""Meshes are closed and face outwards; reserved hues stay apart; marks of sliders do not
+overlap."""
 
 import math
 import re
@@ -59,7 +60,9 @@ def test_hulls(shape: str) -> None:
     mesh = hull.mesh
     assert solid(mesh).volume > 0
     assert mesh.vertices.max(axis=0) == pytest.approx([0.32, 0.12, 0.11], abs=0.01)
-    assert hull.contains(np.array([0.02, 0.0, 0.01])) and not hull.contains(np.array([0.5, 0.0, 0.0]))
+    assert hull.contains(np.array([0.02, 0.0, 0.01])) and not hull.contains(
+        np.array([0.5, 0.0, 0.0])
+    )
     anchor = hull.anchor(np.array([0.1, 0.4, 0.0]))
     assert 0.02 < anchor[1] < 0.13
 
@@ -98,7 +101,9 @@ def test_unit_meshes_are_of_length_and_radius_one() -> None:
     middle = ring[-2:]  # of both ends
     assert np.hypot(*middle[:, :2].T) == pytest.approx(1.0) and middle[:, 2] == pytest.approx(0.0)
     assert middle[0] == pytest.approx([1.0, 0.0, 0.0])
-    assert middle[1] == pytest.approx([math.cos(TURN), math.sin(TURN), 0.0]), "the head is at its end"
+    assert middle[1] == pytest.approx([math.cos(TURN), math.sin(TURN), 0.0]), (
+        "the head is at its end"
+    )
 
 
 def test_quaternions_are_those_of_scipy() -> None:
@@ -177,7 +182,9 @@ def test_a_direction_follows_the_hand_on_a_sphere_and_jumps_to_axes() -> None:
     assert snapped(free) is free
 
 
-@pytest.mark.parametrize("name", ["bluerov2_heavy", "catamaran", "torpedo", "turtle_hybrid", "fish"])
+@pytest.mark.parametrize(
+    "name", ["bluerov2_heavy", "catamaran", "torpedo", "turtle_hybrid", "fish"]
+)
 def test_actuators_move_as_commanded_or_hang(name: str) -> None:
     for part in load_layout(shipped_layouts()[name]).actuators:
         full = motion(part, np.array(part.upper))
@@ -189,7 +196,9 @@ def test_actuators_move_as_commanded_or_hang(name: str) -> None:
         if isinstance(part, Fin):
             assert (full.amplitude, full.frequency, full.angle) == pytest.approx(part.upper)
             limp = part.frame[2][2] * math.sin(hung.angle) + part.frame[1][2] * math.cos(hung.angle)
-            assert limp == pytest.approx(math.hypot(part.frame[1][2], part.frame[2][2])), "its blade is low"
+            assert limp == pytest.approx(math.hypot(part.frame[1][2], part.frame[2][2])), (
+                "its blade is low"
+            )
         if isinstance(part, Rudder):
             assert full.angle == part.upper[0]
 

@@ -1,6 +1,8 @@
-"""What one step of a slider costs: own Python calls in all threads, who calls whom, and what is sent.
+"""What one step of a slider costs: own Python calls in all threads, who calls whom, and what is
+sent.
 
-The figures are printed with `-s`; the most expensive functions of a step with `FINLAB_CALLS=1` as well.
+The figures are printed with `-s`; the most expensive functions of a step with `FINLAB_CALLS=1` as
+well.
 """
 
 import os
@@ -30,8 +32,8 @@ OURS = (f"{Path(finlab.__file__).parent}/", APP)
 SETTLED_S = 1.6
 """Longer than the page lets anything wait that belongs to a step [s]."""
 MOST_CALLS = {"Candidates": 1850, "folded": 760}
-"""Of the library's and the app's functions together; most are the library's: what is proved of the answer
-takes 230, and the candidates of a network 1,000."""
+"""Of the library's and the app's functions together; most are the library's: what is proved of the
+answer takes 230, and the candidates of a network 1,000."""
 MOST_OF_APP = {"Candidates": 620, "folded": 340}
 MOST_MESSAGES = 12
 MOST_BYTES = 6000
@@ -40,7 +42,8 @@ MOST_WRITTEN = 2
 
 
 class Count:
-    """Calls of own code by function, and between files, in all threads that begin after it was made."""
+    """Calls of own code by function, and between files, in all threads that begin after it was
+    made."""
 
     def __init__(self) -> None:
         self.is_on = False
@@ -87,7 +90,10 @@ class Count:
         return {
             (one.removeprefix(APP), other.removeprefix(APP))
             for one, other in self.between
-            if one < other and (other, one) in self.between and one.startswith(APP) and other.startswith(APP)
+            if one < other
+            and (other, one) in self.between
+            and one.startswith(APP)
+            and other.startswith(APP)
         }
 
 
@@ -111,9 +117,13 @@ def tab(count: Count) -> Iterator[Tab]:
     pools.stop()
 
 
-@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+@pytest.mark.skipif(
+    "default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree"
+)
 @pytest.mark.parametrize("drawer", ["Candidates", "folded"])
-def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_is_cheap(
+    tab: Tab, count: Count, drawer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     session = tab.view.session
     write = View._write_words
     written = [0]
@@ -127,7 +137,9 @@ def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytes
         tab.on_loop(lambda: tab.view.do(session.fold_drawer))
     tab.settle()
     listener = Listener(tab.server)
-    slider = next(handle for handle in handles(tab.server) if getattr(handle, "label", "") == "Fx [N]")
+    slider = next(
+        handle for handle in handles(tab.server) if getattr(handle, "label", "") == "Fx [N]"
+    )
     monkeypatch.setattr(View, "_write_words", counted)
     steps = []
     listener.wait()
@@ -151,8 +163,13 @@ def test_a_step_is_cheap(tab: Tab, count: Count, drawer: str, monkeypatch: pytes
         for code, calls in count.of.most_common():
             print(f"{calls:6} {'/'.join(code.co_filename.split('/')[-3:])} {code.co_name}")
     calls, of_app, files, _, _, size = map(max, zip(*steps[1:], strict=True))
-    # On a busy machine an answer may be later than the page waits, and the page is written once more.
+    # On a busy machine an answer may be later than the page waits, and the page is written once
+    # more.
     times = min(step[3] for step in steps[1:])
     sent = min(step[4] for step in steps[1:])
-    assert 100 < calls <= MOST_CALLS[drawer] and 50 < of_app <= MOST_OF_APP[drawer] and files <= MOST_FILES
+    assert (
+        100 < calls <= MOST_CALLS[drawer]
+        and 50 < of_app <= MOST_OF_APP[drawer]
+        and files <= MOST_FILES
+    )
     assert 1 < times <= MOST_WRITTEN and 3 < sent <= MOST_MESSAGES and size <= MOST_BYTES

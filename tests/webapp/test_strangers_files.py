@@ -105,7 +105,8 @@ def refused(name: str, content: bytes) -> str:
 
 
 def seen_of(tmp_path: Path) -> list[str]:
-    """What was opened of this machine, beside Python's own files and what the upload was unpacked to."""
+    """What was opened of this machine, beside Python's own files and what the upload was unpacked
+    to."""
     places = ("private", "passwd", "zero", "stdin", "environ", "id_rsa")
     return [path for path in opened if any(place in path for place in places)]
 
@@ -158,9 +159,9 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
     path = str(found.layout.fins[0].model.values()["path"])
     assert Path(path).parent == cache / "tables" and Path(path).read_bytes() == table
     name, content = files.layout_file(found.layout)
-    assert name == "robot.zip" and str(tmp_path).encode() not in zipfile.ZipFile(io.BytesIO(content)).read(
-        "robot.yaml"
-    )
+    assert name == "robot.zip" and str(tmp_path).encode() not in zipfile.ZipFile(
+        io.BytesIO(content)
+    ).read("robot.yaml")
     assert files.read_layout(name, content).layout == found.layout
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(tmp_path / "elsewhere")
@@ -187,7 +188,10 @@ def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None
 
 
 def test_a_mesh_that_names_other_files_reads_none(tmp_path: Path) -> None:
-    lines = "mtllib /etc/passwd,usemtl a,v 0 0 0,v 1 0 0,v 0 1 0,v 0 0 1,f 1 3 2,f 1 2 4,f 2 3 4,f 1 4 3,"
+    lines = (
+        "mtllib /etc/passwd,usemtl a,v 0 0 0,v 1 0 0,v 0 1 0,v 0 0 1,f 1 3 2,f 1 2 4,f 2 3 4,f 1 "
+        "4 3,"
+    )
     wavefront = lines.replace(",", "\n").encode()
     opened.clear()
     files.stored_hull("hull.obj", wavefront)
@@ -212,6 +216,11 @@ def test_descriptions_of_others_are_opened_and_what_they_lack_is_said() -> None:
     assert np.allclose(opened.layout.position[:4], known.position[:4], atol=1e-9)
     rotors = WRITERS["px4"](known, Exchange(), ".params").encode()
     assert files.read_layout("rov.params", rotors).layout.n == 8
-    for bad in (text.replace(b"<robot", b"<!DOCTYPE a []><robot", 1), b"<a/>", b"\xff\xfe", b"nothing"):
+    for bad in (
+        text.replace(b"<robot", b"<!DOCTYPE a []><robot", 1),
+        b"<a/>",
+        b"\xff\xfe",
+        b"nothing",
+    ):
         with pytest.raises(FinlabError, match=r"rov\.sdf"):
             files.read_layout("rov.sdf", bad)

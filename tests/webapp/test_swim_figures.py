@@ -33,7 +33,9 @@ class Shelf:
 
     def __init__(self, worker: Pool) -> None:
         self.sent: dict[str, bytes] = {}
-        client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
+        client = SimpleNamespace(
+            send_file_download=lambda name, data, **_: self.sent.update({name: data})
+        )
         context = context_of(worker)
         self.swimming = Swimming(context)
         silent: Any = None
@@ -74,7 +76,9 @@ def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     )
     assert figures.energy_wh == pytest.approx(power.sum() * 0.1 / 3600)
     assert figures.track_m == pytest.approx(np.sqrt((off**2).mean()))
-    assert figures.depth_m == pytest.approx(np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean()))
+    assert figures.depth_m == pytest.approx(
+        np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean())
+    )
     swimmer.shown = swimmer.shown._replace(figures=figures._replace(mean_w=2.0, energy_wh=0.0042))
     card = swim_card(*now(shelf.swimming))
     assert "<td>2.00 W</td>" in card and "<td>4.2 mWh</td>" in card
@@ -146,7 +150,9 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
     settings = chosen("weak")
-    plan = settings.plan(State(UCAT, damage=Damage(("back_right",)), method="analytic"))._replace(path=SHORT)
+    plan = settings.plan(State(UCAT, damage=Damage(("back_right",)), method="analytic"))._replace(
+        path=SHORT
+    )
     swimming.start(plan)
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer is not None
@@ -166,5 +172,7 @@ def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
         swimmer.step()
     moment = swimmer.moment()
     assert (
-        moment.figures is not None and moment.figures.mean_w >= 0.0 and moment.motion.shape == (layout.n, 3)
+        moment.figures is not None
+        and moment.figures.mean_w >= 0.0
+        and moment.motion.shape == (layout.n, 3)
     )

@@ -148,7 +148,9 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     assert swimmer.shown.doubted == ("front_left",)
     blind = swimmer.shown._replace(failed=(), found=())
-    assert "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
+    assert (
+        "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
+    )
     wrong = blind._replace(lost=())
     assert "The monitor takes front_left for torn or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)

@@ -17,7 +17,9 @@ from webapp.guard import COOKIE, Guard, is_loopback
 from webapp.viser_internals import hold_uploads, start_server, stop_server
 
 
-def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_icons_and_properties_are_viser_s_own_and_read_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     server = start_server()
     opened: list[str] = []
     begin = ZipFile.__init__
@@ -28,7 +30,8 @@ def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.
 
     monkeypatch.setattr(ZipFile, "__init__", noted)
     drawn = [
-        _icons.svg_from_icon(icon) for icon in (viser.Icon.ANCHOR, viser.Icon.FISH, viser.Icon.SUBMARINE)
+        _icons.svg_from_icon(icon)
+        for icon in (viser.Icon.ANCHOR, viser.Icon.FISH, viser.Icon.SUBMARINE)
     ]
     assert len(opened) <= 1
     with ZipFile(_icons.ICONS_DIR / "tabler-icons.zip") as archive:
@@ -46,7 +49,9 @@ def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.
 def test_the_first_page_has_our_name_and_icon() -> None:
     server = start_server()
     for encoding in ("gzip", "identity"):
-        request = Request(f"http://127.0.0.1:{server.get_port()}/", headers={"Accept-Encoding": encoding})
+        request = Request(
+            f"http://127.0.0.1:{server.get_port()}/", headers={"Accept-Encoding": encoding}
+        )
         with urlopen(request) as answer:
             body = answer.read()
             page = gzip.decompress(body) if answer.headers["Content-Encoding"] == "gzip" else body
@@ -80,7 +85,9 @@ class Sending:
 
     def begin(self, size: Any, parts: Any, key: str = "a") -> None:
         """Announce a file."""
-        self._tell(_messages.FileTransferStartUpload(self.button, key, "a.csv", "text/csv", parts, size))
+        self._tell(
+            _messages.FileTransferStartUpload(self.button, key, "a.csv", "text/csv", parts, size)
+        )
 
     def part(self, index: int, content: Any, key: str = "a") -> None:
         """Send a part of it."""
@@ -167,7 +174,11 @@ def test_token_is_asked_for_beyond_this_machine() -> None:
         refused = guard.check(path, {**headers, "cookie": cookie})
         assert refused is not None and refused.status_code == 401
     opened = guard.check(f"/?token={guard.token}", headers)
-    assert opened is not None and opened.status_code == 303 and guard.token in opened.headers["Set-Cookie"]
+    assert (
+        opened is not None
+        and opened.status_code == 303
+        and guard.token in opened.headers["Set-Cookie"]
+    )
     assert guard.check("/", {**headers, "cookie": f"{COOKIE}={guard.token}"}) is None
 
 

@@ -1,4 +1,5 @@
-"""Many visitors, silent ones and hostile ones: an honest one always comes in, and nothing piles up."""
+"""Many visitors, silent ones and hostile ones: an honest one always comes in, and nothing piles
+up."""
 
 import asyncio
 import gc
@@ -53,7 +54,9 @@ class Visitor:
         async for raw in self.socket:
             assert isinstance(raw, bytes)
             size, packed = (int.from_bytes(raw[k : k + 8], "little") for k in (0, 8))
-            text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], max_output_size=size)
+            text = zstandard.ZstdDecompressor().decompress(
+                raw[16 : 16 + packed], max_output_size=size
+            )
             for message in msgspec.msgpack.decode(text)["messages"]:
                 yield message
 
@@ -68,7 +71,10 @@ class Visitor:
             if message["type"] == "LocalStorageGetItemRequestMessage":
                 answer = {"value": keys, "error": None, "request_uuid": message["request_uuid"]}
                 await self.send("LocalStorageGetItemResponseMessage", **answer)
-            elif message["type"] == "LocalStorageSetItemMessage" and message["key"] == "finlab-sessions":
+            elif (
+                message["type"] == "LocalStorageSetItemMessage"
+                and message["key"] == "finlab-sessions"
+            ):
                 self.stored = message["value"]
                 return
         raise AssertionError("the server has dropped this page")
@@ -131,7 +137,8 @@ def port_of(app: App) -> int:
 
 @pytest.fixture
 def frozen() -> Iterator[None]:
-    """What other tests left is not searched for circles, as what stands before the app serves is not."""
+    """What other tests left is not searched for circles, as what stands before the app serves is
+    not."""
     gc.collect()
     gc.freeze()
     yield
@@ -139,7 +146,9 @@ def frozen() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("frozen")
-def test_two_hundred_pages_one_after_the_other_and_at_once(app: App, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_hundred_pages_one_after_the_other_and_at_once(
+    app: App, monkeypatch: pytest.MonkeyPatch
+) -> None:
     longest = 0.0
 
     async def beat() -> None:
@@ -229,7 +238,11 @@ def test_every_answer_carries_headers_that_keep_other_sites_out(app: App) -> Non
         answer = connection.getresponse()
         policy = answer.getheader("Content-Security-Policy") or ""
         assert answer.status == status
-        assert "frame-ancestors 'none'" in policy and "object-src 'none'" in policy and "https:" not in policy
+        assert (
+            "frame-ancestors 'none'" in policy
+            and "object-src 'none'" in policy
+            and "https:" not in policy
+        )
         assert answer.getheader("X-Frame-Options") == "DENY"
         assert answer.getheader("X-Content-Type-Options") == "nosniff"
         assert answer.getheader("Referrer-Policy") == "no-referrer"

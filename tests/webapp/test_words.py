@@ -67,7 +67,10 @@ def test_reachable_and_not() -> None:
     assert "N of heave is left undone" in rest_sentence(hard)
     told = {"reachable": False, "scale": np.ones(6), "target": np.array([0.0, 0.0, 5.0, 0, 0, 0])}
     beside: Any = SimpleNamespace(unallocated=np.array([0.0, -2.0, 1.0, 0, 0, 0]), **told)
-    assert rest_sentence(beside) == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
+    assert (
+        rest_sentence(beside)
+        == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
+    )
     beside.unallocated = np.array([0.0, -2.0, -1.0, 0, 0, 0])  # more heave than asked
     assert rest_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
 
@@ -96,7 +99,9 @@ def test_no_verdict_stands_beside_a_new_question() -> None:
     layout = load_layout("ucat")
     answer = Allocator(layout, StandIn).allocate(PRESETS["Turn"])
     state = State(layout, target=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-    shown = corner(state, "", answer, True, None, in_reach=True) + answer_sentence(state, answer, True)
+    shown = corner(state, "", answer, True, None, in_reach=True) + answer_sentence(
+        state, answer, True
+    )
     assert shown.count(WORKING) == 2 and "Exact" not in shown and "undone" not in shown
     assert css(DELIVERED) not in shown
 
@@ -123,7 +128,10 @@ def test_what_is_exact_by_an_uncertain_model_says_so() -> None:
 
 def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
     layout = load_layout("ucat")
-    own = {"fin_model": layout.fins[0].model, "read_networks": classmethod(lambda cls, checkpoint: None)}
+    own = {
+        "fin_model": layout.fins[0].model,
+        "read_networks": classmethod(lambda cls, checkpoint: None),
+    }
     learned = type("Learned", (StandIn, LearnedMethod), own)
     other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
     strange = replace(layout, actuators=(*layout.fins[:2], other, layout.fins[3]))
@@ -206,10 +214,14 @@ def test_fins_in_the_way_are_told() -> None:
 
 
 def test_cards_say_what_a_layout_can_do() -> None:
-    ucat, blind = (replace(load_layout(shipped_layouts()[name]), axes=AXES) for name in ("ucat", "no_yaw"))
+    ucat, blind = (
+        replace(load_layout(shipped_layouts()[name]), axes=AXES) for name in ("ucat", "no_yaw")
+    )
     found = find(Question(ucat, ("front_left",), blind, "forces"))
     assert found.now is not None and found.whole is not None
-    assert found.before is not None and found.before.layout == "no_yaw", "any layout may stand beside"
+    assert found.before is not None and found.before.layout == "no_yaw", (
+        "any layout may stand beside"
+    )
     table = score_table(ucat, found.card, None)
     assert "6 of 6" in table and table.count("without") == 3
     both = score_table(ucat, score_card(ucat), score_card(blind))
@@ -230,7 +242,9 @@ def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
         for path in (Path(finlab.__file__).parent / room).rglob("*.py")
         if path.name != "convert.py"  # which writes files of others
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and option.search(node.value)
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and option.search(node.value)
     ]
     assert any("--flow" in text for text in texts) and any("--frame" in text for text in texts)
     for text in texts:
@@ -254,7 +268,13 @@ def test_every_stop_of_the_tour_stands() -> None:
     session.show_drawer("Improve")
 
     def all_there_is() -> tuple[object, ...]:
-        return session.state, session.display, session.desk, session.selected, session.history.undo_name
+        return (
+            session.state,
+            session.display,
+            session.desk,
+            session.selected,
+            session.history.undo_name,
+        )
 
     before = all_there_is()
     for step in TOUR:
@@ -285,7 +305,9 @@ def test_the_best_mode_is_shown_again_after_a_tour() -> None:
         (150.0, ("sinks with", "push up with", "cannot keep its depth")),
     ],
 )
-def test_whether_the_fins_hold_the_weight_is_said(lift_n: float | None, words: tuple[str, ...]) -> None:
+def test_whether_the_fins_hold_the_weight_is_said(
+    lift_n: float | None, words: tuple[str, ...]
+) -> None:
     ucat = load_layout("ucat")
     assert ucat.body is not None
     layout = replace(ucat, body=replace(ucat.body, buoyancy_n=lift_n))

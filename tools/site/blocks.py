@@ -1,8 +1,9 @@
-"""The code blocks of pages, and the cells of examples: run as notebooks, and shown with their output.
+"""The code blocks of pages, and the cells of examples: run as notebooks, and shown with their
+output.
 
-A block ```python or ```sh is run, after those before it on its page. One whose title begins with "Not run"
-is not, and its title says so to the reader. Another title names a file: a block of any language is written to
-it, and not run.
+A block ```python or ```sh is run, after those before it on its page. One whose title begins with
+"Not run" is not, and its title says so to the reader. Another title names a file: a block of any
+language is written to it, and not run.
 """
 
 import base64
@@ -102,7 +103,8 @@ def with_output(page: str, notebook: Any) -> str:
 
 
 def output(cell: Any) -> str:
-    """What a cell showed, in Markdown: what it printed, and its value as a table, a picture or text."""
+    """What a cell showed, in Markdown: what it printed, and its value as a table, a picture or
+    text."""
     parts = []
     text = ""
     for each in cell.get("outputs", ()):
@@ -110,7 +112,9 @@ def output(cell: Any) -> str:
         if html := data.get("text/html"):
             parts.append(f'<div class="output">{html}</div>')
         elif png := data.get("image/png"):
-            parts.append(f'<img class="output" alt="what it draws" src="data:image/png;base64,{png}">')
+            parts.append(
+                f'<img class="output" alt="what it draws" src="data:image/png;base64,{png}">'
+            )
         elif each.get("name") != "stderr" or cell.source.startswith("%%bash"):
             text += each.get("text") or data.get("text/plain", "") + "\n"
     lines = text.rstrip().splitlines()

@@ -1,4 +1,5 @@
-"""The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of numbers."""
+"""The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of
+numbers."""
 
 import json
 import subprocess
@@ -56,9 +57,18 @@ def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
         "size": float(max(np.abs(layout.position).max(), max(hull.size_m) / 2)),
         "strongest": float(robot.most.max()),
         "actuators": [
-            {"name": name, "position": at.tolist(), "directions": own.tolist(), "numbers": part.NUMBERS}
+            {
+                "name": name,
+                "position": at.tolist(),
+                "directions": own.tolist(),
+                "numbers": part.NUMBERS,
+            }
             for name, at, own, part in zip(
-                layout.names, layout.position, robot.effectiveness[..., :3], layout.actuators, strict=True
+                layout.names,
+                layout.position,
+                robot.effectiveness[..., :3],
+                layout.actuators,
+                strict=True,
             )
         ],
     }
@@ -68,10 +78,16 @@ def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
 def _compiled() -> bytes:
     """The core, whose sines the browser computes: so it needs headers, and no C library."""
     headers = package_files("ziglang") / "lib" / "libc" / "include"
-    words = "cc -std=c99 -O2 -ffp-contract=off -fno-math-errno -mbulk-memory -target wasm32-wasi -nostdlib -s"
+    words = (
+        "cc -std=c99 -O2 -ffp-contract=off -fno-math-errno -mbulk-memory -target wasm32-wasi "
+        "-nostdlib -s"
+    )
     words += " -DFL_MOST=16 -Wl,--no-entry -Wl,--import-symbols"
     core = ROOT / "finlab" / "core"
-    include = [f"-I{core}", *(f"-isystem{headers / name}" for name in ("wasm-wasi-musl", "generic-musl"))]
+    include = [
+        f"-I{core}",
+        *(f"-isystem{headers / name}" for name in ("wasm-wasi-musl", "generic-musl")),
+    ]
     sources = sorted(map(str, (core / "src").glob("*.c")))
     with TemporaryDirectory() as folder:
         made = Path(folder) / "finlab.wasm"

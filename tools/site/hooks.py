@@ -1,4 +1,5 @@
-"""What mkdocs does beside its own work: generated pages, blocks that run, formulas as MathML, checks."""
+"""What mkdocs does beside its own work: generated pages, blocks that run, formulas as MathML,
+checks."""
 
 import html
 import io
@@ -32,13 +33,17 @@ def on_files(files: Files, config: Any) -> Files:
     """Run all blocks and examples, and add the pages that are made of code."""
     examples = sorted((blocks.ROOT / "examples").glob("[0-9]*.py"))
     pages = {f"docs/{file.src_uri}": file.content_string for file in files.documentation_pages()}
-    notebooks = {f"examples/{path.name}": jupytext.read(path, fmt="py:percent") for path in examples}
+    notebooks = {
+        f"examples/{path.name}": jupytext.read(path, fmt="py:percent") for path in examples
+    }
     notebooks |= {name: blocks.notebook_of(page) for name, page in pages.items() if "```" in page}
     _shown.update(blocks.run_all(notebooks))
     made: dict[str, str | bytes] = {**reference.python_pages(), **reference.command_pages()}
     made |= {**reference.format_pages(), **reference.robots_page(), **gallery()}
     picture = io.BytesIO()
-    Image.open(blocks.ROOT / "docs" / "app-jets.png").convert("RGB").save(picture, "webp", quality=82)
+    Image.open(blocks.ROOT / "docs" / "app-jets.png").convert("RGB").save(
+        picture, "webp", quality=82
+    )
     made["app-jets.webp"] = picture.getvalue()  # a quarter of the bytes, for the first page
     font = package_files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf"
     made["math.ttf"] = font.read_bytes()
@@ -63,7 +68,11 @@ def gallery() -> dict[str, str | bytes]:
             words = cell.cell_type == "markdown"
             page += (
                 "\n"
-                + (cell.source if words else f"```python\n{cell.source}\n```\n{blocks.output(cell)}")
+                + (
+                    cell.source
+                    if words
+                    else f"```python\n{cell.source}\n```\n{blocks.output(cell)}"
+                )
                 + "\n"
             )
         title = re.findall(r'^(?:# |""")(.*)', page, re.MULTILINE)[0].rstrip(".")
@@ -89,7 +98,8 @@ def _in_navigation(nav: Any, made: list[str]) -> None:
 
 
 def _by_package(pages: list[str]) -> list[Any]:
-    """The pages of Python names, those of each package in a section of its own, under their short names."""
+    """The pages of Python names, those of each package in a section of its own, under their short
+    names."""
     entries: list[Any] = [f"{PYTHON}index.md"]
     sections: dict[str, list[Any]] = {}
     paths = {Path(page).stem: page for page in pages if page not in entries}
@@ -105,7 +115,8 @@ def _by_package(pages: list[str]) -> list[Any]:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Show what the blocks of a page gave, and give each numbered equation an anchor: #eq-8 of `\\tag{8}`."""
+    """Show what the blocks of a page gave, and give each numbered equation an anchor: #eq-8 of
+    `\\tag{8}`."""
     source = f"docs/{page.file.src_uri}"
     markdown = NUMBERED.sub(r'<a id="eq-\1" class="equation"></a>\n\n\g<0>', markdown)
     return blocks.with_output(markdown, _shown[source]) if source in _shown else markdown
@@ -135,15 +146,21 @@ def on_post_build(config: Any) -> None:
     site = Path(config.site_dir)
     index = site / "search" / "search_index.json"
     found = json.loads(index.read_text())
-    for each in found["docs"]:  # every page loads them: words alone, and of the reference its first ones
+    for each in found[
+        "docs"
+    ]:  # every page loads them: words alone, and of the reference its first ones
         words = " ".join(re.sub(r"<[^<>]*>", " ", each["text"]).split())
         each["text"] = words[:300] if each["location"].startswith("reference/") else words
     index.write_text(json.dumps(found, separators=(",", ":")))
     first = (site / "index.html").read_text()
-    loaded = {name for name in re.findall(r'(?:src|href)="([^"#?]+)"', first) if (site / name).is_file()}
+    loaded = {
+        name for name in re.findall(r'(?:src|href)="([^"#?]+)"', first) if (site / name).is_file()
+    }
     loaded |= {"index.html", "search/search_index.json", *re.findall(r'"search": "([^"]+)"', first)}
     if (weight := sum((site / name).stat().st_size for name in loaded)) > 1_000_000:
-        raise PluginError(f"the first page loads {weight} bytes, more than a megabyte: {sorted(loaded)}")
+        raise PluginError(
+            f"the first page loads {weight} bytes, more than a megabyte: {sorted(loaded)}"
+        )
     for page in site.rglob("*.html"):
         if found := re.search(
             r'<(?:script|link|img)[^>]*(?:src|href)="(?:https?:)?//[^"]*"', page.read_text()

@@ -1,4 +1,5 @@
-"""Pages of reference, made of what the code itself says: names, commands, file formats, shipped robots."""
+"""Pages of reference, made of what the code itself says: names, commands, file formats, shipped
+robots."""
 
 import io
 import json
@@ -41,12 +42,17 @@ def public(module: Any) -> dict[str, Any]:
         r"^ *from finlab\.([\w.]+) import (\w+) as \2$", module.filepath.read_text(), re.MULTILINE
     ):
         found[name] = package()[f"{home}.{name}"]  # a module may have the name of what stands in it
-    return {name: each.final_target if each.is_alias else each for name, each in sorted(found.items())}
+    return {
+        name: each.final_target if each.is_alias else each for name, each in sorted(found.items())
+    }
 
 
 def python_pages() -> Pages:
     """A page for each package that has public names, and one for each name."""
-    packages = [package(), *(each for _, each in sorted(package().modules.items()) if each.is_init_module)]
+    packages = [
+        package(),
+        *(each for _, each in sorted(package().modules.items()) if each.is_init_module),
+    ]
     pages = {}
     index = "# Python\n\n| import from | what is there |\n|---|---|\n"
     home: dict[str, str] = {}
@@ -57,7 +63,8 @@ def python_pages() -> Pages:
         path = module.path
         own = f"reference/python/{module.path}.md"
         pages[own] = (
-            f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | |\n|---|---|\n"
+            f"# {path}\n\n{module.docstring.value if module.docstring else ''}\n\n| name | "
+            "|\n|---|---|\n"
         )
         index += f"| [`{path}`]({path}.md) | {first_line(module)} |\n"
         for name, thing in names.items():
@@ -104,7 +111,9 @@ def format_pages() -> Pages:
     pages = {}
     for name in ("layout", "graph"):
         schema = json.loads((ROOT / f"finlab/layout/{name}.schema.json").read_text())
-        text = f"# The {name} file\n\nMade of its JSON Schema, `finlab/layout/{name}.schema.json`.\n"
+        text = (
+            f"# The {name} file\n\nMade of its JSON Schema, `finlab/layout/{name}.schema.json`.\n"
+        )
         pages[f"reference/formats/{name}-file.md"] = text + "".join(
             f"\n## {part}\n\n{about.get('description', '')}\n\n{HEAD}{_keys(part, about)}"
             for part, about in schema["$defs"].items()
@@ -117,7 +126,9 @@ def _keys(part: str, about: dict[str, Any]) -> str:
     must = about.get("required", [])
     meaning = _meanings(part)
     return "".join(
-        row.format(key, " (required)" * (key in must), _value(of), of.get("description") or meaning(key))
+        row.format(
+            key, " (required)" * (key in must), _value(of), of.get("description") or meaning(key)
+        )
         for key, of in about.get("properties", {}).items()
     )
 
@@ -164,7 +175,8 @@ def _value(of: dict[str, Any]) -> str:
 def robots_page() -> Pages:
     """The robots that come along, with their files."""
     text = (
-        "# Robots that come along\n\n`finlab.load_layout(NAME)`, or NAME where a command asks for a layout.\n"
+        "# Robots that come along\n\n`finlab.load_layout(NAME)`, or NAME where a command asks for "
+        "a layout.\n"
     )
     for path in sorted((ROOT / "layouts").glob("*.yaml")):
         source = path.read_text(encoding="utf-8")

@@ -22,7 +22,8 @@ HEADER = Markup(
     "<th title='share of the full thrust'>load</th></tr>"
 )
 BARS_HEADER = Markup(
-    "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right given'>delivered</b>"
+    "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right "
+    "given'>delivered</b>"
     "<b class='right missing'>missing</b>"
 )
 MIDDLE = "<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"
@@ -35,17 +36,21 @@ PLAIN_HEADER = Markup(
 
 def bars_of(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
     """The bars of an answer; one to an earlier question stands beside what was asked then."""
-    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    demanded = (
+        shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    )
     return wrench_bars(demanded, None if shown is None else shown.wrench)
 
 
 def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
-    """The bars of all six axes: wrenches (6,) [N, N m], demanded (NaN where free) and got, if anything."""
+    """The bars of all six axes: wrenches (6,) [N, N m], demanded (NaN where free) and got, if
+    anything."""
     demanded = np.asarray(demanded, dtype=float)
     got = None if got is None else np.asarray(got, dtype=float)
     wanted = np.nan_to_num(demanded)
     values = np.array([wanted, wanted if got is None else got])
-    # One scale for the forces and one for the torques, so that bars compare; it moves in coarse steps only.
+    # One scale for the forces and one for the torques, so that bars compare; it moves in coarse
+    # steps only.
     scales = [
         max(nice_limit(np.abs(values[:, part]).max()), least)
         for part, least in ((slice(0, 3), 2), (slice(3, 6), 0.5))
@@ -77,7 +82,8 @@ def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> 
     if wish is not None and got is not None and abs(wish - got) > 0.02 * scale:
         bars.append((got, wish, 8, "missing"))
     parts = [
-        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span><div class='track'>{MIDDLE}"
+        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span><div "
+        f"class='track'>{MIDDLE}"
     ]
     for start, end, top, word in bars:
         low, high = sorted((min(max(start / scale, -1.0), 1.0), min(max(end / scale, -1.0), 1.0)))
@@ -97,7 +103,10 @@ def swatch(index: int, failed: bool = False) -> str:
     """The fin's number on its colour."""
     color = DEAD if failed else fin_color(index)
     return html(
-        "<span class='swatch' style='background:{};color:{}'>{}</span>", css(color), ink(color), index + 1
+        "<span class='swatch' style='background:{};color:{}'>{}</span>",
+        css(color),
+        ink(color),
+        index + 1,
     )
 
 
@@ -111,7 +120,9 @@ def fin_table(
     for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
-        first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
+        first = html(
+            "{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name
+        )
         remark = damage_words(damage, fin.name, fin.TURNS) if is_damaged and not failed else ""
         if remark:
             first += html("<div class='missing damage'>{}</div>", remark)
@@ -146,7 +157,8 @@ def _cells(
         return html("{}{}<td>{}</td>", words, cell, meter)
     first, second = np.where(limits, "full", "").tolist()
     angles = (
-        f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td class='{second}'>{frequency:.2f}</td>"
+        f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td "
+        f"class='{second}'>{frequency:.2f}</td>"
     )
     return Markup(f"{angles}<td>{_degrees(direction)}</td><td>{force:.2f}</td><td>{meter}</td>")
 

@@ -1,4 +1,5 @@
-"""The modes of an answer as numbered rings that can be picked, and what led to them: effort against error."""
+"""The modes of an answer as numbered rings that can be picked, and what led to them: effort against
+error."""
 
 import math
 from functools import cache
@@ -16,8 +17,8 @@ from webapp.theme import DEAD, MODE_COLORS, css
 LEFT = 54
 """Where the axis that goes up stands [px]."""
 FAR = 2.0
-"""Samples that cost more than the answer, and so many times the dearest other mode, are counted, not drawn:
-modes keep apart."""
+"""Samples that cost more than the answer, and so many times the dearest other mode, are counted,
+not drawn: modes keep apart."""
 LEGEND = (("sample", 0), ("refined", 76), ("on the robot", 154))
 """Words and places of what is drawn."""
 DOT, RING = 3.0, 5.5
@@ -33,8 +34,9 @@ TRAIL = (0, 1, 2, 3, 4, 6, 8, 12, 20)
 
 
 def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
-    """Effort, which the network's proposals keep least, against the error: samples, after so many steps of
-    refinement (None: all), are small dots with lines to where they end, modes are rings; `height` in px."""
+    """Effort, which the network's proposals keep least, against the error: samples, after so many
+    steps of refinement (None: all), are small dots with lines to where they end, modes are rings;
+    `height` in px."""
     if not modes.shown or not modes.ways:
         return ""
     error = np.array([named.mode.err_norm for named in modes.shown])
@@ -49,7 +51,9 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     if not np.isfinite(points).all():
         return ""
     plot = Plot(cost_axis("effort", points[:, 0]), error_axis(points[:, 1]), height, LEFT)
-    ends = [end for end, kept in zip(modes.ends or [-1] * len(near), near.tolist(), strict=True) if kept]
+    ends = [
+        end for end, kept in zip(modes.ends or [-1] * len(near), near.tolist(), strict=True) if kept
+    ]
     places = np.stack(plot.place(drawn[..., 0], drawn[..., 1]), axis=-1)
     parts = [
         _legend(),
@@ -59,7 +63,9 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     if step is not None:
         parts.append(_dots("moving", places[step], ends, 1.0, places[max(step - 1, 0)]))
     if beyond := int((~near).sum()):
-        parts.append(html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond))
+        parts.append(
+            html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond)
+        )
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
     parts += _rings(rings, shown)
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
@@ -68,7 +74,8 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
 def _rings(places: list[Point], shown: int) -> list[str]:
     """A ring where each mode lies, filled where it is on the robot, with its number above it."""
     ring = (
-        "<g class='pick' {}><circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' fill='{}'/>"
+        "<g class='pick' {}><circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' "
+        "fill='{}'/>"
         "<text x='{:.1f}' y='{:.1f}' class='digit' text-anchor='middle'>{}</text></g>"
     )
     parts = []
@@ -78,7 +85,9 @@ def _rings(places: list[Point], shown: int) -> list[str]:
         fill = color if k == shown else "transparent"
         under = [place for place in places[:k] if math.dist((x, y), place) < RING]
         radius = RING + APART * len(under)
-        parts.append(html(ring, press("mode", str(k)), x, y, radius, color, fill, u, v + 3.8, k + 1))
+        parts.append(
+            html(ring, press("mode", str(k)), x, y, radius, color, fill, u, v + 3.8, k + 1)
+        )
     return parts
 
 

@@ -1,4 +1,5 @@
-"""Outcomes in a few words and figures: how a swim goes, and what a fit is worth, the verdict first."""
+"""Outcomes in a few words and figures: how a swim goes, and what a fit is worth, the verdict
+first."""
 
 from markupsafe import Markup
 
@@ -21,18 +22,25 @@ def pace_words(swimming: Swimming) -> str:
     speed = swimming.pace.speed
     if rate is None or rate > 0.9 * speed:
         return f"running at {speed:.2g}×"
-    return html("<span class='missing'>{:.1f}× of {:g}×, as fast as this machine can</span>", rate, speed)
+    return html(
+        "<span class='missing'>{:.1f}× of {:g}×, as fast as this machine can</span>", rate, speed
+    )
 
 
 def findings_words(shown: Moment) -> list[str]:
     """Which unannounced losses the monitor has detected, and which it has not."""
     sentences = [
-        f"The monitor found {name} lost {seconds:.1f} s after it broke." for name, seconds in shown.found
+        f"The monitor found {name} lost {seconds:.1f} s after it broke."
+        for name, seconds in shown.found
     ]
     for name in shown.lost:
         if name not in shown.failed:
             known = name in shown.doubted
-            rest = "the monitor takes it for torn or stuck" if known else "the allocator does not know yet"
+            rest = (
+                "the monitor takes it for torn or stuck"
+                if known
+                else "the allocator does not know yet"
+            )
             sentences.append(html("<span class='missing'>{} is lost, and {}.</span>", name, rest))
     sentences += [
         html("<span class='missing'>The monitor takes {} for torn or stuck.</span>", name)
@@ -48,7 +56,8 @@ def findings_words(shown: Moment) -> list[str]:
 
 
 def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> str:
-    """Distance from where the robot should be, depth error, power and energy so far, and what was found."""
+    """Distance from where the robot should be, depth error, power and energy so far, and what was
+    found."""
     if not swims:
         return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:
@@ -80,7 +89,9 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
             "to drift off.</div>",
             fins,
         )
-    return warning + Markup().join(html("<div>{}</div>", sentence) for sentence in findings_words(shown))
+    return warning + Markup().join(
+        html("<div>{}</div>", sentence) for sentence in findings_words(shown)
+    )
 
 
 MOST_NAMED = 8
@@ -93,7 +104,11 @@ def fit_card(result: Fitted) -> str:
     name = result.upload.name
     fit = result.fit
     if fit is None:
-        said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, result.upload.part.name)
+        said = html(
+            "<b>{} is a finished table.</b> It is on {} as it stands.",
+            name,
+            result.upload.part.name,
+        )
         return html("<div class='fl said'>{}</div>", said)
     if isinstance(fit, ThrusterFit):
         return html(
@@ -115,9 +130,14 @@ def fit_card(result: Fitted) -> str:
     count = len(fit.outliers)
     if count:
         named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if count > MOST_NAMED else "")
-        left = f"{count} {'sample contradicts' if count == 1 else 'samples contradict'} the others: {named}."
+        left = (
+            f"{count} {'sample contradicts' if count == 1 else 'samples contradict'} the others: "
+            f"{named}."
+        )
     parts.append(html("<div class='said'>{}</div>", left))
-    parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]
+    parts += [
+        html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes
+    ]
     return html("<div class='fl'>{}</div>", parts)
 
 

@@ -36,8 +36,8 @@ class Axis(NamedTuple):
 
 
 def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
-    """An axis that shows all of some values (N,), in the unit that `word` names, with round ticks, `most` at
-    most."""
+    """An axis that shows all of some values (N,), in the unit that `word` names, with round ticks,
+    `most` at most."""
     low = float(values.min())
     high = float(values.max())
     margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
@@ -46,7 +46,12 @@ def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
     decade = 10.0 ** math.floor(math.log10((high - low) / most))
     step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= most)
     places = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return Axis(word, low, high, tuple((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")) for k in places))
+    return Axis(
+        word,
+        low,
+        high,
+        tuple((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")) for k in places),
+    )
 
 
 def error_axis(logs: Array) -> Axis:
@@ -57,7 +62,9 @@ def error_axis(logs: Array) -> Axis:
     for power in range(low, high + 1, max(1, round((high - low) / 5))):
         below = "≤" if 10.0**power <= EXACT else ""
         raised = str(power).replace("-", "−")
-        ticks.append((float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised)))
+        ticks.append(
+            (float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised))
+        )
     margin = 0.06 * (high - low)
     return Axis("error", low - margin, high + margin, tuple(ticks))
 
@@ -96,7 +103,10 @@ class Plot(NamedTuple):
 
     def key(self, right: int, color: Rgb, words: str) -> str:
         """What a colour means, above the plot, so far [px] from the axis that goes up."""
-        sign = "<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/><text x='{}' y='14'>{}</text>"
+        sign = (
+            "<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/><text x='{}' "
+            "y='14'>{}</text>"
+        )
         return html(sign, self.left + right, css(color), self.left + right + 19, words)
 
     def grid(self, upright: bool) -> str:
@@ -119,8 +129,12 @@ class Plot(NamedTuple):
             parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
         middle = (left + self.width) / 2
         word = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
-        turned = f"<text transform='translate(10 {(TOP + floor) / 2}) rotate(-90)' text-anchor='middle'>"
-        words = html(word + turned + "{}</text>", middle, self.height - 5, self.across.word, self.up.word)
+        turned = (
+            f"<text transform='translate(10 {(TOP + floor) / 2}) rotate(-90)' text-anchor='middle'>"
+        )
+        words = html(
+            word + turned + "{}</text>", middle, self.height - 5, self.across.word, self.up.word
+        )
         return Markup("".join(parts)) + words
 
     def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
@@ -138,7 +152,9 @@ def positive(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
 def exact_axis(word: str, values: Array) -> Axis:
     """An axis from the first of some values (N,) to the last."""
     axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
-    return axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
+    return axis._replace(
+        ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high)
+    )
 
 
 NARROW, LOW, INDENT = 250, 128, 46
@@ -154,16 +170,20 @@ def over_time(
     words: Sequence[str] = (),
     moment: float | None = None,
 ) -> str:
-    """Curves (T,), in the unit of `up`, over the same times (T,) [s], of as many colours, the first of which
-    have words; with an upright line at a moment [s]."""
+    """Curves (T,), in the unit of `up`, over the same times (T,) [s], of as many colours, the first
+    of which have words; with an upright line at a moment [s]."""
     drawing = Plot(across, up._replace(word=""), LOW, INDENT, NARROW)
     parts = [html("<text x='2' y='14'>{}</text>", up.word)]
-    parts += [drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)]
+    parts += [
+        drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)
+    ]
     parts += [
         drawing.key(34 + 68 * k, color, word)
         for k, (word, color) in enumerate(zip(words, colors, strict=False))
     ]
     if moment is not None:
         at = drawing.place(moment, 0.0)[0]
-        parts.append(html("<path d='M{:.1f} {}V{}' stroke='currentColor'/>", at, TOP, drawing.floor))
+        parts.append(
+            html("<path d='M{:.1f} {}V{}' stroke='currentColor'/>", at, TOP, drawing.floor)
+        )
     return drawing.drawn(parts)

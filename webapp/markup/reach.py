@@ -11,7 +11,8 @@ CLOSE = 0.28
 
 
 def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:
-    """Value and text at both ends of a range on a slider `width` long, or one for both where they meet."""
+    """Value and text at both ends of a range on a slider `width` long, or one for both where they
+    meet."""
     if not np.isfinite(low):
         return ()
     fine = 1 if width >= 2.0 else 2 if width >= 0.2 else 3

@@ -17,7 +17,9 @@ from webapp.session.state import AXIS_UNITS
 
 FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
     "weakest direction [N]": lambda card: card.authority.weakest,
-    "weakest after the worst loss [N]": lambda card: card.worst_loss.weakest if card.worst_loss else None,
+    "weakest after the worst loss [N]": lambda card: (
+        card.worst_loss.weakest if card.worst_loss else None
+    ),
 }
 """Words -> figure of a whole robot; None where it has none, as the worst loss of a single fin."""
 
@@ -41,7 +43,8 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
         text += html(" <span class='missing'>It cannot {}.</span>", listed(a.without_authority))
     if a.coupled:
         text += html(
-            " <span class='missing'>{} only together with others.</span>", listed(a.coupled).capitalize()
+            " <span class='missing'>{} only together with others.</span>",
+            listed(a.coupled).capitalize(),
         )
     return text
 
@@ -57,7 +60,9 @@ def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
         head = html("<tr><th></th><th>before</th><th>now</th><th></th></tr>{}", ranks)
     known = [one for one in (before, card) if one is not None]
     rows = [_figure(words, [of(one) for one in known]) for words, of in FIGURES.items()]
-    return html("<div class='said'>{}</div><table>{}{}</table>", rank_sentence(card.authority), head, rows)
+    return html(
+        "<div class='said'>{}</div><table>{}{}</table>", rank_sentence(card.authority), head, rows
+    )
 
 
 def _figure(words: str, values: list[float | None]) -> str:
@@ -115,24 +120,31 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
     for loss in card.losses:
         cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
         name = html("without {}{}", swatch(layout.index(loss.actuator)), loss.actuator)
-        rows.append(row(name, f"{three_digits(loss.weakest)} N", html("<div class='words'>{}</div>", cost)))
+        rows.append(
+            row(name, f"{three_digits(loss.weakest)} N", html("<div class='words'>{}</div>", cost))
+        )
     return html("<table><tr><th>one lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
 
 
 def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:
-    """What there is to watch while a layout is edited: axes, what single failures cost, fins in the way."""
+    """What there is to watch while a layout is edited: axes, what single failures cost, fins in the
+    way."""
     texts = Markup().join(html("<div class='missing'>{}</div>", text) for text in warnings)
     costs = "No single failure costs an axis." if several else ""
     if quick.lost:
         lost = "; ".join(f"{name}: {', '.join(axes)}" for name, axes in quick.lost)
         costs = html("<span class='missing'>A failure costs axes: {}.</span>", lost)
     return html(
-        "<div class='fl check'>{}<div class='said'>{} {}</div></div>", texts, rank_sentence(quick), costs
+        "<div class='fl check'>{}<div class='said'>{} {}</div></div>",
+        texts,
+        rank_sentence(quick),
+        costs,
     )
 
 
 def warnings(layout: Layout) -> tuple[str, ...]:
-    """Sentences about fins that cannot beat where they stand; cheap enough for every step of a drag."""
+    """Sentences about fins that cannot beat where they stand; cheap enough for every step of a
+    drag."""
     hull = hull_of(layout)
     sentences = []
     for a, b in combinations(layout.fins, 2):

@@ -15,9 +15,11 @@ from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
 WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
 SPOKEN = 0.05
-"""Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
+"""Share of the largest miss, each axis over its scale, from which another axis is spoken of,
+too."""
 FAR = 9.0
-"""Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a table."""
+"""Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a
+table."""
 PROVED = 1e-4
 """Share of its watts that an answer may lie above the bound and count as proved least."""
 LEAST_WATTS = 1e-3
@@ -47,7 +49,8 @@ COLORS: dict[Verdict, Rgb] = {
 
 
 def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
-    """What an answer is worth; `in_reach` where any command of the working fins gives what is asked."""
+    """What an answer is worth; `in_reach` where any command of the working fins gives what is
+    asked."""
     if allocation.unknown_fins:
         return Verdict.UNLEARNED  # whatever it gives, it gives by chance
     if allocation.reachable:
@@ -56,8 +59,8 @@ def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
 
 
 def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
-    """The verdict, and what else could be done, or which policy chose the answer; the answer's sentence says
-    what is missing."""
+    """The verdict, and what else could be done, or which policy chose the answer; the answer's
+    sentence says what is missing."""
     verdict = verdict_of(allocation, in_reach)
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
@@ -80,7 +83,9 @@ def rest_sentence(allocation: Allocation) -> str:
     less = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] > 0.0]
     more = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] <= 0.0]
     parts = [f"{listed(less)} {'is' if len(less) == 1 else 'are'} left undone"] if less else []
-    parts += [f"{listed(more)} {'comes' if len(more) == 1 else 'come'} along unasked"] if more else []
+    parts += (
+        [f"{listed(more)} {'comes' if len(more) == 1 else 'come'} along unasked"] if more else []
+    )
     return f"{'; '.join(parts)}."
 
 
@@ -94,7 +99,8 @@ def is_proved(allocation: Allocation) -> bool:
 
 
 def bound_sentence(allocation: Allocation) -> str:
-    """How far an answer may be from the least watts, by the bound that its method proves; else nothing."""
+    """How far an answer may be from the least watts, by the bound that its method proves; else
+    nothing."""
     if allocation.bound is None:
         return ""
     gap = _gap(allocation, allocation.bound)
@@ -109,8 +115,8 @@ def bound_sentence(allocation: Allocation) -> str:
 def answer_sentence(
     state: State, allocation: Allocation | None, busy: bool, searching: bool = False
 ) -> Markup:
-    """What is left undone, why, and what the method ignores; while `busy` of an earlier question, and while
-    `searching` without what is proved of it."""
+    """What is left undone, why, and what the method ignores; while `busy` of an earlier question,
+    and while `searching` without what is proved of it."""
     sentences: list[str] = []
     if allocation is not None and not busy:
         if allocation.unknown_fins:
@@ -128,7 +134,9 @@ def answer_sentence(
                 sentences.append(f"{doubt[0].upper()}{doubt[1:]}.")
     elif busy:
         sentences.append(WORKING)
-    blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed, state.flow))
+    blind = authority_sentence(
+        state.layout, state.failed, axis_reach(state.able, state.failed, state.flow)
+    )
     if blind is not None:
         sentences.insert(0, _warning(blind))
     return Markup(" ").join(filter(None, sentences))

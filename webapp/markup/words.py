@@ -1,4 +1,5 @@
-"""Sentences and numbers as people read them: fixed width, a real minus sign, three significant digits."""
+"""Sentences and numbers as people read them: fixed width, a real minus sign, three significant
+digits."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -24,9 +25,10 @@ ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '
 
 
 def html(template: str, *values: object) -> str:
-    """Markup, a text that is marked as such, with values in the place of `{}`, which may have formats, as
-    `str.format` has them. Of several things in one, all stand one after the other."""
-    # Much faster than the format of `Markup`, which looks at each value through a formatter of its own.
+    """Markup, a text that is marked as such, with values in the place of `{}`, which may have
+    formats, as `str.format` has them. Of several things in one, all stand one after the other."""
+    # Much faster than the format of `Markup`, which looks at each value through a formatter of its
+    # own.
     safe: list[Any] = []
     for value in values:
         if type(value) in SAFE:
@@ -45,15 +47,18 @@ def row(*cells: object) -> str:
 
 
 def marker(name: str) -> str:
-    """Invisible element, put right before what a style is about; its holder gets `data-fl` (`habits.js`)."""
+    """Invisible element, put right before what a style is about; its holder gets `data-fl`
+    (`habits.js`)."""
     return html("<i class='{}'></i>", name)
 
 
 def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
-    """A style that paints the buttons of the group behind the marker: background and text colour of each."""
+    """A style that paints the buttons of the group behind the marker: background and text colour of
+    each."""
     rules = [
         html(
-            "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: {}; }}",
+            "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; "
+            "border-color: {}; }}",
             name.removeprefix("fl-"),
             k + 1,
             back,
@@ -85,7 +90,8 @@ CONTROLS = {
 }
 """Words of the command line that reach the page, and what is said there."""
 SMALL = 3e-4
-"""Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
+"""Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no
+more."""
 OWN = "the answer"
 """Source of a mode that is the answer of a method without candidates."""
 MOST_LISTED = 2
@@ -103,7 +109,8 @@ def listed(items: Sequence[str]) -> str:
 
 
 def fins_words(numbers: Sequence[int], layout: Layout | None = None) -> str:
-    """`fin 2`, `fins 1 and 3`: fins, or actuators of a layout with others, by their places from 0 in it."""
+    """`fin 2`, `fins 1 and 3`: fins, or actuators of a layout with others, by their places from 0
+    in it."""
     word = "fin" if layout is None or layout.is_of_fins else "actuator"
     return f"{word}{'s' if len(numbers) > 1 else ''} {listed([str(k + 1) for k in numbers])}"
 
@@ -126,7 +133,8 @@ def degrees(angle: float) -> str:
 
 
 def three_digits(value: float | None) -> str:
-    """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has them."""
+    """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has
+    them."""
     if value is None or not math.isfinite(value):
         return "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e4:
@@ -152,8 +160,8 @@ def source_words(sources: Sequence[str]) -> str:
 
 
 def in_app(text: str) -> str:
-    """A sentence of the library in the words of the page: its own controls in place of options of commands,
-    and the command of an option that it has no control for."""
+    """A sentence of the library in the words of the page: its own controls in place of options of
+    commands, and the command of an option that it has no control for."""
     for option, control in CONTROLS.items():
         text = text.replace(option, control)
     return text
@@ -166,17 +174,23 @@ def missing_part(allocation: Allocation) -> Array:
 
 
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
-    """Which fins the method's networks have not learned, so that its commands for them are wrong."""
-    return f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
+    """Which fins the method's networks have not learned, so that its commands for them are
+    wrong."""
+    return (
+        f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
+    )
 
 
 def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
-    """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for none."""
+    """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for
+    none."""
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:
         return None
     without = (
-        f"Without {fins_words([layout.index(name) for name in failed], layout)} this" if failed else "This"
+        f"Without {fins_words([layout.index(name) for name in failed], layout)} this"
+        if failed
+        else "This"
     )
     return f"{without} robot cannot {listed(blind)}."
 
@@ -188,7 +202,8 @@ def righting_sentences(layout: Layout) -> tuple[str, ...]:
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
-    """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if little."""
+    """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if
+    little."""
     vehicle = Vehicle(complete_body(layout))
     over = vehicle.lift - vehicle.weight
     if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
@@ -198,11 +213,15 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
     most = f"{three_digits(float(reach[2]))} N" if reach[2] >= 1e-6 else "nothing"
     if abs(over) < reach[2]:
         return f"{said}; of the {most} that its working fins can push {way}, that is most."
-    return f"{said}, and its working fins can push {way} with {most} at most: it cannot keep its depth."
+    return (
+        f"{said}, and its working fins can push {way} with {most} at most: it cannot keep its "
+        "depth."
+    )
 
 
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
-    """Which of the first two numbers of commands (n, 2) are at their limits, but for free angles."""
+    """Which of the first two numbers of commands (n, 2) are at their limits, but for free
+    angles."""
     layout = allocation.layout
     command = allocation.command[:, :2]
     turns = _turning(layout)[:, :2]
@@ -223,12 +242,14 @@ def parts_word(layout: Layout) -> str:
 
 
 def damage_words(damage: Damage, name: str, turns: bool = True) -> str:
-    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a whole one.
-    `turns` says whether what sticks is an angle, else a force."""
+    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a
+    whole one. `turns` says whether what sticks is an angle, else a force."""
     said: dict[str, Callable[[Any], str]] = {
         "weak": lambda share: f"weak {100 * share:.0f} %",
         "torn": lambda share: f"torn, {100 * share:.0f} % left",
-        "stuck": lambda at: f"stuck at {math.degrees(at):.0f}°" if turns else f"hangs at {at:.3g} N",
+        "stuck": lambda at: (
+            f"stuck at {math.degrees(at):.0f}°" if turns else f"hangs at {at:.3g} N"
+        ),
         "running": lambda command: "runs on",
     }
     known = {} if damage == WHOLE else damage.of(name)

@@ -1,4 +1,5 @@
-"""What a layout says of the selected actuators: place, direction, limits, model. An edit counts for all."""
+"""What a layout says of the selected actuators: place, direction, limits, model. An edit counts for
+all."""
 
 import math
 from collections.abc import Sequence
@@ -60,7 +61,9 @@ def _add_place(page: Page) -> None:
         session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
 
     def aim(degrees: tuple[Any, Any]) -> None:
-        turn, rise = (math.radians(number(end, "direction [°]", -3600.0, 3600.0)) for end in degrees)
+        turn, rise = (
+            math.radians(number(end, "direction [°]", -3600.0, 3600.0)) for end in degrees
+        )
         level = math.cos(rise)
         session.point_selected((level * math.cos(turn), level * math.sin(turn), math.sin(rise)))
 
@@ -69,9 +72,13 @@ def _add_place(page: Page) -> None:
     page.bind_number(place, session.place_selected, of_part(lambda part: part.position))
     about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
     shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about)
-    page.bind_number(shaft, turn, of_part(lambda part: math.degrees(_mounting(part) or 0.0)), digits=2)
+    page.bind_number(
+        shaft, turn, of_part(lambda part: math.degrees(_mounting(part) or 0.0)), digits=2
+    )
     board.show(shaft, visible=of_part(lambda part: _mounting(part) is not None))
-    about = "Force of a thruster, of an azimuth at angle 0, or the shaft out of the hull; any length."
+    about = (
+        "Force of a thruster, of an azimuth at angle 0, or the shaft out of the hull; any length."
+    )
     way = gui.add_vector3("Axis", (1.0, 0.0, 0.0), step=0.05, hint=about)
     page.bind_number(way, session.point_selected, of_part(lambda part: part.direction))
     board.show(way, label=of_part(lambda part: part.AXES[part.POINTED].capitalize()))
@@ -83,7 +90,9 @@ def _add_place(page: Page) -> None:
     page.add_buttons("Snap to", snaps, hint="Ahead, astern, left, right, up, down.")
     about = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
     other = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=about)
-    page.bind_number(other, session.turn_about, of_part(lambda part: part.frame[0 if part.POINTED else 1]))
+    page.bind_number(
+        other, session.turn_about, of_part(lambda part: part.frame[0 if part.POINTED else 1])
+    )
     board.show(
         other,
         label=of_part(lambda part: part.OTHER),
@@ -126,10 +135,14 @@ def _add_box(page: Page, box: Box) -> None:
     def put(value: Any) -> None:
         checked = [number(end, box.label, -1e6, 1e6) for end in (value if pair else (value,))]
         meant = tuple(math.radians(v) if box.degrees else v for v in checked)
-        page.session.set_value(box.key, meant if pair else None if box.free and not meant[0] else meant[0])
+        page.session.set_value(
+            box.key, meant if pair else None if box.free and not meant[0] else meant[0]
+        )
 
     add: Any = page.gui.add_vector2 if pair else page.gui.add_number
-    handle = add(box.label, (0.0, 0.0) if pair else box.usual, step=box.step, hint=box.hint, visible=False)
+    handle = add(
+        box.label, (0.0, 0.0) if pair else box.usual, step=box.step, hint=box.hint, visible=False
+    )
     digits = 2 if box.degrees else 4 if pair else 5
     page.bind_number(handle, put, of_part(lambda part: _value(part, box)), digits)
     page.board.show(handle, visible=of_part(lambda part: _has(part, box)))

@@ -56,19 +56,24 @@ def add_actuator_list(page: Page) -> None:
         return tuple(word for word in edits if word != ("Mirror" if paired else "Unlink"))
 
     page.board.show(buttons, options=there)
-    axis = page.gui.add_dropdown("Around", tuple(AXES), hint="The axis for copies of the selected one.")
+    axis = page.gui.add_dropdown(
+        "Around", tuple(AXES), hint="The axis for copies of the selected one."
+    )
 
     def ring(count: int) -> None:
         session.ring(count, AXES[axis.value])
 
-    about = "Copies of the selected one, so that so many stand evenly around the axis, turned along."
+    about = (
+        "Copies of the selected one, so that so many stand evenly around the axis, turned along."
+    )
     rings = page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=about)
     for handle in (buttons, axis, rings):
         page.board.show(handle, visible=lambda selected: selected is not None)
 
 
 def actuator_list(state: State, selection: tuple[str, ...]) -> str:
-    """All actuators with their places and directions; `selection` has the names of the selected ones."""
+    """All actuators with their places and directions; `selection` has the names of the selected
+    ones."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
     names = state.layout.names
     kinds = sorted({part.type for part in state.layout.actuators})
@@ -81,13 +86,17 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     )
     return html(
         "<div class='fl fin-list'><table><tr><th>{}</th>{}<th class='place' title='{}'>points</th>"
-        "</tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. <span class='place'>"
+        "</tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. <span "
+        "class='place'>"
         "x, y, z in m, points in °.</span></div></div>",
         kinds[0] if len(kinds) == 1 else "",
         heads,
         POINTS,
         robot,
-        [_rows(state, index, name in selection, len(kinds) > 1) for index, name in enumerate(names)],
+        [
+            _rows(state, index, name in selection, len(kinds) > 1)
+            for index, name in enumerate(names)
+        ],
     )
 
 
@@ -100,7 +109,8 @@ def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
     places = [_minus(f"{value:.3f}") for value in part.position]
     twin = partner(state.links, part.name)
     return html(
-        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name {}' title='{}'>{}</span>{}</td>{}</tr>",
+        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name {}' "
+        "title='{}'>{}</span>{}</td>{}</tr>",
         html("<tr><th colspan='5'>{}</th></tr>", part.type) if head else "",
         "chosen" if chosen else "",
         part.name,

@@ -1,4 +1,5 @@
-"""What the selected actuators are known by: a formula with its numbers, or a table of measurements."""
+"""What the selected actuators are known by: a formula with its numbers, or a table of
+measurements."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -78,13 +79,18 @@ def add_fit(page: Page) -> None:
 
     def upload(name: str, content: bytes) -> None:
         if session.selected is None:
-            raise FinlabError("no actuator is selected; click the one that was measured, or its row")
+            raise FinlabError(
+                "no actuator is selected; click the one that was measured, or its row"
+            )
         fitting.start(session.selected, name, content)
         session.show_task("Design")
 
     page.add_html(of_part(drawn_curves))
     page.opening.add(CSV, upload)
-    about = "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and power."
+    about = (
+        "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and "
+        "power."
+    )
     with gui.add_folder(None) as full:  # viser cannot hide a button for files
         button = page.add_upload(
             "Fit from measurements (CSV)",
@@ -111,7 +117,9 @@ def _written(fitted: Fitted | None, fitting: str | None, fitted_error: str | Non
     if fitting is not None:
         return html("<div class='fl dim'>{} …</div>", fitting)
     if fitted_error is not None:
-        return html("<div class='fl'><div class='said missing'>{}</div></div>", in_app(fitted_error))
+        return html(
+            "<div class='fl'><div class='said missing'>{}</div></div>", in_app(fitted_error)
+        )
     if fitted is None:
         return ""
     from webapp.markup.outcomes import fit_card  # scipy comes with it
@@ -144,7 +152,11 @@ def _table_words(fin: Fin, doubts: bool) -> str:
     covers = f"A {degrees(low_a)}° to {degrees(high_a)}°, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
     power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
-    said = "" if doubt is None or not doubts else html("<div class='missing'>This fin is {}.</div>", doubt)
+    said = (
+        ""
+        if doubt is None or not doubts
+        else html("<div class='missing'>This fin is {}.</div>", doubt)
+    )
     if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
         most_a = fin.limits.amplitude[1]
         most_f = fin.limits.frequency[1]
@@ -170,25 +182,30 @@ class Curves(NamedTuple):
 
 
 def drawn_curves(part: Actuator) -> str:
-    """Plots of one actuator; nothing where its table cannot be read, which is reported elsewhere."""
+    """Plots of one actuator; nothing where its table cannot be read, which is reported
+    elsewhere."""
     try:
         result = curves(part)
     except DataError:
         return ""
     plots = []
     for across, x, up, lines in result:
-        plot = Plot(exact_axis(across, x), positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
+        plot = Plot(
+            exact_axis(across, x), positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT
+        )
         parts = [plot.curve(x, y, color) for (_, y), color in zip(lines, COLORS, strict=False)]
         named = zip(lines, COLORS, strict=False)
-        parts += [plot.key(104 * k, color, word) for k, ((word, _), color) in enumerate(named) if word]
+        parts += [
+            plot.key(104 * k, color, word) for k, ((word, _), color) in enumerate(named) if word
+        ]
         plots.append(plot.drawn(parts))
     return html("<div class='fl'>{}</div>", plots)
 
 
 @lru_cache(maxsize=64)
 def curves(part: Actuator) -> Sequence[Curves]:
-    """Force and power of an actuator over its command: of a fin for three amplitudes, of a rudder for water
-    from ahead at 1 m/s. Raises DataError: its table cannot be read."""
+    """Force and power of an actuator over its command: of a fin for three amplitudes, of a rudder
+    for water from ahead at 1 m/s. Raises DataError: its table cannot be read."""
     plant = plant_of(Layout("one", (part,)))
     if isinstance(part, Fin):
         across = np.linspace(*part.limits.frequency, POINTS)
@@ -200,7 +217,10 @@ def curves(part: Actuator) -> Sequence[Curves]:
         force = np.linalg.norm(plant.force(command)[..., 0, :], axis=-1)
         names = [f"A {degrees(size)}°" for size in amplitude]
         kinds = (("mean force [N]", force), ("power [W]", plant.power(command)[..., 0]))
-        return [Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True))) for up, y in kinds]
+        return [
+            Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True)))
+            for up, y in kinds
+        ]
     if part.BY_FLOW:
         across = np.linspace(part.lower[0], part.upper[0], POINTS)
         command = np.zeros((POINTS, 1, 3))

@@ -1,4 +1,5 @@
-"""What a layout says of the robot as a whole: its name, what it is, its mass, damping and buoyancy."""
+"""What a layout says of the robot as a whole: its name, what it is, its mass, damping and
+buoyancy."""
 
 from collections.abc import Callable
 from functools import partial
@@ -23,7 +24,9 @@ NUMBERS = {
     "buoyancy_n": ("Buoyancy [N]", 1.0, "As much as the robot weighs where nothing is said."),
 }
 PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
-    "inertia_kgm2": (("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),),
+    "inertia_kgm2": (
+        ("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),
+    ),
     "added_mass": (
         ("Added mass [kg]", 0, "Along x, y, z. From the hull: its ellipsoid after Lamb, art. 114."),
         ("turning [kg m²]", 3, "About x, y, z. From the hull: its ellipsoid after Lamb, art. 115."),
@@ -33,14 +36,23 @@ PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
         ("turning [N m s]", 3, "About x, y, z. From the hull: by the same friction."),
     ),
     "quadratic_damping": (
-        ("Drag ∝ v² [N s²/m²]", 0, "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies."),
-        ("turning [N m s²]", 3, "About x, y, z. From the hull: strips in cross-flow but for the round core."),
+        (
+            "Drag ∝ v² [N s²/m²]",
+            0,
+            "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies.",
+        ),
+        (
+            "turning [N m s²]",
+            3,
+            "About x, y, z. From the hull: strips in cross-flow but for the round core.",
+        ),
     ),
     "center_of_buoyancy_m": (
         ("Buoyancy at [m]", 0, "Its centre, from that of gravity; above it, it rights the robot."),
     ),
 }
-"""Fields of `Body` with several numbers: their rows of three, the first number of each, what they are."""
+"""Fields of `Body` with several numbers: their rows of three, the first number of each, what they
+are."""
 
 
 def add_body(page: Page) -> None:
@@ -57,11 +69,16 @@ def add_body(page: Page) -> None:
         session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in full))
 
     def forget() -> None:
-        text = "Nothing is said of mass, inertia, damping and buoyancy from then on; undo brings it back."
+        text = (
+            "Nothing is said of mass, inertia, damping and buoyancy from then on; undo brings it "
+            "back."
+        )
         page.ask("Forget the body?", text, {"Forget": session.forget_dynamics})
 
     def one(key: str) -> Callable[[Layout], float]:
-        return lambda layout: nan if getattr(_body(layout), key) is None else getattr(_body(layout), key)
+        return lambda layout: (
+            nan if getattr(_body(layout), key) is None else getattr(_body(layout), key)
+        )
 
     def three(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
         return lambda layout: _whole(_body(layout), key)[first : first + 3]
@@ -72,7 +89,9 @@ def add_body(page: Page) -> None:
     page.bind(text, session.describe_robot, lambda layout: layout.description)
     acts = {"Estimate": session.estimate, "Forget": forget}
     page.add_buttons(
-        "From the hull", acts, hint="Of the bare hull: fins, wires and ports come on top; each box says how."
+        "From the hull",
+        acts,
+        hint="Of the bare hull: fins, wires and ports come on top; each box says how.",
     )
     for key, (label, step, hint) in NUMBERS.items():
         box = gui.add_number(label, 0.0, step=step, hint=hint)
@@ -106,7 +125,8 @@ def _facts(layout: Layout) -> str:
             lines[0] += f"{said}: {reason}, or estimate anew."
         rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
         lines.append(
-            f"By mass and buoyancy below it {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
+            "By mass and buoyancy below it "
+            f"{'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
         )
     missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
     if missing:

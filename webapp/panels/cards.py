@@ -38,31 +38,41 @@ def card(written: Callable[..., str]) -> Callable[[Page], object]:
 def robot_name(layout: Layout, saved: Layout) -> str:
     """The robot's name, and whether it has been changed since it was opened or saved."""
     changed = "" if layout == saved else Markup("<span class='dim'>edited</span>")
-    return html("<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>", layout.name, layout.name, changed)
+    return html(
+        "<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>", layout.name, layout.name, changed
+    )
 
 
 def tasks(task: str) -> str:
     """What is being done: one of four tasks."""
-    buttons = [button(name, "task", name, Markup("aria-current=page") * (name == task)) for name in TASKS]
+    buttons = [
+        button(name, "task", name, Markup("aria-current=page") * (name == task)) for name in TASKS
+    ]
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
 
 
 def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
-    """What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
+    """What can be said of a layout at once: its axes, what a failure costs, what looks like a
+    mistake."""
     remarks = (*warnings(layout), *righting_sentences(layout))
     return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, remarks)
 
 
 def camera() -> str:
     """Sides to look from, and framing."""
-    looks = [button(name, "look", name, html("title='{}'", key)) for key, name in enumerate(CAMERAS, 1)]
-    looks.append(button("Frame", "frame", "", Markup("title='what is selected fills the view (F)'")))
+    looks = [
+        button(name, "look", name, html("title='{}'", key)) for key, name in enumerate(CAMERAS, 1)
+    ]
+    looks.append(
+        button("Frame", "frame", "", Markup("title='what is selected fills the view (F)'"))
+    )
     looks.append(button("Picture", "picture", "", Markup("title='save the view as it is (PNG)'")))
     return html("<div class='fl fl-camera'>{}</div>", looks)
 
 
 def guide_card(stop: Stop | None, solved: bool) -> str:
-    """Title and text, and an exercise with praise once that is done; nothing outside of tour and lessons."""
+    """Title and text, and an exercise with praise once that is done; nothing outside of tour and
+    lessons."""
     if stop is None:
         return ""
     course = TOUR if stop in TOUR else LESSONS
@@ -90,7 +100,11 @@ def add_switches(page: Page) -> None:
     """All of them."""
     for key, (label, hint) in SWITCHES.items():
         box = page.gui.add_checkbox(label, False, hint=hint)
-        page.bind(box, partial(page.session.set_display, key), lambda display, key=key: getattr(display, key))
+        page.bind(
+            box,
+            partial(page.session.set_display, key),
+            lambda display, key=key: getattr(display, key),
+        )
 
 
 DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))
@@ -140,7 +154,9 @@ def add_history(page: Page) -> None:
     add_html(page.gui, marker("fl-history"))
     back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
     page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
-    forth = page.add_button("Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z")
+    forth = page.add_button(
+        "Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z"
+    )
     page.board.show(forth, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
 
 
@@ -148,14 +164,20 @@ def add_answering(page: Page) -> None:
     """Who answers, what is kept least, and where help is found."""
     session = page.session
     gui = page.gui
-    about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
-    least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
+    about = (
+        "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
+    )
+    least = page.bind(
+        gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of
+    )
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
     add_html(gui, marker("fl-method"))
     methods = gui.add_dropdown("Method", tuple(METHODS))
     page.board.show(methods, options=_options)
     named = {_option(name): name for name in METHODS}
-    page.bind(methods, lambda option: session.set_setting("method", named.get(option, option)), _option)
+    page.bind(
+        methods, lambda option: session.set_setting("method", named.get(option, option)), _option
+    )
     add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
 
 
@@ -169,12 +191,18 @@ def _option(method: str) -> str:
 
 def _menu(course: tuple[Stop, ...]) -> str:
     """A button that opens a list of the lessons, or of the tour's stops."""
-    said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", f"The app in {len(TOUR)} stops")}
+    said = {
+        LESSONS: ("Lessons", "Each has a task"),
+        TOUR: ("Tour", f"The app in {len(TOUR)} stops"),
+    }
     word, about = said[course]
     hide = html("popovertarget='fl-{}' popovertargetaction='hide'", word)
-    items = [button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)]
+    items = [
+        button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)
+    ]
     menu = (
-        "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl fl-menu'><b>{}</b>"
+        "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl "
+        "fl-menu'><b>{}</b>"
         "<p>{}. Your own work comes back when you close them.</p>{}</div>"
     )
     return html(menu, word, word, word, word, about, items)

@@ -1,4 +1,5 @@
-"""Which actuators have failed, and what is wrong with the others: a button for each, and sliders."""
+"""Which actuators have failed, and what is wrong with the others: a button for each, and
+sliders."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,7 +22,12 @@ DEGREE = 180.0 / math.pi
 
 
 def add_fin_buttons(
-    page: Page, label: str, hint: str, marker: str, act: Callable[[str], object], row: Callable[..., Row]
+    page: Page,
+    label: str,
+    hint: str,
+    marker: str,
+    act: Callable[[str], object],
+    row: Callable[..., Row],
 ) -> None:
     """A row of numbers, one per actuator, that carry out `act(name)`; `row` is made of facts."""
     names: Sequence[str] = ()
@@ -40,7 +46,9 @@ def add_fin_buttons(
     @wraps(row)
     def options(*facts: object) -> tuple[str, ...]:
         known, failed, _ = row(*facts)
-        return tuple([f"{k + 1} ✕" if name in failed else f"{k + 1}" for k, name in enumerate(known)])
+        return tuple(
+            [f"{k + 1} ✕" if name in failed else f"{k + 1}" for k, name in enumerate(known)]
+        )
 
     def pressed(button: str) -> None:
         numbers = {str(k + 1): name for k, name in enumerate(names)}
@@ -54,7 +62,8 @@ def add_fin_buttons(
 
 
 def add_damage(page: Page) -> None:
-    """What is wrong with the selected actuator, or the first: every fault that its type may have."""
+    """What is wrong with the selected actuator, or the first: every fault that its type may
+    have."""
     session = page.session
     gui = page.gui
     board = page.board
@@ -63,7 +72,8 @@ def add_damage(page: Page) -> None:
         return _part(session.selected, session.state.layout)
 
     def at_now() -> Array:
-        """Where that actuator is [command]: the middle of its limits where nothing is known of it."""
+        """Where that actuator is [command]: the middle of its limits where nothing is known of
+        it."""
         now = page.shown
         own = part()
         index = session.state.layout.index(own.name)
@@ -105,21 +115,35 @@ def add_damage(page: Page) -> None:
         page.bind_number(slider, partial(leave, kind), _of(kind, 1.0, 100.0), digits=1)
         board.show(slider, visible=_may(kind))
     held = {
-        "stuck": ("Stuck", "It no longer turns from where it is; a thruster hangs at its force.", jam),
+        "stuck": (
+            "Stuck",
+            "It no longer turns from where it is; a thruster hangs at its force.",
+            jam,
+        ),
         "running": ("Runs on", "It no longer listens: it keeps the command that it has.", run_on),
     }
     for kind, (label, hint, act) in held.items():
         box = gui.add_checkbox(label, False, hint=hint, visible=False)
         page.bind(box, act, _is(kind))
         board.show(box, visible=_may(kind))
-    angle = gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint="Where it stays.", visible=False)
-    page.bind_number(angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1)
+    angle = gui.add_slider(
+        "Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint="Where it stays.", visible=False
+    )
+    page.bind_number(
+        angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1
+    )
     board.show(angle, visible=_is("stuck", lambda own: own.TURNS))
-    force = gui.add_number("Hangs at [N]", 0.0, step=1.0, hint="The force that it keeps.", visible=False)
+    force = gui.add_number(
+        "Hangs at [N]", 0.0, step=1.0, hint="The force that it keeps.", visible=False
+    )
     page.bind_number(force, lambda at: damage("stuck", at), _of("stuck", 0.0, 1.0), digits=2)
     board.show(force, visible=_is("stuck", lambda own: not own.TURNS))
     kept = gui.add_vector3(
-        "A [°], f [Hz], φ [°]", (0.0, 0.0, 0.0), step=0.5, hint="The command that it keeps.", visible=False
+        "A [°], f [Hz], φ [°]",
+        (0.0, 0.0, 0.0),
+        step=0.5,
+        hint="The command that it keeps.",
+        visible=False,
     )
     page.bind_number(
         kept,

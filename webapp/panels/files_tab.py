@@ -1,4 +1,5 @@
-"""Designs that are shipped, and files that are made of this one: what each is for, and what takes it."""
+"""Designs that are shipped, and files that are made of this one: what each is for, and what takes
+it."""
 
 import math
 import shlex
@@ -9,7 +10,15 @@ from finlab.layout import Layout
 from webapp.handles import add_html
 from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.session.files import BUNDLE, GRAPH, design_name, file_stem, has_files, shipped, shipped_name
+from webapp.session.files import (
+    BUNDLE,
+    GRAPH,
+    design_name,
+    file_stem,
+    has_files,
+    shipped,
+    shipped_name,
+)
 from webapp.session.state import State
 
 
@@ -27,13 +36,18 @@ def add_files(page: Page) -> None:
 
 def _bundle(state: State) -> str:
     file = file_stem(state.layout.name) + BUNDLE
-    about = "for the robot: its actuators' physics, method, README and checksums. Test it there first"
+    about = (
+        "for the robot: its actuators' physics, method, README and checksums. Test it there first"
+    )
     return _about(file, about, shlex.join(["finlab-runtime", "check", file]))
 
 
 def _graph(state: State) -> str:
     file = file_stem(state.layout.name) + GRAPH
-    about = "the graph of actuators that the networks see: nodes, features, edges, for networkx and learners"
+    about = (
+        "the graph of actuators that the networks see: nodes, features, edges, for networkx and "
+        "learners"
+    )
     return _about(file, about, shlex.join(["finlab", "layout", "show", file]))
 
 
@@ -47,7 +61,8 @@ def _design(state: State) -> str:
 
 
 def _about(file: str, about: str, command: str) -> str:
-    """What a file is for, and a line that a click takes to the clipboard, where the browser lets it."""
+    """What a file is for, and a line that a click takes to the clipboard, where the browser lets
+    it."""
     copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return html(
         "<div class='fl'><div class='said copy'><b>{}</b> <span class='dim'>is {}:</span></div>"
@@ -96,9 +111,13 @@ def add_designs(page: Page) -> None:
         if name in shipped():
             page.session.open_layout(shipped()[name])
 
-    layouts = page.gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
+    layouts = page.gui.add_dropdown(
+        "Layout", tuple(shipped()), hint="Shipped layouts to start from."
+    )
     page.board.show(layouts, options=_options)
-    page.bind(layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved))
+    page.bind(
+        layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved)
+    )
     page.add_html(_described)
 
 

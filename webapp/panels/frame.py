@@ -1,8 +1,9 @@
 """The frame: a bar above, a list at the left, an inspector at the right, a drawer below, by task.
 
 Every region is a folder of viser's that a style takes out of its panel and puts into its place
-(`markup/frame.css`); which of them are there, and which sections in them, is one more style element, written
-here. So widgets that were seen once stay mounted, and a change of task is one message.
+(`markup/frame.css`); which of them are there, and which sections in them, is one more style
+element, written here. So widgets that were seen once stay mounted, and a change of task is one
+message.
 """
 
 import json
@@ -30,14 +31,18 @@ if TYPE_CHECKING:
     from finlab.log import Judgement
 
 _VARIABLES = (
-    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; "
+    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: "
+    f"{css(MISSING)}; "
     f"--fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 STYLE = html(
     "<style>{}{}</style>",
     _VARIABLES,
-    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in ("style.css", "frame.css")),
+    (
+        Markup(files("webapp.markup").joinpath(name).read_text("utf-8"))
+        for name in ("style.css", "frame.css")
+    ),
 )
 LOW = ":root { --tall: 92px; }"
 USUAL = ":root {{ --fl-usual: {}px; }}"
@@ -47,8 +52,8 @@ FOLDER = ".mantine-Paper-root[data-fl~={}]"
 
 
 class Section:
-    """A panel in its place, built when it is met first; it gives way to a sentence when it cannot be shown:
-    no old figure stands under a new name."""
+    """A panel in its place, built when it is met first; it gives way to a sentence when it cannot
+    be shown: no old figure stands under a new name."""
 
     def __init__(self, page: Page, place: places.Place, index: int) -> None:
         self.place = place
@@ -99,7 +104,9 @@ class Frame:
         page.board.act(self._arrange)
         page.board.act(self._guard)
         title = "document.title = {};"
-        page.board.act(lambda layout: run_script(gui, title.format(json.dumps(layout.name + " · finlab"))))
+        page.board.act(
+            lambda layout: run_script(gui, title.format(json.dumps(layout.name + " · finlab")))
+        )
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
@@ -126,13 +133,16 @@ class Frame:
         layout: Layout,
         judged: "Judgement | None",
     ) -> None:
-        """Write which regions and sections are there; the drawer is low until there are plots in it."""
+        """Write which regions and sections are there; the drawer is low until there are plots in
+        it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
         about += ("flow",) * plant_of(layout).feels_flow
         there = [section for section in self.sections if section.arrange(desk.task, drawer, about)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
-        gone += [FOLDER.format(region) for region in (places.LEFT, places.RIGHT) if region not in regions]
+        gone += [
+            FOLDER.format(region) for region in (places.LEFT, places.RIGHT) if region not in regions
+        ]
         has_drawer = bool(DRAWERS[desk.task])
         if not has_drawer:
             gone.append(FOLDER.format(places.DRAWER))

@@ -33,12 +33,17 @@ def add_hull(page: Page) -> None:
     gui = page.gui
 
     def load(name: str, content: bytes) -> None:
-        page.deferred.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
+        page.deferred.make(
+            lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull"
+        )
 
     def take(hull: Hull) -> None:
-        """Mesh files do not say in which unit they are: where it need not be metres, the user says it."""
+        """Mesh files do not say in which unit they are: where it need not be metres, the user says
+        it."""
         side = 2.0 * max(hull_of(with_hull(session.state.layout, hull)).half) / hull.scale
-        lengths = {word: side * scale for word, scale in UNITS.items() if LEAST <= side * scale <= LARGEST}
+        lengths = {
+            word: side * scale for word, scale in UNITS.items() if LEAST <= side * scale <= LARGEST
+        }
         if list(lengths) in (["m"], []):
             put_in(hull)
             return
@@ -55,9 +60,16 @@ def add_hull(page: Page) -> None:
         session.select(None)  # so that the report is seen, wherever the file was dropped
         layout = session.state.layout
         if layout.body is not None and contradicts(layout):
-            said, water = (three_digits(v) for v in (lift_of(layout.body) / GRAVITY, displaced(layout)))
-            text = f"This hull encloses {water} kg of water, the body's buoyancy is that of {said} kg."
-            anew = {"All": partial(session.estimate, True), "All but the mass": partial(session.estimate)}
+            said, water = (
+                three_digits(v) for v in (lift_of(layout.body) / GRAVITY, displaced(layout))
+            )
+            text = (
+                f"This hull encloses {water} kg of water, the body's buoyancy is that of {said} kg."
+            )
+            anew = {
+                "All": partial(session.estimate, True),
+                "All but the mass": partial(session.estimate),
+            }
             page.ask("Estimate anew from the hull?", text, anew)
 
     def choose_shape(shape: str) -> None:
@@ -69,11 +81,17 @@ def add_hull(page: Page) -> None:
         if shape != MESH:
             session.set_hull(shape, size)
 
-    shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for estimates.")
+    shapes = gui.add_dropdown(
+        "Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for estimates."
+    )
     page.bind(shapes, choose_shape, _shape)
     ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
-    sides = gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint="Length, width and height of a shape.")
-    page.board.show(page.bind_number(sides, resize, _size), disabled=lambda layout: _shape(layout) == MESH)
+    sides = gui.add_vector3(
+        "Size [m]", (0.5, 0.3, 0.2), **ends, hint="Length, width and height of a shape."
+    )
+    page.board.show(
+        page.bind_number(sides, resize, _size), disabled=lambda layout: _shape(layout) == MESH
+    )
     about = "Centre of gravity as seen from the hull's middle. Torques are about it."
     center = gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
     page.bind_number(center, session.set_center_of_gravity, center_of_gravity)
@@ -83,7 +101,8 @@ def add_hull(page: Page) -> None:
         load,
         icon=viser.Icon.UPLOAD,
         mime_type=MESHES,
-        hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are simplified.",
+        hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are "
+        "simplified.",
     )
     page.add_html(_report, visible=lambda layout: bool(_report(layout)))
     _add_turns(page)
@@ -117,7 +136,8 @@ def _add_turns(page: Page) -> None:
 
 
 def _drawn(page: Page, hull: Hull) -> Hull:
-    """The same hull, whose drawing is known from now on: that takes its time. Not on the event loop."""
+    """The same hull, whose drawing is known from now on: that takes its time. Not on the event
+    loop."""
     hull_of(with_hull(page.session.state.layout, hull))
     return hull
 
@@ -144,6 +164,14 @@ def _report(layout: Layout) -> str:
     if report is None:
         return ""
     size = " × ".join(f"{2.0 * half:.3g}" for half in hull.half)
-    closed = "watertight" if report.is_watertight else Markup("<span class='missing'>not quite closed</span>")
-    mended = f" Mended: {'; '.join(report.mended)}." if report.mended else " Nothing had to be mended."
-    return html("<div class='fl'>{} m, {:,} triangles, {}.{}</div>", size, report.triangles, closed, mended)
+    closed = (
+        "watertight"
+        if report.is_watertight
+        else Markup("<span class='missing'>not quite closed</span>")
+    )
+    mended = (
+        f" Mended: {'; '.join(report.mended)}." if report.mended else " Nothing had to be mended."
+    )
+    return html(
+        "<div class='fl'>{} m, {:,} triangles, {}.{}</div>", size, report.triangles, closed, mended
+    )

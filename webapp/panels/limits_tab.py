@@ -20,7 +20,9 @@ from webapp.tasks.analysing import Findings
 
 def add_reach(page: Page) -> None:
     """What is drawn, and the card."""
-    about = "Forces that it can give without torque, or torques without force, as a body in the view."
+    about = (
+        "Forces that it can give without torque, or torques without force, as a body in the view."
+    )
     sets = page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about)
     page.bind(sets, partial(page.session.set_display, "drawn"), lambda display: display.drawn)
     page.add_html(_findings)
@@ -35,7 +37,9 @@ def _findings(found: Findings | None, finding: bool, found_error: str | None) ->
     if found.now is not None:
         unit = "N" if found.now.kind == "force" else "N m"
         gap = three_digits(found.now.gap)
-        note += html("<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit)
+        note += html(
+            "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
+        )
     table = score_table(found.question.layout, found.card, found.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 
@@ -90,9 +94,13 @@ def add_improving(page: Page) -> None:
     )
     board.show(search, disabled=lambda improving: improving)
     bar = gui.add_progress_bar(0.0, visible=False)
-    board.show(bar, value=lambda progress: 100.0 * progress.round / progress.n_rounds if progress else 0.0)
+    board.show(
+        bar, value=lambda progress: 100.0 * progress.round / progress.n_rounds if progress else 0.0
+    )
     offered = "What was found so far is offered."
-    cancel = page.add_button("Cancel", improver.stop, icon=viser.Icon.X, visible=False, hint=offered)
+    cancel = page.add_button(
+        "Cancel", improver.stop, icon=viser.Icon.X, visible=False, hint=offered
+    )
     for handle in (bar, cancel):
         board.show(handle, visible=lambda improving: improving)
     add_html(gui, marker("fl-verdict"))
@@ -132,7 +140,14 @@ def _before_and_after(result: Improvement) -> str:
     some = result.goal != "mission_power" and len(result.axes) < len(AXES)
     of = f" of {listed(result.axes)}, with anything on the others" if some else ""
     heading = html(
-        "<b>{}{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), of, before, unit, after, unit, stopped
+        "<b>{}{}: {}{} before, {}{} after.</b>{}",
+        goal.capitalize(),
+        of,
+        before,
+        unit,
+        after,
+        unit,
+        stopped,
     )
     if result.goal == "mission_power" and -result.value_before * len(MISSION) >= UNREACHED:
         heading += f" A wrench out of reach counts with {UNREACHED:g} W or more."
@@ -140,6 +155,8 @@ def _before_and_after(result: Improvement) -> str:
     lost = [axis for axis in result.card_before.authority.alone if axis not in then]
     if lost:
         heading += html(" <span class='missing'>It no longer pushes {} alone.</span>", listed(lost))
-    moved = fins_words([result.layout.index(name) for name in result.moved], result.layout).capitalize()
+    moved = fins_words(
+        [result.layout.index(name) for name in result.moved], result.layout
+    ).capitalize()
     table = score_table(result.layout, result.card_after, result.card_before)
     return html("{} {} moved; the view shows them as shadows.{}", heading, moved, table)

@@ -1,4 +1,5 @@
-"""A log: what the robot could not, when, and what would have held it; each moment can be put on the robot."""
+"""A log: what the robot could not, when, and what would have held it; each moment can be put on the
+robot."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 ACROSS = 4
 """Plots that stand beside each other."""
 FIRST = (
-    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin), or a bag of ROS (.mcap, .db3, .bag). It is told "
+    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin), or a bag of ROS (.mcap, .db3, .bag). It "
+    "is told "
     "when and on which axis the robot could not, and what would have held it."
 )
 
@@ -33,12 +35,23 @@ def add_log(page: Page) -> None:
     gui = page.gui
     page.opening.add(SUFFIXES, log.open)
     add_html(gui, marker("fl-primary"))
-    page.add_upload("Open a log", page.opening.open, icon=viser.Icon.FOLDER_OPEN, mime_type=SUFFIXES)
-    about = "Judge it by the robot of this page; else by the one that the log's own parameters describe."
-    page.bind(gui.add_checkbox("This robot", False, hint=about), log.choose_robot, lambda by_page: by_page)
+    page.add_upload(
+        "Open a log", page.opening.open, icon=viser.Icon.FOLDER_OPEN, mime_type=SUFFIXES
+    )
+    about = (
+        "Judge it by the robot of this page; else by the one that the log's own parameters "
+        "describe."
+    )
+    page.bind(
+        gui.add_checkbox("This robot", False, hint=about), log.choose_robot, lambda by_page: by_page
+    )
     page.add_html(_said)
-    better = page.add_button("Open the improved robot", lambda: _improve(page), icon=viser.Icon.SPARKLES)
-    page.board.show(better, visible=lambda judged: judged is not None and judged.improved is not None)
+    better = page.add_button(
+        "Open the improved robot", lambda: _improve(page), icon=viser.Icon.SPARKLES
+    )
+    page.board.show(
+        better, visible=lambda judged: judged is not None and judged.improved is not None
+    )
 
 
 def _improve(page: Page) -> None:
@@ -51,11 +64,19 @@ def _said(judged: "Judgement | None", judging: str | None, judged_error: str | N
     if judging is not None:
         return html("<div class='fl dim'>{} …</div>", judging.capitalize())
     if judged is None:
-        said = html("<div class='missing'>{}</div>", in_app(judged_error)) if judged_error else FIRST
+        said = (
+            html("<div class='missing'>{}</div>", in_app(judged_error)) if judged_error else FIRST
+        )
         return html("<div class='fl'>{}</div>", said)
-    notes = [html("<div class='said dim'>{}</div>", in_app(note)) for note in (*judged.asks, *judged.notes)]
+    notes = [
+        html("<div class='said dim'>{}</div>", in_app(note))
+        for note in (*judged.asks, *judged.notes)
+    ]
     return html(
-        "<div class='fl'><b>{}</b><div class='said'>{}</div>{}</div>", judged.source, judged.sentence, notes
+        "<div class='fl'><b>{}</b><div class='said'>{}</div>{}</div>",
+        judged.source,
+        judged.sentence,
+        notes,
     )
 
 
@@ -68,7 +89,9 @@ def add_losses(page: Page) -> None:
         page.jobs.log.jump(spells[placed(key, len(spells))].start)
 
     page.presses.on("spell", jump)
-    slider = page.gui.add_slider("Moment [s]", 0.0, 1.0, 0.1, 0.0, hint="Which moment is on the robot.")
+    slider = page.gui.add_slider(
+        "Moment [s]", 0.0, 1.0, 0.1, 0.0, hint="Which moment is on the robot."
+    )
     page.on_change(slider, page.jobs.log.jump)
 
     def place(judged: "Judgement | None", log_moment: float | None) -> None:
@@ -88,11 +111,14 @@ def add_losses(page: Page) -> None:
 
 def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
     if judged is None:
-        return html("<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here.")
+        return html(
+            "<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here."
+        )
     each = zip(MOTIONS, AXIS_UNITS, judged.asked, judged.missing, judged.lost_s, strict=True)
     rows = [
         row(
-            html("{} <span class='dim'>{} s</span>", motion, unit), *map(three_digits, (asked, missing, lost))
+            html("{} <span class='dim'>{} s</span>", motion, unit),
+            *map(three_digits, (asked, missing, lost)),
         )
         for motion, unit, asked, missing, lost in each
         if asked > 0.0
@@ -111,8 +137,12 @@ def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
         )
         for k, spell in enumerate(judged.spells)
     ]
-    when = Markup("<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>")
-    tables = [html("<table>{}{}</table>", *each) for each in ((head, rows), (when, spells)) if each[1]]
+    when = Markup(
+        "<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>"
+    )
+    tables = [
+        html("<table>{}{}</table>", *each) for each in ((head, rows), (when, spells)) if each[1]
+    ]
     return html("<div class='fl'>{}</div>", tables)
 
 
@@ -126,9 +156,12 @@ def plot_rows(judged: "Judgement") -> int:
 
 
 def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
-    """Demand and what was given over time, of each axis that was asked for, and actuators at their limits."""
+    """Demand and what was given over time, of each axis that was asked for, and actuators at their
+    limits."""
     if judged is None:
-        return html("<div class='fl dim fl-timeline'>{}</div>", "The log is plotted here over time.")
+        return html(
+            "<div class='fl dim fl-timeline'>{}</div>", "The log is plotted here over time."
+        )
     line = judged.timeline
     parts = []
     ends: Any = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
@@ -146,15 +179,18 @@ def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
 
 
 def replays_table(judged: "Judgement | None") -> str:
-    """The same demands asked of other methods and policies, with each actuator lost, of a better robot."""
+    """The same demands asked of other methods and policies, with each actuator lost, of a better
+    robot."""
     if judged is None:
         return html(
-            "<div class='fl dim'>{}</div>", "Other methods and policies are asked the log's demands here."
+            "<div class='fl dim'>{}</div>",
+            "Other methods and policies are asked the log's demands here.",
         )
     lost = AXES.index(judged.axis) if judged.axis else int(np.argmax(judged.asked))
     rows = [
         html(
-            "<tr><td>{}</td><td class='words'>{}</td><td class='{}'>{}</td><td>{}</td><td>{}</td></tr>",
+            "<tr><td>{}</td><td class='words'>{}</td><td "
+            "class='{}'>{}</td><td>{}</td><td>{}</td></tr>",
             each.robot if each.lost is None else f"without {each.lost}",
             each.name,
             "given" if each == judged.held_by else "",
@@ -165,13 +201,15 @@ def replays_table(judged: "Judgement | None") -> str:
         for each in judged.replays
     ]
     head = html(
-        "<tr><th>robot</th><th class='words'>method</th><th>{} missing [{} s]</th><th>power [W]</th>"
+        "<tr><th>robot</th><th class='words'>method</th><th>{} missing [{} s]</th><th>power "
+        "[W]</th>"
         "<th>short [s]</th></tr>",
         MOTIONS[lost],
         AXIS_UNITS[lost],
     )
     said = Markup(
-        "<div class='said'><span class='given'>Green</span>: holds what was lost, at least power.</div>"
+        "<div class='said'><span class='given'>Green</span>: holds what was lost, at least "
+        "power.</div>"
     )
     return html(
         "<div class='fl fl-timeline'><table class='methods'>{}{}</table>{}</div>",

@@ -13,18 +13,31 @@ from finlab.research.mdn.method import WHOLE
 from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.verdict import Verdict, verdict_of
-from webapp.markup.words import error_digits, html, marker, source_words, three_digits, unlearned_sentence
+from webapp.markup.words import (
+    error_digits,
+    html,
+    marker,
+    source_words,
+    three_digits,
+    unlearned_sentence,
+)
 from webapp.page import Page
 from webapp.session.state import DRAWING, State, least_of
 from webapp.tasks.comparing import Run
 from webapp.tasks.solver import Modes
 from webapp.theme import MODE_COLORS, css
 
-BEYOND = "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
+BEYOND = (
+    "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
+)
 NOTHING = "No wrench is asked for, so there is nothing to share among the fins."
-LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
+LEARNED = (
+    "The paper's network draws samples; the best are refined by Adam on learned physics, which "
+    "errs."
+)
 PROPOSED = (
-    "The network proposes ways to share the wrench, drawn from its mixture; each is refined to the least "
+    "The network proposes ways to share the wrench, drawn from its mixture; each is refined to "
+    "the least "
     "effort near it and made exact by the fins' own laws."
 )
 BESIDE = {
@@ -32,8 +45,10 @@ BESIDE = {
     "mdn": " The answer, number 1, is the cheapest of them.",
 }
 ROW = (
-    "<tr class='{} pick' {} tabindex='0'><td><span class='swatch mode' style='border-color:{}'>{}</span></td>"
-    "<td class='words'>{}<div><span class='badge {}'>{}</span> <span class='dim'>{}</span></div></td>"
+    "<tr class='{} pick' {} tabindex='0'><td><span class='swatch mode' "
+    "style='border-color:{}'>{}</span></td>"
+    "<td class='words'>{}<div><span class='badge {}'>{}</span> <span "
+    "class='dim'>{}</span></div></td>"
     "<td class='{}'>{}</td><td>{}</td>"
 )
 EFFORT = "<td>{}</td>"
@@ -50,7 +65,9 @@ def add_candidates(page: Page) -> None:
     page.add_html(lambda modes, mode, step: mode_plot(modes, mode, step, PLOT_PX))
 
     def choose(key: str, _held: str) -> None:
-        session.show_mode(placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.shown)))
+        session.show_mode(
+            placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.shown))
+        )
 
     page.presses.on("mode", choose)
     page.presses.on("play", lambda _key, _held: jobs.refining.toggle())
@@ -69,7 +86,9 @@ def add_candidates(page: Page) -> None:
     hint = "What method paper answers with: the shipped network, or one trained in runs."
     networks = gui.add_dropdown("Network", tuple(solver.networks()), hint=hint)
     page.bind(
-        networks, partial(session.set_setting, "network"), lambda network: network or solver.first_network
+        networks,
+        partial(session.set_setting, "network"),
+        lambda network: network or solver.first_network,
     )
     board.show(networks, visible=lambda method: method == "paper")
     page.add_html(_listed)
@@ -78,7 +97,8 @@ def add_candidates(page: Page) -> None:
 
 
 def _listed(modes: Modes, mode: int, searching: bool) -> str:
-    """The table; the drawer is dimmed (`habits.js`) while what it shows belongs to an earlier question."""
+    """The table; the drawer is dimmed (`habits.js`) while what it shows belongs to an earlier
+    question."""
     asking = "asking" if searching else ""
     return html("<div class='fl-modes {}'>{}</div>", asking, mode_table(modes, mode))
 
@@ -111,15 +131,24 @@ def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
         return ""
     play = ("❚❚", "Pause") if playing else ("▶", "Play")
     row = (
-        "<div class='fl fl-player'><button {} title='let the samples travel to where they end'>{} {}</button>"
-        "<button {} aria-pressed='{}' title='begin anew at the end'>Loop</button><span>{}</span></div>"
+        "<div class='fl fl-player'><button {} title='let the samples travel to where they end'>{} "
+        "{}</button>"
+        "<button {} aria-pressed='{}' title='begin anew at the "
+        "end'>Loop</button><span>{}</span></div>"
     )
-    return html(row, press("play", ""), *play, press("loop", ""), str(loops).lower(), step_words(modes, step))
+    return html(
+        row,
+        press("play", ""),
+        *play,
+        press("loop", ""),
+        str(loops).lower(),
+        step_words(modes, step),
+    )
 
 
 def step_words(modes: Modes, step: int | None) -> str:
-    """What is done in a step of the refinement, and the error that is left then, half of the samples having
-    less."""
+    """What is done in a step of the refinement, and the error that is left then, half of the
+    samples having less."""
     at = modes.steps if step is None else step
     words = "descent in forces" if at <= WHOLE.descent else "made exact"
     words = "samples of the network" if at == 0 else words
@@ -141,7 +170,8 @@ def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
 
 
 def mode_table(modes: Modes, mode: int) -> str:
-    """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the fins."""
+    """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the
+    fins."""
     if not modes.shown:
         return ""
     of_fins = any(not math.isnan(way.effort) for way, _, _ in modes.shown)
@@ -200,12 +230,15 @@ def comparison_table(run: Run, stale: bool) -> str:
     """Error, power, effort and time of each method."""
     if run.state is None:
         return Markup(
-            "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
+            "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time "
+            "side by side."
             "</div>"
         )
     rows = []
     answers = dict(run.answers)
-    in_reach = any(isinstance(answer, Allocation) and answer.reachable for answer in answers.values())
+    in_reach = any(
+        isinstance(answer, Allocation) and answer.reachable for answer in answers.values()
+    )
     for method in run.methods:
         answer = answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
@@ -215,12 +248,17 @@ def comparison_table(run: Run, stale: bool) -> str:
             figures = (answer.power, answer.effort, answer.solve_ms)
             kind = KINDS[verdict_of(answer, in_reach)]
             error = html("<td class='{}'>{}</td>", kind, error_digits(answer.err_norm))
-            cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
+            cells = error + Markup().join(
+                html("<td>{}</td>", three_digits(value)) for value in figures
+            )
         else:
-            cells = html("<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–"))
+            cells = html(
+                "<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–")
+            )
         rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
     header = Markup(
-        "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th>"
+        "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time "
+        "[ms]</th>"
         "</tr>"
     )
     said = html(
@@ -230,7 +268,11 @@ def comparison_table(run: Run, stale: bool) -> str:
         REACHED,
     )
     note = (
-        Markup("<div class='missing'>The question has changed since; compare again.</div>") if stale else ""
+        Markup("<div class='missing'>The question has changed since; compare again.</div>")
+        if stale
+        else ""
     )
     body = Markup().join(rows)
-    return html("<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note)
+    return html(
+        "<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note
+    )

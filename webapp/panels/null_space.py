@@ -1,4 +1,5 @@
-"""The null space of an answer: a slider for each direction of it, what comes of them, and the mean of two."""
+"""The null space of an answer: a slider for each direction of it, what comes of them, and the mean
+of two."""
 
 import math
 from functools import partial
@@ -15,7 +16,10 @@ from webapp.tasks.solver import Modes
 
 ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
 ALONE = "Each wrench has one set of forces here: the null space is empty."
-WRONG = "Both commands give the wrench, and their average does not: a model with one answer would learn that."
+WRONG = (
+    "Both commands give the wrench, and their average does not: a model with one answer would "
+    "learn that."
+)
 RIGHT = "The average gives the wrench, too: these commands are in proportion to forces."
 
 
@@ -38,7 +42,13 @@ def add_null_space(page: Page) -> None:
             high = math.floor(high / step) * step
             value = shifts[k] if k < len(shifts) else 0.0
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
-            put(slider, label=f"{known.names[k]} [N]", hint=f"Shares: {known.about[k]}.", step=step, **ends)
+            put(
+                slider,
+                label=f"{known.names[k]} [N]",
+                hint=f"Shares: {known.about[k]}.",
+                step=step,
+                **ends,
+            )
             put(slider, value=round(value, 6))
 
     page.board.act(place, *sliders)
@@ -69,4 +79,6 @@ def _mean_words(modes: Modes) -> str:
     if modes.null is None or len(modes.shown) < 3:
         return ""
     wrong = modes.shown[2].mode.err_norm > REACHED
-    return html("<div class='fl {}'>{}</div>", "missing" if wrong else "dim", WRONG if wrong else RIGHT)
+    return html(
+        "<div class='fl {}'>{}</div>", "missing" if wrong else "dim", WRONG if wrong else RIGHT
+    )

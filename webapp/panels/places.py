@@ -1,4 +1,5 @@
-"""Tables of the frame: which panel stands where, and what can be done by a key or a command (Ctrl+K)."""
+"""Tables of the frame: which panel stands where, and what can be done by a key or a command
+(Ctrl+K)."""
 
 from collections.abc import Callable
 from functools import partial
@@ -34,7 +35,8 @@ from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
 
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
-"""The bar above all; the list at the left; the inspector at the right; the drawer below; over the view."""
+"""The bar above all; the list at the left; the inspector at the right; the drawer below; over the
+view."""
 DESIGN, ALLOCATE, SIMULATE, EXPORT, LOG = TASKS
 CANDIDATES, NULL_SPACE = WAYS
 
@@ -49,8 +51,9 @@ class Place(NamedTuple):
     make: Callable[[Page], object]
     folded: bool = False
     about: str = ""
-    """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide` where a tour
-    or a lesson must be under way; `flow` where an actuator feels it; nothing where it is there always."""
+    """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide`
+    where a tour or a lesson must be under way; `flow` where an actuator feels it; nothing where it
+    is there always."""
 
 
 PLACES = (
@@ -97,7 +100,8 @@ ALT = "alt"
 
 
 def add_keys(page: Page) -> None:
-    """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow keys."""
+    """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow
+    keys."""
     session = page.session
     robot = page.scenery.robot
     swimming = page.jobs.swimming
@@ -107,7 +111,10 @@ def add_keys(page: Page) -> None:
 
     # What it is called and does and, if any, its key as viser calls that, and a modifier.
     table: list[tuple[Any, ...]] = [
-        *((task, partial(session.show_task, task), str(k + 1), ALT) for k, task in enumerate(TASKS)),
+        *(
+            (task, partial(session.show_task, task), str(k + 1), ALT)
+            for k, task in enumerate(TASKS)
+        ),
         ("Fold or open the drawer", session.fold_drawer, "J", CTRL),
         ("Undo", session.undo, "Z", CTRL),
         ("Redo", session.redo, "Z", CTRL_SHIFT),

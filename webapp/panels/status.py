@@ -70,12 +70,18 @@ def _written(
 
 @lru_cache(maxsize=32)
 def legend(newtons: float, torque: float, size: float, also: str) -> str:
-    """Arrows, scales ([N] of an arrow of 0.1 m, [N m] of such a ring, where `size` is 1), and more rows."""
+    """Arrows, scales ([N] of an arrow of 0.1 m, [N m] of such a ring, where `size` is 1), and more
+    rows."""
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
     ring = f"{0.1 * size:g} m = {torque:g} N m"
     scales = "<div class='dim scales'><span>{}</span><span><i>radius </i>{}</span></div>"
-    return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons, size), ring))
+    return html(
+        "<div class='fl-legend'>{}{}</div>{}",
+        rows,
+        also,
+        html(scales, _length(newtons, size), ring),
+    )
 
 
 def _length(newtons: float, size: float) -> str:
@@ -92,7 +98,9 @@ def set_rows(findings: Findings | None, size: float) -> str:
         question = findings.question
         word = "with all" if question.failed else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
-    ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
+    ball = html(
+        "<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED)
+    )
     unit = "N" if findings.now.kind == "force" else "N m"
     scale = f"body {0.1 * size:g} m = {three_digits(0.1 / set_scale(findings))} {unit}"
     rows.append(html("{}<span class='dim wide'>{}</span>", _key(ball, "asked in it"), scale))
@@ -110,12 +118,16 @@ def _patch(color: str) -> str:
 
 
 def _arrow(color: str, opacity: float) -> str:
-    way = "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 10V7H0Z'/></svg>"
+    way = (
+        "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 "
+        "10V7H0Z'/></svg>"
+    )
     return html(way, opacity, color)
 
 
 JETS = html(
-    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by jets</span>"
+    "<div class='fl-legend'><div class='key'>{}<span>jet</span>{}<span class='wide'>taken by "
+    "jets</span>"
     "</div></div>",
     _patch(css(WATER, 0.5)),
     _arrow(css(TAKEN), 1.0),
@@ -134,9 +146,9 @@ def corner(
     refined: str = "",
     badge: str = "",
 ) -> str:
-    """Legend and status line in the lower left corner of the page; `least` where the answer itself is shown,
-    not another way to do the same, whose `badge` says where that comes from; `refined` is the step of its
-    refinement, nothing at its end."""
+    """Legend and status line in the lower left corner of the page; `least` where the answer itself
+    is shown, not another way to do the same, whose `badge` says where that comes from; `refined` is
+    the step of its refinement, nothing at its end."""
     fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
@@ -149,7 +161,9 @@ def corner(
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str) -> list[str]:
+def _figures(
+    allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str
+) -> list[str]:
     color = COLORS[verdict_of(allocation, in_reach)]
     verdict = verdict_sentence(allocation, in_reach)
     if refined:
@@ -157,9 +171,14 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
         verdict = refined
     pill = "pill long" if len(verdict) > LONG else "pill"
     missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
-    rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace("-", "−")
+    rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
+        "-", "−"
+    )
     costs = []
-    kinds = (("power", "watts", allocation.power, " W"), ("effort", "effort", allocation.effort, ""))
+    kinds = (
+        ("power", "watts", allocation.power, " W"),
+        ("effort", "effort", allocation.effort, ""),
+    )
     for word, kind, value, unit in kinds:
         if value is None:  # effort is of fins
             continue
@@ -202,7 +221,9 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
         html("<span>{}</span>", pace),
     ]
-    scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout)))
+    scale = html(
+        "<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout))
+    )
     jets = JETS * (first.layout.interaction is not None)
     return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), parts)
 

@@ -31,12 +31,18 @@ def _bind(page: Page, key: str, widget: Any) -> None:
 def add_scenario(page: Page) -> None:
     """What is swum, in which water, by which methods."""
     gui = page.gui
-    day = "A day that is not as the designer assumed; it sets path, water, body, sensors and actuators."
+    day = (
+        "A day that is not as the designer assumed; it sets path, water, body, sensors and "
+        "actuators."
+    )
     days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
     _bind(page, "scenario", days)
     page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", CHOICES["path"], hint="Where to swim."))
-    laws = "The paper's two beside ours: towards a waypoint; speed and depth by PID, which keeps no course."
+    laws = (
+        "The paper's two beside ours: towards a waypoint; speed and depth by PID, which keeps no "
+        "course."
+    )
     _bind(page, "controller", gui.add_dropdown("Controller", CHOICES["controller"], hint=laws))
 
 
@@ -61,7 +67,9 @@ def add_run(page: Page) -> None:
     add_html(gui, marker("fl-primary"))
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
-    run = page.add_buttons("Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on.")
+    run = page.add_buttons(
+        "Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on."
+    )
     page.board.show(
         run,
         options=lambda paused: ("Go on" if paused else "Pause", "Step", "End"),
@@ -118,7 +126,8 @@ FIRST_S = 8.0
 SMOOTH_S = 1.0
 """Time over which plotted power is averaged."""
 UNSWUM = (
-    "Once a swim is started, its distance from the path, power, wrench, forces and what is found broken "
+    "Once a swim is started, its distance from the path, power, wrench, forces and what is found "
+    "broken "
     "are plotted here over time."
 )
 

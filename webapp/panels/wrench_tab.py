@@ -1,4 +1,5 @@
-"""The question and its answer: the target wrench, bars, failures, commands, and what jets change."""
+"""The question and its answer: the target wrench, bars, failures, commands, and what jets
+change."""
 
 from functools import partial
 from typing import Any
@@ -57,7 +58,9 @@ def add_target(page: Page) -> None:
     def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         ends[:] = [slider_end(size) for size in axis_reach(able, failed, flow).tolist()]
 
-    def ask(target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+    def ask(
+        target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None
+    ) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for value, slider, most in zip(target, sliders, ends, strict=True):
             slider.max = end = max(most, abs(value))
@@ -77,7 +80,9 @@ def add_target(page: Page) -> None:
         shown: Markup = style(ranges, able, *[slider.max for slider in sliders])
         return shown
 
-    def hint(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
+    def hint(
+        ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None
+    ) -> None:
         """Say what the marks are; they change more often than that."""
         if ranges is None:
             return
@@ -123,9 +128,12 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
 
 def _switch(axis: int, counts: bool) -> str:
     """Whether an axis counts; it lies beside the axis's slider."""
-    does = "counts: press to free it" if counts else "is free, takes what comes: press to command it"
+    does = (
+        "counts: press to free it" if counts else "is free, takes what comes: press to command it"
+    )
     return html(
-        "<div class='fl-axis fl-axis-{}'><span role='switch' tabindex='0' aria-checked='{}' aria-label='{}' "
+        "<div class='fl-axis fl-axis-{}'><span role='switch' tabindex='0' aria-checked='{}' "
+        "aria-label='{}' "
         "title='{}' {}></span></div>",
         axis,
         "true" if counts else "false",
@@ -158,11 +166,13 @@ def _hint(axis: int, low: float, reach: float) -> str:
 
 
 def add_answer(page: Page) -> None:
-    """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
-    stands beside what was asked then."""
+    """What is asked, what the actuators give, and what is left undone; an answer to an earlier
+    question stands beside what was asked then."""
     bars = Kept(bars_of)
 
-    def write(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> Markup:
+    def write(
+        shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None
+    ) -> Markup:
         """Bars and words are one message; what is proved of an answer changes the words alone."""
         said = answer_sentence(state, shown, busy, proving or step is not None)
         words = "<div class='fl'><div class='said'>{}</div></div>"
@@ -179,7 +189,9 @@ JETS_HEADER = Markup(
 
 def add_jets(page: Page) -> None:
     """The switch that lets jets count, and the answer beside that which leaves them out."""
-    about = "What the jets of thrusters and fins take from each other, and where they meet the hull."
+    about = (
+        "What the jets of thrusters and fins take from each other, and where they meet the hull."
+    )
     switch = page.gui.add_checkbox("Count jets", False, hint=about)
     page.bind(switch, page.session.set_jets, lambda layout: layout.interaction is not None)
     page.add_html(jets_table)

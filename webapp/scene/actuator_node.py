@@ -59,7 +59,9 @@ def motion(part: Actuator, command: Array | None) -> Motion:
     force = float(command[part.THRUST])
     most = part.upper[part.THRUST] if force >= 0.0 else -part.lower[part.THRUST]
     # Thrust grows with the square of the speed.
-    turns = math.copysign(TURNS_PER_S * math.sqrt(min(abs(force) / most, 1.0)), force) if force else 0.0
+    turns = (
+        math.copysign(TURNS_PER_S * math.sqrt(min(abs(force) / most, 1.0)), force) if force else 0.0
+    )
     return Motion(angle=angle, turns=turns, along=along)
 
 
@@ -85,7 +87,9 @@ def _propeller(along: int) -> Mesh:
 
 def shape_of(part: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
-    ratio, area = (part.value("aspect_ratio"), part.value("area")) if part.LOOKS == "foil" else (None, None)
+    ratio, area = (
+        (part.value("aspect_ratio"), part.value("area")) if part.LOOKS == "foil" else (None, None)
+    )
     if ratio is None or area is None:
         return 1.0, size
     ratio = min(max(ratio, 0.5), 8.0) / 2.0
@@ -94,7 +98,8 @@ def shape_of(part: Actuator, size: float) -> tuple[float, float]:
 
 
 class ActuatorNode:
-    """The nodes of the actuator at one place of the layout. Made once; hidden while the layout has fewer."""
+    """The nodes of the actuator at one place of the layout. Made once; hidden while the layout has
+    fewer."""
 
     def __init__(
         self,
@@ -103,8 +108,8 @@ class ActuatorNode:
         on_click: Callable[[int, bool], None],
         on_drag: Callable[[int, str, tuple[float, float, float]], None],
     ) -> None:
-        """Build the nodes. `on_click` gets the index and whether Ctrl or Shift was held, `on_drag` the index,
-        phase (`start`, `update`, `end`) and the position [m]."""
+        """Build the nodes. `on_click` gets the index and whether Ctrl or Shift was held, `on_drag`
+        the index, phase (`start`, `update`, `end`) and the position [m]."""
         name = f"/robot/fins/{index}"
         # The arrows stay along the body's axes, like the numbers beside them.
         idle: dict[str, Any] = {"depth_test": False, "active_axes": (False,) * 3, "line_width": 3.5}
@@ -151,8 +156,9 @@ class ActuatorNode:
         stuck: bool,
         owned_by_user: bool,
     ) -> None:
-        """Show an actuator with its strut to the hull; `sizes` are of actuators and of arrows, `moved` shows
-        its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that holds it."""
+        """Show an actuator with its strut to the hull; `sizes` are of actuators and of arrows,
+        `moved` shows its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that
+        holds it."""
         frame = np.array(part.frame)
         place = np.array(part.position)
         size, arrows = sizes
@@ -200,6 +206,9 @@ def moved_parts(parts: tuple[Actuator, ...], size: float) -> Mesh:
         slenderness, scale = shape_of(part, size)
         for mesh in (_moving(part.LOOKS, slenderness), _mount(part.LOOKS, True)):
             meshes.append(
-                Mesh(scale * mesh.vertices @ np.array(part.frame) + np.array(part.position), mesh.faces)
+                Mesh(
+                    scale * mesh.vertices @ np.array(part.frame) + np.array(part.position),
+                    mesh.faces,
+                )
             )
     return joined(*meshes)

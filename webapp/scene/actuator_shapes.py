@@ -31,11 +31,12 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:
-    """A closed round tube along a path (P, 3) [m], no two neighbours equal, with one radius or (P,) [m];
-    `across` is never along the path, and chosen from it if left out."""
+    """A closed round tube along a path (P, 3) [m], no two neighbours equal, with one radius or (P,)
+    [m]; `across` is never along the path, and chosen from it if left out."""
     radius = np.broadcast_to(np.asarray(radius, dtype=float), (len(path),))
     tangent = np.gradient(path, axis=0)
-    # Where the path stands still (a step of the radius) the direction of travel is taken from its whole.
+    # Where the path stands still (a step of the radius) the direction of travel is taken from its
+    # whole.
     still = np.linalg.norm(tangent, axis=1) < 1e-12
     tangent[still] = path[-1] - path[0]
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -48,7 +49,9 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = left * first[:, [2, 0, 1]] - right * first[:, [1, 2, 0]]
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    ring = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
+    ring = (
+        np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
+    )
     points = path[:, None] + radius[:, None, None] * ring
     vertices = np.concatenate([points.reshape(-1, 3), path[:1], path[-1:]])
     return Mesh(vertices, _tube_faces(len(path), sides))
@@ -56,17 +59,21 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
 
 @cache
 def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
-    """Triangles of a tube of so many rings, with a fan at each end whose middle points come last."""
+    """Triangles of a tube of so many rings, with a fan at each end whose middle points come
+    last."""
     k = np.arange(sides)
     n = np.roll(k, -1)
     last = (rows - 1) * sides
     start = np.full(sides, rows * sides)
     end = np.full(sides, rows * sides + 1)
-    return np.concatenate([grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
+    return np.concatenate(
+        [grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)]
+    )
 
 
 def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
-    """A straight arrow from `start` (3,) along `way` (3,) [m]: a force times the scale of the arrows."""
+    """A straight arrow from `start` (3,) along `way` (3,) [m]: a force times the scale of the
+    arrows."""
     length = float(np.linalg.norm(way))
     if length < SHORTEST:
         return NOTHING
@@ -78,7 +85,8 @@ def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
 
 
 def unit_arrow(thickness: float) -> Mesh:
-    """A straight arrow of length 1 along x, its shaft of a radius [m]: a node scales it along x alone."""
+    """A straight arrow of length 1 along x, its shaft of a radius [m]: a node scales it along x
+    alone."""
     stations = np.array([0.0, 1.0 - HEAD, 1.0 - HEAD, 1.0])
     path = stations[:, None] * np.array([1.0, 0.0, 0.0])
     return tube(path, thickness * np.array([1.0, 1.0, 2.6, 0.02]), 18)
@@ -119,16 +127,24 @@ def blade() -> Mesh:
 
 def shaft() -> Mesh:
     """The servo's housing at the root and the shaft that carries the blade."""
-    housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
+    housing = np.array(
+        [[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float
+    )
     rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
     return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
 
 
 def foil(slenderness: float) -> Mesh:
-    """A rudder of span 1 along x', its leading edge towards y' and a quarter of its chord ahead of the shaft;
-    `slenderness` is its span over its chord."""
+    """A rudder of span 1 along x', its leading edge towards y' and a quarter of its chord ahead of
+    the shaft; `slenderness` is its span over its chord."""
     along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 24))
-    shape = (0.2969, -0.126, -0.3516, 0.2843, -0.1036)  # of a symmetric NACA section with a closed end
+    shape = (
+        0.2969,
+        -0.126,
+        -0.3516,
+        0.2843,
+        -0.1036,
+    )  # of a symmetric NACA section with a closed end
     thick = 5.0 * 0.15 * sum(c * along**p for c, p in zip(shape, (0.5, 1, 2, 3, 4), strict=True))
     points = []
     for x, chord in ((-0.5, 1.0), (0.46, 0.82), (0.5, 0.74)):
@@ -150,14 +166,18 @@ def stock() -> Mesh:
 
 def pin(size: float) -> Mesh:
     """A nail through what is stuck."""
-    way = size * np.array([[0.0, 0.0, -0.04], [0.0, 0.0, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.066]])
+    way = size * np.array(
+        [[0.0, 0.0, -0.04], [0.0, 0.0, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.066]]
+    )
     return tube(way, size * np.array([0.004, 0.004, 0.016, 0.016]), 14)
 
 
 RADIUS = 0.046
 """Of the duct [m]."""
 N_BLADES = 3
-COLUMN: Array = RADIUS * np.array([[1.02, 0.0, 0.0], [1.12, 0.0, 0.0], [1.12, 0.0, 0.0], [2.2, 0.0, 0.0]])
+COLUMN: Array = RADIUS * np.array(
+    [[1.02, 0.0, 0.0], [1.12, 0.0, 0.0], [1.12, 0.0, 0.0], [2.2, 0.0, 0.0]]
+)
 """Steps of the column about which a pod turns [m]."""
 
 
@@ -168,13 +188,17 @@ def duct(along: int) -> Mesh:
     x = 0.5 * np.cos(section)
     radius = 1.0 - 0.07 * np.sin(section) + 0.06 * x  # a little wider where water comes in
     turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
-    rim = [np.broadcast_to(x[:, None], (17, 40)), *(radius[:, None] * f(turn) for f in (np.cos, np.sin))]
+    rim = [
+        np.broadcast_to(x[:, None], (17, 40)),
+        *(radius[:, None] * f(turn) for f in (np.cos, np.sin)),
+    ]
     ring = Mesh(np.stack(rim, axis=-1).reshape(-1, 3), grid_faces(17, 40))
     s = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 13))
     round_ = 0.25 * np.sqrt(1.0 - s**2) + 1e-4
     hub = revolved(0.62 * s - 0.12, round_, round_, sides=20)
     spokes = [
-        tube(np.array([[-0.32, 0, 0], [-0.32, np.cos(t), np.sin(t)]]), 0.05, 8) for t in turn[[0, 13, 27]]
+        tube(np.array([[-0.32, 0, 0], [-0.32, np.cos(t), np.sin(t)]]), 0.05, 8)
+        for t in turn[[0, 13, 27]]
     ]
     return _along(joined(ring, hub, *spokes), along)
 
@@ -185,8 +209,12 @@ def propeller(along: int) -> Mesh:
     radius = np.linspace(0.2, 0.9, 9)
     share = np.linspace(-0.5, 0.5, 5)
     pitch = np.arctan(0.42 / radius)[:, None]
-    chord = (0.42 * np.sqrt(np.clip(1.0 - ((radius - 0.55) / 0.62) ** 2, 0.0, 1.0)))[:, None] * share
-    place = np.stack([0.1 + chord * np.sin(pitch), radius[:, None] + 0 * chord, chord * np.cos(pitch)], -1)
+    chord = (0.42 * np.sqrt(np.clip(1.0 - ((radius - 0.55) / 0.62) ** 2, 0.0, 1.0)))[
+        :, None
+    ] * share
+    place = np.stack(
+        [0.1 + chord * np.sin(pitch), radius[:, None] + 0 * chord, chord * np.cos(pitch)], -1
+    )
     k, n = (v.ravel() for v in np.meshgrid(np.arange(8), np.arange(4), indexing="ij"))
     a = 5 * k + n
     faces = triangles(a, a + 1, a + 5, a + 1, a + 6, a + 5)
@@ -194,7 +222,9 @@ def propeller(along: int) -> Mesh:
     for turn in 2.0 * np.pi * np.arange(N_BLADES) / N_BLADES:
         c = np.cos(turn)
         s = np.sin(turn)
-        blades.append(Mesh(place.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces))
+        blades.append(
+            Mesh(place.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces)
+        )
     return _along(joined(*blades), along)
 
 

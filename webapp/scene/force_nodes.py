@@ -1,4 +1,5 @@
-"""Forces of all actuators as arrows, and the fans that blades sweep: unit meshes that are moved and scaled.
+"""Forces of all actuators as arrows, and the fans that blades sweep: unit meshes that are moved and
+scaled.
 
 Both are one node for the whole robot, so a page is sent a few numbers for each step, and no mesh.
 """
@@ -44,7 +45,8 @@ class Arrows:
         )
 
     def show(self, starts: Array, ways: Array, colors: list[Rgb], size: float) -> None:
-        """Show arrows from `starts` (n, 3) along `ways` (n, 3) [m]; those of no length are left out."""
+        """Show arrows from `starts` (n, 3) along `ways` (n, 3) [m]; those of no length are left
+        out."""
         drawn = np.linalg.norm(ways, axis=1) > SHORTEST * size
         self.node.visible = bool(drawn.any())
         if not drawn.any():
@@ -90,7 +92,8 @@ class ForceNodes:
         self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
 
     def command(self, forces: Array, amplitudes: Array, angles: Array) -> None:
-        """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,) [rad]."""
+        """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
+        [rad]."""
         self._arrows.show(self._starts, forces, self._colors, self._sizes[1])
         beats = amplitudes > 0.0
         fans = self._fans
@@ -104,7 +107,9 @@ class ForceNodes:
         scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
         turns = turned_about_x(self._turns[beats, None], across)
         fans.batched_colors = np.repeat(linear(self._colors)[beats], WEDGES, axis=0)
-        fans.batched_positions = _rows(np.broadcast_to(self._starts[beats, None], (*across.shape, 3)))
+        fans.batched_positions = _rows(
+            np.broadcast_to(self._starts[beats, None], (*across.shape, 3))
+        )
         fans.batched_scales = _rows(scales)
         fans.batched_wxyzs = _rows(turns)
 
@@ -115,15 +120,16 @@ def _rows(values: Array) -> NDArray[np.float32]:
 
 
 def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
-    """Colours (n, 3) in linear light (IEC 61966-2-1): viser takes those of instances for that, and those of
-    other meshes for sRGB (its `BatchedMeshBase.tsx`, `setRGB` without a colour space)."""
+    """Colours (n, 3) in linear light (IEC 61966-2-1): viser takes those of instances for that, and
+    those of other meshes for sRGB (its `BatchedMeshBase.tsx`, `setRGB` without a colour space)."""
     share = np.array(colors) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.asarray((255.0 * light).round().astype(np.uint8))
 
 
 def unit_wedge() -> Mesh:
-    """A narrow piece of the ring that a blade sweeps about its shaft, in the middle of its width."""
+    """A narrow piece of the ring that a blade sweeps about its shaft, in the middle of its
+    width."""
     inner = 0.035
     outer = CHORD - 0.004
     ends = np.array([[inner, -1.0], [outer, -1.0], [outer, 1.0], [inner, 1.0]])
@@ -133,7 +139,8 @@ def unit_wedge() -> Mesh:
 
 
 def quaternion(rotation: Array) -> Array:
-    """The unit quaternion (4,) of a rotation matrix (3, 3), by its largest component (Shepperd, 1978)."""
+    """The unit quaternion (4,) of a rotation matrix (3, 3), by its largest component (Shepperd,
+    1978)."""
     trace = float(np.trace(rotation))
     k = int(np.argmax([trace, *np.diag(rotation)]))
     if k == 0:
@@ -153,7 +160,8 @@ def _skew(rotation: Array) -> Array:
 
 
 def turned_about_x(wxyz: Array, angle: Array) -> Array:
-    """Quaternions (..., 4) that turn by angles (...) [rad] about x before they turn by others (..., 4)."""
+    """Quaternions (..., 4) that turn by angles (...) [rad] about x before they turn by others (...,
+    4)."""
     c = np.cos(angle / 2)
     s = np.sin(angle / 2)
     w, x, y, z = np.moveaxis(wxyz, -1, 0)

@@ -1,4 +1,5 @@
-"""Jets in the view: a cone behind each actuator that blows, and an arrow of what the jets take there."""
+"""Jets in the view: a cone behind each actuator that blows, and an arrow of what the jets take
+there."""
 
 import numpy as np
 import viser
@@ -33,8 +34,9 @@ class JetNodes:
         """Actuators whose nodes may show something."""
 
     def refresh(self, layout: Layout | None, force: Array, scale: float, size: float) -> None:
-        """Show the jets of forces (n, 3) [N], body frame, and what they take at rest, by the `scale` of
-        arrows [m/N], as thick as `size` says; nothing for None, or for a layout without interaction."""
+        """Show the jets of forces (n, 3) [N], body frame, and what they take at rest, by the
+        `scale` of arrows [m/N], as thick as `size` says; nothing for None, or for a layout without
+        interaction."""
         known = None if layout is None else plant_of(layout).interaction
         if layout is None or known is None:
             self._hide(0)
@@ -63,7 +65,9 @@ class JetNodes:
     def _node(self, index: int) -> tuple[Shape, Shape]:
         if index == len(self._nodes):
             jet = Shape(self._scene, f"/robot/jets/{index}", WATER, opacity=0.3, cast_shadow=False)
-            self._nodes.append((jet, Shape(self._scene, f"/robot/taken/{index}", TAKEN, cast_shadow=False)))
+            self._nodes.append(
+                (jet, Shape(self._scene, f"/robot/taken/{index}", TAKEN, cast_shadow=False))
+            )
         return self._nodes[index]
 
     def _hide(self, first: int) -> None:
@@ -75,7 +79,8 @@ class JetNodes:
 
 
 def cone(way: Array, diameter: float, width: float, spread: float) -> Mesh:
-    """A jet along `way` (3,) [m] from the origin, as wide as its water has 1/e of the speed in its middle."""
+    """A jet along `way` (3,) [m] from the origin, as wide as its water has 1/e of the speed in its
+    middle."""
     length = float(np.linalg.norm(way))
     if not length:
         return NOTHING

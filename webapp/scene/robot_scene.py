@@ -46,7 +46,9 @@ FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
-    def __init__(self, client: viser.ClientHandle, session: Session, board: Board, intents: Intents) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, session: Session, board: Board, intents: Intents
+    ) -> None:
         self._client = client
         self._session = session
         self._do = intents.do
@@ -70,7 +72,14 @@ class RobotScene:
         self._arrow_size = 1.0
         self._top = 0.0
         self._flaps = ""
-        shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
+        shows = (
+            self._show_stage,
+            self._place,
+            self._push,
+            self._flap,
+            self._show_wrench,
+            self._show_sets,
+        )
         for show in (*shows, self._offer):
             board.act(show)
         self.look_from("3D")
@@ -103,7 +112,8 @@ class RobotScene:
         return np.array(self._client.camera.position), np.array(self._client.camera.look_at)
 
     def frame(self) -> None:
-        """Bring the selected fin, or the whole robot, into the middle of the view, seen from where it is."""
+        """Bring the selected fin, or the whole robot, into the middle of the view, seen from where
+        it is."""
         session = self._session
         place, target = self.camera
         layout = session.state.layout
@@ -125,7 +135,9 @@ class RobotScene:
         # Glass within glass is not drawn; inside an attainable set the hull is a net.
         net = display.drawn != "none" and task == "Design"
         size = arrow_size(drawn)
-        self._stage.refresh(hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn), size)
+        self._stage.refresh(
+            hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn), size
+        )
         if not swims and not 0.75 < view_size(drawn) / self._size < 1.34:  # another robot
             self.look_from("3D")
 
@@ -145,13 +157,17 @@ class RobotScene:
         self._arrow_size = sizes[1]
         self._top = hull_top(drawn)
         while len(self._fins) < drawn.n:
-            self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
+            self._fins.append(
+                ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag)
+            )
         for node in self._fins[drawn.n :]:
             node.hide()
         edited = selected if task == "Design" and not swims else None
         stuck = () if swims else damage.stuck
         for i, part in enumerate(drawn.actuators):
-            remark = "" if swims or part.name in failed else damage_words(damage, part.name, part.TURNS)
+            remark = (
+                "" if swims or part.name in failed else damage_words(damage, part.name, part.TURNS)
+            )
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])
@@ -188,10 +204,12 @@ class RobotScene:
             forces = np.zeros((drawn.n, 3))
         scaled = LENGTH / scale.newtons
         works = [
-            part.name not in lost and math.isfinite(commands[i, 0]) for i, part in enumerate(drawn.actuators)
+            part.name not in lost and math.isfinite(commands[i, 0])
+            for i, part in enumerate(drawn.actuators)
         ]
         self._moves = [
-            motion(part, commands[i] if works[i] else None) for i, part in enumerate(drawn.actuators)
+            motion(part, commands[i] if works[i] else None)
+            for i, part in enumerate(drawn.actuators)
         ]
         if works != self._works:
             self._works = works
@@ -216,7 +234,9 @@ class RobotScene:
         paused: bool,
     ) -> None:
         """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
-        speed, still = (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
+        speed, still = (
+            (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
+        )
         moves = json.dumps([self._moves, speed, still])[1:-1]
         if moves != self._flaps:
             self._flaps = moves
@@ -270,7 +290,9 @@ class RobotScene:
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
-        self._do(lambda: select(self._board.facts["drawn"].names[index]) if self._board.facts else None)
+        self._do(
+            lambda: select(self._board.facts["drawn"].names[index]) if self._board.facts else None
+        )
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float]) -> None:
         session = self._session
@@ -294,4 +316,6 @@ class RobotScene:
 
 
 def _named(part: Actuator) -> str:
-    return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace("-", "−")
+    return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace(
+        "-", "−"
+    )

@@ -34,7 +34,12 @@ class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
 
     def __init__(
-        self, client: viser.ClientHandle, session: Session, swimming: Swimming, board: Board, intents: Intents
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        swimming: Swimming,
+        board: Board,
+        intents: Intents,
     ) -> None:
         """`board` lets it show the facts, `intents` takes what a user does in the view."""
         self._client = client
@@ -64,7 +69,8 @@ class Scenery:
     _dark: bool | None = None
 
     def fit(self, target: Sequence[float], shown: Allocation | None) -> Scale:
-        """What arrows and rings stand for, given a target (6,) and what is shown of it, or in a swim."""
+        """What arrows and rings stand for, given a target (6,) and what is shown of it, or in a
+        swim."""
         swimmer = self._swimming.swimmer
         if swimmer is not None:
             self._swam = swim_scale(swimmer, self._swam)
@@ -103,8 +109,9 @@ class Scenery:
             self.robot.look_from("3D")
 
     def follow_guide(self) -> None:
-        """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
-        one, or to leave, ends a swim. At its end the camera stands where it stood before."""
+        """The robot fills the view at each stop of the tour and in each lesson, and swims at some;
+        to come to one, or to leave, ends a swim. At its end the camera stands where it stood
+        before."""
         session = self._session
         before = self._stop
         stop = self._stop = session.guide.stop
@@ -135,21 +142,32 @@ TRAIL_POINTS = 250
 class SwimScene:
     """Draws a swim; nothing of it is there while no robot swims."""
 
-    def __init__(self, client: viser.ClientHandle, swimming: Swimming, root: viser.FrameHandle) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, swimming: Swimming, root: viser.FrameHandle
+    ) -> None:
         """`root` carries the robot."""
         self._client = client
         self._swimming = swimming
         self._root = root
         scene = client.scene
-        self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)
+        self._goal = Shape(
+            scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False
+        )
         self._reference = scene.add_icosphere(
             "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
         )
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
-        self._water = Shape(scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False)
+        self._water = Shape(
+            scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False
+        )
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._trail = scene.add_line_segments(
-            "/swim/trail", NO_LINE, DELIVERED, thickness=3.5, thickness_units="screen", visible=False
+            "/swim/trail",
+            NO_LINE,
+            DELIVERED,
+            thickness=3.5,
+            thickness_units="screen",
+            visible=False,
         )
         self._shown: Swimmer | None = None
         self._behind: Moment | None = None
@@ -174,17 +192,22 @@ class SwimScene:
         put(self._reference, position=moment.reference)
         path = swimmer.path
         flow = swimmer.shown.flow
-        place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
+        place = np.array(
+            [path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()]
+        )
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
         places = moment.record[:, PLACE : PLACE + 3]
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         points = (
-            np.stack([places[:-1], places[1:]], axis=1).astype(np.float32) if len(places) > 1 else NO_LINE
+            np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)
+            if len(places) > 1
+            else NO_LINE
         )
         put(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
 
     def _begin(self, swimmer: Swimmer) -> None:
-        """Another swim: its way, the robot at its start, and the camera where all of it can be seen."""
+        """Another swim: its way, the robot at its start, and the camera where all of it can be
+        seen."""
         self._shown = swimmer
         self._ahead = None
         self._goal.show(_goal, swimmer.path)
@@ -195,7 +218,8 @@ class SwimScene:
         run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")
 
     def _look(self, path: Array, start: Array, size: float) -> None:
-        """Show the robot, of a size, and much of the path (N, 3); `frames.js` lets the camera go along."""
+        """Show the robot, of a size, and much of the path (N, 3); `frames.js` lets the camera go
+        along."""
         extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
         distance = max(0.18 * extent, 0.9 * size)
         place = start + distance * np.array([-0.6, -0.75, 0.8])
@@ -216,7 +240,9 @@ class SwimScene:
             or self._clock >= ahead.time
         ):
             return
-        self._clock = min(self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time)
+        self._clock = min(
+            self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time
+        )
         share = (self._clock - behind.time) / (ahead.time - behind.time)
         start = behind.pose
         end = ahead.pose.copy()

@@ -38,9 +38,12 @@ def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
 def add_floor(
     scene: viser.SceneApi, name: str, size: float, cell: float, section: float, **options: Any
 ) -> viser.GridHandle:
-    """A grid of a size, with fine and strong lines so far apart [m]; `options` as viser has them."""
+    """A grid of a size, with fine and strong lines so far apart [m]; `options` as viser has
+    them."""
     lines: dict[str, Any] = {"cell_thickness": 0.6, "section_thickness": 1.0}
-    return scene.add_grid(name, size, size, cell_size=cell, section_size=section, **lines, **options)
+    return scene.add_grid(
+        name, size, size, cell_size=cell, section_size=section, **lines, **options
+    )
 
 
 def paint_floor(floor: viser.GridHandle, dark: bool) -> None:
@@ -59,22 +62,31 @@ class Stage:
         self._scene = scene
         self._hull = hull
         self._look: tuple[bool, bool] | None = None
-        # Surfaces that mirror a picture, viser's default, take twice the time without a graphics card.
+        # Surfaces that mirror a picture, viser's default, take twice the time without a graphics
+        # card.
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
         mesh = hull.mesh
         bow = _bow(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
-        self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
+        self._bow = Shape(
+            scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False
+        )
         self._axes = scene.add_frame(
-            "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
+            "/robot/axes",
+            axes_length=0.09,
+            axes_radius=0.004,
+            origin_radius=0.009,
+            origin_color=(40, 40, 40),
         )
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self.floor = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: Surface, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
-        """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside. Axes and
-        floor are as large as `size` says."""
+    def refresh(
+        self, hull: Surface, dark: bool, shadows: bool, net: bool, glass: bool, size: float
+    ) -> None:
+        """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look
+        inside. Axes and floor are as large as `size` says."""
         opacity = 0.35 if glass or net else None
         put(self._body.node, opacity=opacity, wireframe=net)
         put(self._bow.node, opacity=opacity, visible=not net)
@@ -90,7 +102,9 @@ class Stage:
             self._scene.configure_default_lights(cast_shadow=shadows)
             paint_floor(self.floor, dark)
             water = np.linspace(look(dark).water_top, look(dark).water_bottom, 64)[:, None]
-            self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
+            self._scene.set_background_image(
+                np.repeat(water, 8, axis=1).astype(np.uint8), format="png"
+            )
             put(self._body.node, color=look(dark).hull)
             put(self._bow.node, color=look(dark).glass)
 
@@ -124,7 +138,8 @@ class Shape:
 
 
 def _bow(hull: Surface) -> Mesh:
-    """A dark window over the foremost part of a shape; a mesh from a file shows its bow by itself."""
+    """A dark window over the foremost part of a shape; a mesh from a file shows its bow by
+    itself."""
     if hull.file is not None:
         return NOTHING
     stations = np.concatenate([[BOW], STATIONS[STATIONS > BOW]])

@@ -25,7 +25,8 @@ NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
 ARROWS = (0.1, 0.3)
-"""The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
+"""The longest arrow stays within these [m]; between them the scale is left alone, so it seldom
+jumps."""
 
 TORQUES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Torques [N m] that a ring of a radius of 0.1 m may stand for."""
@@ -63,17 +64,21 @@ def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale)
 def fitting(
     steps: Sequence[float], largest: float, current: float, unit: float, ends: tuple[float, float]
 ) -> float:
-    """What `unit` [m] in the view stands for, one of `steps`, so that `largest` ends within two ends;
-    `current` while that is good enough, or next to nothing is shown."""
+    """What `unit` [m] in the view stands for, one of `steps`, so that `largest` ends within two
+    ends; `current` while that is good enough, or next to nothing is shown."""
     if largest < steps[0] / 100.0 or ends[0] <= unit * largest / current <= ends[1]:
         return current
     return next((step for step in steps if unit * largest / step <= ends[1]), steps[-1])
 
 
 def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
-    """The scale of a swim, which only grows, so that its arrows compare; `before` is the last one."""
+    """The scale of a swim, which only grows, so that its arrows compare; `before` is the last
+    one."""
     moment = swimmer.shown
-    sizes = [np.linalg.norm(v, axis=-1).max() for v in (moment.force, moment.asked[:3], moment.delivered[:3])]
+    sizes = [
+        np.linalg.norm(v, axis=-1).max()
+        for v in (moment.force, moment.asked[:3], moment.delivered[:3])
+    ]
     fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= ARROWS[1])
     return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0)
 
@@ -89,8 +94,12 @@ class WrenchNodes:
             scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
         ]
 
-        def part(name: str, color: Rgb, mesh: Mesh, opacity: float | None = None) -> viser.MeshHandle:
-            shape = Shape(scene, f"/robot/wrench/{name}", color, mesh, opacity=opacity, cast_shadow=False)
+        def part(
+            name: str, color: Rgb, mesh: Mesh, opacity: float | None = None
+        ) -> viser.MeshHandle:
+            shape = Shape(
+                scene, f"/robot/wrench/{name}", color, mesh, opacity=opacity, cast_shadow=False
+            )
             return shape.node
 
         self._forces = Arrows(scene, "/robot/wrench/forces", 0.0065)
@@ -103,10 +112,18 @@ class WrenchNodes:
         self._torques = [UnitMesh(ring, about_z) for ring in rings]
 
     def refresh(
-        self, target: Array, got: Array, missing: Array, top: float, scale: float, turn: float, size: float
+        self,
+        target: Array,
+        got: Array,
+        missing: Array,
+        top: float,
+        scale: float,
+        turn: float,
+        size: float,
     ) -> None:
-        """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is missing
-        enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of rings [m/(N m)]."""
+        """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is
+        missing enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of
+        rings [m/(N m)]."""
         self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
         for node in self._nodes:
             node.scale = size
@@ -154,7 +171,8 @@ def along_x(way: Array) -> Array:
 
 
 def about_z(axis: Array) -> Array:
-    """A rotation (3, 3) that takes the z axis to a direction (3,), and the x axis astern as far as it goes.
+    """A rotation (3, 3) that takes the z axis to a direction (3,), and the x axis astern as far as
+    it goes.
 
     So a ring begins out of the way of the force's arrow, which mostly points ahead.
     """
@@ -170,12 +188,15 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class AttainableNodes:
-    """Sand for what works, grey for all where something has failed, a blue ball for what is asked."""
+    """Sand for what works, grey for all where something has failed, a blue ball for what is
+    asked."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
 
         def glass(name: str, color: tuple[int, int, int], opacity: float) -> Shape:
-            return Shape(scene, name, color, opacity=opacity, side="double", visible=False, cast_shadow=False)
+            return Shape(
+                scene, name, color, opacity=opacity, side="double", visible=False, cast_shadow=False
+            )
 
         self._now = glass("/robot/attainable/now", REACH, 0.34)
         self._whole = glass("/robot/attainable/whole", DEAD, 0.16)
@@ -186,8 +207,8 @@ class AttainableNodes:
     def refresh(
         self, findings: Findings | None, better: AttainableSet | None, target: Array, size: float
     ) -> None:
-        """Show the sets of findings, nothing for None, as large as `size` says, or a better one around the
-        present one; the ball marks what `target` (6,) [N, N m] asks in them."""
+        """Show the sets of findings, nothing for None, as large as `size` says, or a better one
+        around the present one; the ball marks what `target` (6,) [N, N m] asks in them."""
         if findings is None and not (self._now.node.visible or self._whole.node.visible):
             return
         now, full = (None, None) if findings is None else (findings.now, findings.whole)
@@ -226,7 +247,8 @@ def _body(vertices: Array, faces: NDArray[np.intp], outline: NDArray[np.intp]) -
 NEEDLE = 0.3
 """From the actuator to the tip [m], for size 1."""
 TIP, TAIL = 0.02, 0.012
-"""Radii of the ends [m], for size 1; where the robot is before one of them, the other one is free."""
+"""Radii of the ends [m], for size 1; where the robot is before one of them, the other one is
+free."""
 SNAP = np.cos(np.radians(5.0))
 """Cosine of the angle up to which the needle jumps to an axis of the body."""
 
@@ -243,7 +265,9 @@ class DirectionHandle:
         scene = client.scene
         self._root = scene.add_frame("/robot/direction", show_axes=False, visible=False)
         way = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
-        needle = Shape(scene, "/robot/direction/needle", LIGHT.line, tube(way, 0.0025, 10), cast_shadow=False)
+        needle = Shape(
+            scene, "/robot/direction/needle", LIGHT.line, tube(way, 0.0025, 10), cast_shadow=False
+        )
         self._ends = []
         for name, radius, sign in (("tip", TIP, 1.0), ("tail", TAIL, -1.0)):
             end = scene.add_icosphere(f"/robot/direction/{name}", radius, cast_shadow=False)
@@ -274,18 +298,26 @@ class DirectionHandle:
             put(self._root, position=place)
             put(self._needle, scale=size)
             for end, sign in self._ends:
-                put(end, scale=size, color=color, position=np.array([sign * NEEDLE * size, 0.0, 0.0]))
+                put(
+                    end,
+                    scale=size,
+                    color=color,
+                    position=np.array([sign * NEEDLE * size, 0.0, 0.0]),
+                )
             self._turn()
 
     def _turn(self) -> None:
         x, y, z = self._direction
-        wxyz = np.array([1.0 + x, 0.0, -z, y]) if x > -1.0 + 1e-9 else np.array([0.0, 0.0, 1.0, 0.0])
+        wxyz = (
+            np.array([1.0 + x, 0.0, -z, y]) if x > -1.0 + 1e-9 else np.array([0.0, 0.0, 1.0, 0.0])
+        )
         put(self._root, wxyz=wxyz / np.linalg.norm(wxyz))
 
 
 def on_sphere(eye: Array, aim: Array, radius: float, before: Array) -> Array:
-    """Direction (3,) to the point of a sphere about the origin that a ray from an eye (3,) along `aim` (3,)
-    meets, the one nearer to `before` (3,) of two; the nearest to the ray where it passes by."""
+    """Direction (3,) to the point of a sphere about the origin that a ray from an eye (3,) along
+    `aim` (3,) meets, the one nearer to `before` (3,) of two; the nearest to the ray where it passes
+    by."""
     aim = aim / np.linalg.norm(aim)
     foot = eye - (eye @ aim) * aim
     inside = radius**2 - foot @ foot

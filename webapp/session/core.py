@@ -1,4 +1,5 @@
-"""State with undo, selection, question and looks of a session; what is special about a layout is not here."""
+"""State with undo, selection, question and looks of a session; what is special about a layout is
+not here."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,8 +22,8 @@ FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let
 
 
 class Core:
-    """All of a session but changes of its layout. Undo is of the robot and its damage; wrench, method and
-    policy stay as they are."""
+    """All of a session but changes of its layout. Undo is of the robot and its damage; wrench,
+    method and policy stay as they are."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         """Start with a layout, no failures, and a gentle wrench forward and to the left."""
@@ -40,7 +41,8 @@ class Core:
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
         self.step: int | None = None
-        """How many steps of refinement the network's proposals have had that are shown; None for all."""
+        """How many steps of refinement the network's proposals have had that are shown; None for
+        all."""
         self.shifts: tuple[float, ...] = ()
         """How far along the first directions of the answer's null space the forces are [N]."""
         self.loops = False
@@ -53,7 +55,9 @@ class Core:
 
     # The state and its undo.
 
-    def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
+    def _commit(
+        self, name: str, state: State, merge_key: str | None = None, timed: bool = True
+    ) -> None:
         """Another state; a step of undo where the robot is another one."""
         before = self.state
         if state == before:
@@ -65,8 +69,8 @@ class Core:
         self.settle(before)
 
     def settle(self, before: State) -> None:
-        """After any change of the state: a choice of mode is void, an actuator that is gone is not selected;
-        one that is called otherwise now stays so."""
+        """After any change of the state: a choice of mode is void, an actuator that is gone is not
+        selected; one that is called otherwise now stays so."""
         self.revision += 1
         self.mode = 0
         self.step = None
@@ -124,7 +128,9 @@ class Core:
     def select_next(self) -> None:
         """Select the actuator after the selected one."""
         names = self.state.layout.names
-        self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
+        self.select(
+            names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0]
+        )
 
     # The question: wrench, settings, damage.
 
@@ -139,7 +145,9 @@ class Core:
             for axis, value in zip(range(len(AXES)), values, strict=True):
                 state = state.with_target(axis, float(value))
         except ValueError:
-            raise FinlabError(f"wrench: expected six numbers, got {','.join(values)!r:.60}") from None
+            raise FinlabError(
+                f"wrench: expected six numbers, got {','.join(values)!r:.60}"
+            ) from None
         self._commit("", state)
 
     def set_preset(self, name: str) -> None:
@@ -174,8 +182,8 @@ class Core:
         self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
 
     def damage(self, name: str, kind: str, value: Any) -> None:
-        """An actuator has a fault of a kind, see `Damage`: a share, an angle [rad], a command; None mends
-        that."""
+        """An actuator has a fault of a kind, see `Damage`: a share, an angle [rad], a command; None
+        mends that."""
         verb = "Mend" if value is None else FAULT_VERBS.get(kind, "Damage")
         self._commit(f"{verb} {name}", self.state.with_fault(name, kind, value), f"{kind} {name}")
 
@@ -184,7 +192,9 @@ class Core:
         state = self.state
         for kind in state.layout.part(name).FAULTS:
             state = state.with_fault(name, kind, None)
-        self._commit(f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state)
+        self._commit(
+            f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state
+        )
 
     def mend_all(self) -> None:
         """All actuators are whole again."""
@@ -199,7 +209,8 @@ class Core:
 
     @property
     def opened(self) -> str:
-        """What lies uppermost in the drawer of the open task, folded or not; nothing where it has none."""
+        """What lies uppermost in the drawer of the open task, folded or not; nothing where it has
+        none."""
         opened = self.desk.opened[self.desk.task]
         return opened if opened != WAYS[0] or self.state.layout.is_of_fins else WAYS[1]
 
@@ -234,7 +245,8 @@ class Core:
         self.mode = min(len(self.shifts), 1)
 
     def show_step(self, step: int, steps: int) -> None:
-        """Show the network's proposals after some steps of their refinement, of as many as there are."""
+        """Show the network's proposals after some steps of their refinement, of as many as there
+        are."""
         self.step = max(step, 0) if step < steps else None
 
     def set_loop(self, value: Any) -> None:

@@ -1,4 +1,5 @@
-"""Changes of a session's layout: place, turn, copy, remove and describe actuators, shape the hull."""
+"""Changes of a session's layout: place, turn, copy, remove and describe actuators, shape the
+hull."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -41,8 +42,8 @@ class Session(Core):
     # Robots.
 
     def open_layout(self, layout: Layout, step: str = "", failed: tuple[str, ...] = ()) -> None:
-        """Another layout, of which some may have failed; the target stays, damage and links are forgotten.
-        `step` is what undo calls it."""
+        """Another layout, of which some may have failed; the target stays, damage and links are
+        forgotten. `step` is what undo calls it."""
         method = method_for(layout, self.state.method)
         anew = replace(self.state, layout=layout, damage=Damage(failed), links=(), method=method)
         self._commit(step or f"Open {layout.name}", anew)
@@ -68,7 +69,9 @@ class Session(Core):
 
     def set_hull(self, shape: str, size: Vector) -> None:
         """A parametric hull of a size [m]."""
-        self._edit(f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
+        self._edit(
+            f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}"
+        )
 
     def import_hull(self, hull: Hull, name: str = "Import hull") -> None:
         """A hull from a mesh file; `name` is that of the step."""
@@ -76,7 +79,9 @@ class Session(Core):
 
     def set_center_of_gravity(self, center: Vector) -> None:
         """The centre of gravity at another place in the hull [m]."""
-        self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
+        self._edit(
+            "Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center"
+        )
 
     def set_dynamics(self, key: str, value: Any) -> None:
         """Another field of the body, one of `DYNAMICS`; None forgets it."""
@@ -87,17 +92,20 @@ class Session(Core):
     def forget_dynamics(self) -> None:
         """Nothing is said of mass, damping and buoyancy."""
         nothing: dict[str, Any] = dict.fromkeys(layout_edits.DYNAMICS)
-        self._edit("Forget mass and damping", layout_edits.with_dynamics(self.state.layout, **nothing))
+        self._edit(
+            "Forget mass and damping", layout_edits.with_dynamics(self.state.layout, **nothing)
+        )
 
     def estimate(self, anew: bool = False) -> None:
-        """What the hull says of the body; a mass that is known stays, unless all is estimated `anew`."""
+        """What the hull says of the body; a mass that is known stays, unless all is estimated
+        `anew`."""
         layout = self.state.layout
         known = layout_edits.with_dynamics(layout, mass_kg=None) if anew else layout
         self._edit("Estimate mass and damping from the hull", estimated(known))
 
     def set_jets(self, on: Any) -> None:
-        """Whether jets count: by the robot's own interaction where it was opened or saved with one, else by
-        the usual constants."""
+        """Whether jets count: by the robot's own interaction where it was opened or saved with one,
+        else by the usual constants."""
         layout = self.state.layout
         saved = self.saved
         own = saved.interaction if saved.names == layout.names else None
@@ -108,7 +116,8 @@ class Session(Core):
     # One actuator.
 
     def drag(self, name: str, position: Vector) -> None:
-        """An actuator on its way in the user's hand: one step of undo for the drag from end to end."""
+        """An actuator on its way in the user's hand: one step of undo for the drag from end to
+        end."""
         layout = layout_edits.moved(self.state.layout, name, position)
         self._follow(f"Move {name}", name, layout, f"drag {name}", timed=False)
 
@@ -118,9 +127,9 @@ class Session(Core):
         self.history.end_merge()
 
     def point(self, name: str, direction: Vector, held: bool = False) -> None:
-        """Another direction of an actuator: a thruster's axis, zero of an azimuth, the shaft of a fin or
-        rudder. `direction` may have any length; while it is `held` in the user's hand all is one step, until
-        `history.end_merge`."""
+        """Another direction of an actuator: a thruster's axis, zero of an azimuth, the shaft of a
+        fin or rudder. `direction` may have any length; while it is `held` in the user's hand all is
+        one step, until `history.end_merge`."""
         layout = layout_edits.pointed(self.state.layout, name, direction)
         self._follow(f"Point {name}", name, layout, f"point {name}", timed=not held)
 
@@ -132,7 +141,9 @@ class Session(Core):
             if wanted in layout.names:
                 raise FinlabError(f"there is an actuator {wanted!r:.70} already; give another name")
             renamed = layout.replace_actuator(name, name=wanted)
-            self._commit(f"Rename {name} to {wanted}", self.state.with_layout(renamed, {name: wanted}))
+            self._commit(
+                f"Rename {name} to {wanted}", self.state.with_layout(renamed, {name: wanted})
+            )
 
     def add(self, kind: str) -> None:
         """One more actuator of a type; it is selected."""
@@ -148,7 +159,8 @@ class Session(Core):
         self.chosen = (name,)
 
     def mirror(self) -> None:
-        """The selected actuator's image on the other side, which is selected; they move together."""
+        """The selected actuator's image on the other side, which is selected; they move
+        together."""
         source = self._chosen()[-1]
         layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
@@ -166,7 +178,9 @@ class Session(Core):
     def ring(self, count: int, around: str = "z") -> None:
         """Copies of the selected actuator, so that `count` stand evenly around a body axis."""
         name = self._chosen()[-1]
-        self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count, around))
+        self._edit(
+            f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count, around)
+        )
 
     # All selected actuators.
 
@@ -176,14 +190,20 @@ class Session(Core):
         self._edit(f"Delete {_words(names)}", layout_edits.deleted(self.state.layout, names))
 
     def place_selected(self, position: Vector) -> None:
-        """The selected actuator at another place [m]; others that are selected take what has changed."""
+        """The selected actuator at another place [m]; others that are selected take what has
+        changed."""
         names = self._chosen()
         before = self.state.layout.part(names[-1]).position
-        changed = [abs(new - old) > layout_edits.UNTOUCHED for new, old in zip(position, before, strict=True)]
+        changed = [
+            abs(new - old) > layout_edits.UNTOUCHED
+            for new, old in zip(position, before, strict=True)
+        ]
 
         def placed(layout: Layout, name: str) -> Layout:
             own = layout.part(name).position
-            x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
+            x, y, z = (
+                new if c else old for new, old, c in zip(position, own, changed, strict=True)
+            )
             return layout_edits.moved(layout, name, (x, y, z))
 
         self._for_each("Move", names, placed, f"move {names}")
@@ -191,7 +211,9 @@ class Session(Core):
     def turn_selected(self, angle: float) -> None:
         """All selected fins with one mounting angle [rad]; actuators without one stay."""
         parts = [self.state.layout.part(name) for name in self._chosen()]
-        names = tuple(part.name for part in parts if getattr(part, "mounting_angle", None) is not None)
+        names = tuple(
+            part.name for part in parts if getattr(part, "mounting_angle", None) is not None
+        )
         self._for_each("Turn", names, partial(layout_edits.turned, angle=angle), f"turn {names}")
 
     def point_selected(self, direction: Vector) -> None:
@@ -201,11 +223,13 @@ class Session(Core):
         self._for_each("Point", names, pointed, f"point {names}")
 
     def turn_about(self, direction: Vector) -> None:
-        """Another second axis of all selected actuators that have one, see `Actuator.turned_about`."""
+        """Another second axis of all selected actuators that have one, see
+        `Actuator.turned_about`."""
         self._change("Turn", lambda part: part.turned_about(direction))
 
     def set_value(self, key: str, value: Any) -> None:
-        """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""
+        """A field of all selected actuators that have it, see `with_value`, in SI units and
+        radians."""
         what = f"{key_words(key)} of"
         self._change(what, lambda part: part.with_value(key, value))
 
@@ -228,13 +252,17 @@ class Session(Core):
             raise FinlabError("no actuator is selected; click one, or choose it in the list")
         return self.chosen
 
-    def _edit(self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True) -> None:
+    def _edit(
+        self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True
+    ) -> None:
         layout = layout_edits.keeping_hull(self.state.layout, layout)
         self._commit(name, self.state.with_layout(layout), merge_key, timed)
 
     def _follow(self, step: str, name: str, layout: Layout, merge_key: str, timed: bool) -> None:
         """A layout in which one actuator has moved; its twin moves along."""
-        self._edit(step, followed(self.state.layout, layout, self.state.links, name), merge_key, timed)
+        self._edit(
+            step, followed(self.state.layout, layout, self.state.links, name), merge_key, timed
+        )
 
     def _change(self, what: str, change: Callable[[Actuator], Actuator]) -> None:
         def changed(layout: Layout, name: str) -> Layout:

@@ -1,7 +1,8 @@
 """Layouts, hulls and bundles as files that a browser sends and takes, and designs in links.
 
-Browsers do not send the part of an address behind its # to a server, so a link shows a design to whoever
-opens it, and not to the way. What comes out of a link is treated like any file that a browser sends.
+Browsers do not send the part of an address behind its # to a server, so a link shows a design to
+whoever opens it, and not to the way. What comes out of a link is treated like any file that a
+browser sends.
 """
 
 import base64
@@ -58,7 +59,8 @@ def file_stem(name: str) -> str:
 
 
 def has_files(layout: Layout) -> bool:
-    """Whether its file names others: tables of measured fins, a learned interaction, or a hull's mesh."""
+    """Whether its file names others: tables of measured fins, a learned interaction, or a hull's
+    mesh."""
     hull = None if layout.body is None else layout.body.hull
     return bool(layout.files) or (hull is not None and hull.mesh is not None)
 
@@ -69,13 +71,16 @@ def design_name(layout: Layout) -> str:
 
 
 def read_layout(name: str, content: bytes) -> design_files.Opened:
-    """The layout in an uploaded layout, bundle, archive or description. LayoutError, with file and key: too
-    large, no text, no layout, or a force table is missing. DataError: a table cannot be read."""
+    """The layout in an uploaded layout, bundle, archive or description. LayoutError, with file and
+    key: too large, no text, no layout, or a force table is missing. DataError: a table cannot be
+    read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = design_files.read_archive(source, content, cache_folder())
     elif len(content) > MAX_BYTES:
-        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
+        raise LayoutError(
+            f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source
+        )
     else:
         opened = design_files.read_design(source, content, cache_folder())
     plant_of(opened.layout)  # reads the tables of its fins
@@ -83,8 +88,8 @@ def read_layout(name: str, content: bytes) -> design_files.Opened:
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:
-    """Name and content of the layout's file: YAML, or an archive with the files that it names. DataError: a
-    table or the hull's mesh cannot be read, or is too large to travel."""
+    """Name and content of the layout's file: YAML, or an archive with the files that it names.
+    DataError: a table or the hull's mesh cannot be read, or is too large to travel."""
     stem = file_stem(layout.name)
     inside, tables = with_tables_inside(layout)
     inside, hull = design_files.with_hull_inside(inside)
@@ -104,25 +109,31 @@ def table_folder() -> Path:
 
 
 def stored_hull(name: str, content: bytes) -> Hull:
-    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content; in the
-    first unit in which it has the size of one. FinlabError: it is no mesh, too large, or cannot be kept."""
+    """The hull in an uploaded mesh file, which is checked and kept under a name made from its
+    content; in the first unit in which it has the size of one. FinlabError: it is no mesh, too
+    large, or cannot be kept."""
     short = Path(str(name)).name[-80:] or "upload"
     for scale in UNITS.values():
         with contextlib.suppress(SizeError):
-            return Hull(mesh=design_files.stored_mesh(short, content, scale, cache_folder()), scale=scale)
+            return Hull(
+                mesh=design_files.stored_mesh(short, content, scale, cache_folder()), scale=scale
+            )
     return Hull(
         mesh=design_files.stored_mesh(short, content, 1.0, cache_folder())
     )  # which says what is wrong
 
 
 def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
-    """A hull from a mesh file with another shape, in metres about the middle of its box; kept like an upload.
-    FinlabError: the hull is no mesh, its file is gone, or what comes of it is no hull."""
+    """A hull from a mesh file with another shape, in metres about the middle of its box; kept like
+    an upload. FinlabError: the hull is no mesh, its file is gone, or what comes of it is no
+    hull."""
     if hull.mesh is None:
         raise FinlabError("the hull is drawn from a shape; import a mesh first")
     drawn = Surface.of_file(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
     content = stl_of(change(drawn.mesh))
-    return replace(hull, mesh=design_files.stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
+    return replace(
+        hull, mesh=design_files.stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0
+    )
 
 
 def packed(layout: Layout, most: int = MAX_LINK) -> str:
@@ -135,22 +146,25 @@ def packed(layout: Layout, most: int = MAX_LINK) -> str:
     if len(text) > most:
         files, kind = (" with its files", "ZIP") if is_archive else ("", "file")
         raise FinlabError(
-            f"{layout.name}{files} needs {len(text):,} characters, a link carries {most:,}; save it, "
+            f"{layout.name}{files} needs {len(text):,} characters, a link carries {most:,}; save "
+            "it, "
             f"and share the {kind}"
         )
     return text
 
 
 def unpacked(text: str) -> design_files.Opened:
-    """The design in a link, checked like an upload; it may be anything. FinlabError: it holds no design, or a
-    wrong one."""
+    """The design in a link, checked like an upload; it may be anything. FinlabError: it holds no
+    design, or a wrong one."""
     kind = text[:1]
     coded = text[1:]
     try:
         data = base64.b64decode(coded + "=" * (-len(coded) % 4), altchars=b"-_", validate=True)
         if kind == PLAIN:
             unpacking = zlib.decompressobj()
-            data = unpacking.decompress(data, MAX_BYTES + 1)  # a small text may stand for a huge one
+            data = unpacking.decompress(
+                data, MAX_BYTES + 1
+            )  # a small text may stand for a huge one
             if len(data) <= MAX_BYTES and not unpacking.eof:
                 raise zlib.error("cut off")
     except (binascii.Error, ValueError, zlib.error):

@@ -1,4 +1,5 @@
-"""Changes of a layout that a designer makes by hand. Each takes a layout and returns another one."""
+"""Changes of a layout that a designer makes by hand. Each takes a layout and returns another
+one."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +20,8 @@ from finlab.swim.hull import hull_of
 from webapp.session.state import Links, chosen, number, numbers
 
 UNTOUCHED = 1e-6
-"""Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own rounding."""
+"""Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own
+rounding."""
 MAX_COORDINATE = 10.0
 """How far out an actuator may be placed in the browser [m]."""
 CLOSE = 0.005
@@ -57,31 +59,35 @@ def pointed(layout: Layout, name: str, direction: Vector) -> Layout:
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:
-    """A layout after an edit, with the hull that was drawn before where none is described: one that is made
-    to fit the fins would stretch with each of them."""
+    """A layout after an edit, with the hull that was drawn before where none is described: one that
+    is made to fit the fins would stretch with each of them."""
     if any(layout.body is not None and layout.body.hull is not None for layout in (after, before)):
         return after
     return with_hull(after, _drawn_hull(before))
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with an actuator's image on the other side of the robot, and the image's name. One that
-    already stands there is taken for the image, and nothing is added."""
+    """The layout with an actuator's image on the other side of the robot, and the image's name. One
+    that already stands there is taken for the image, and nothing is added."""
     part = layout.part(name)
     if abs(part.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
     others = (other for other in layout.actuators if other.name != name)
     there = next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)
-    return (layout, there) if there is not None else _added(layout, part.image(), _mirror_name(name))
+    return (
+        (layout, there) if there is not None else _added(layout, part.image(), _mirror_name(name))
+    )
 
 
 def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
-    """The layout with copies of an actuator, so that `count` of them stand evenly around a body axis.
-    FinlabError: the actuator stands on the axis, or there is no such axis."""
+    """The layout with copies of an actuator, so that `count` of them stand evenly around a body
+    axis. FinlabError: the actuator stands on the axis, or there is no such axis."""
     part = layout.part(name)
     axis = np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
-        raise FinlabError(f"{name} stands on the {around} axis, so its copies would all be in one place")
+        raise FinlabError(
+            f"{name} stands on the {around} axis, so its copies would all be in one place"
+        )
     all_of_them = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
     for k in range(1, all_of_them):
         layout, _ = _added(layout, _rotated(part, axis, math.tau * k / all_of_them), name)
@@ -89,24 +95,28 @@ def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
 
 
 def _rotated(part: Actuator, axis: Array, angle: float) -> Actuator:
-    """The actuator turned about an axis (3,) of the body by an angle [rad], place and own axes alike."""
+    """The actuator turned about an axis (3,) of the body by an angle [rad], place and own axes
+    alike."""
     turn = rotation(axis, angle)
     return part.turned(np.array(part.frame) @ turn.T, turn @ np.array(part.position))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a copy of an actuator above it, 5 cm or the first place that is free, and its name."""
+    """The layout with a copy of an actuator above it, 5 cm or the first place that is free, and its
+    name."""
     part = layout.part(name)
     x, y, z = part.position
     places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_ACTUATORS + 1))
     return _added(
-        layout, replace(part, position=next(p for p in places if _is_free(layout, p, STEP_UP))), name
+        layout,
+        replace(part, position=next(p for p in places if _is_free(layout, p, STEP_UP))),
+        name,
     )
 
 
 def added(layout: Layout, kind: str) -> tuple[Layout, str]:
-    """The layout with one more actuator on the hull, and its name: at the stern, or where there is room. A
-    fin's shaft points away from the hull; the others push or steer ahead."""
+    """The layout with one more actuator on the hull, and its name: at the stern, or where there is
+    room. A fin's shaft points away from the hull; the others push or steer ahead."""
     part: Actuator = KINDS[chosen(kind, "actuator", KINDS)].sample()
     hull = hull_of(layout)
     far = 4.0 * max(hull.half)
@@ -126,10 +136,14 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
 
 def blank(kind: str) -> Layout:
     """A robot to begin with: a round hull, and one actuator of a type on its left."""
-    part = replace(KINDS[chosen(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0))
+    part = replace(
+        KINDS[chosen(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0)
+    )
     if isinstance(part, Fin):
         part = replace(part, mounting_angle=math.pi / 2)
-    return Layout("New robot", (part,), body=Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))))
+    return Layout(
+        "New robot", (part,), body=Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2)))
+    )
 
 
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
@@ -148,7 +162,9 @@ def deleted(layout: Layout, names: Sequence[str]) -> Layout:
 
 def _added(layout: Layout, part: Actuator, wanted: str) -> tuple[Layout, str]:
     if layout.n >= MAX_ACTUATORS:
-        raise FinlabError(f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}")
+        raise FinlabError(
+            f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}"
+        )
     stem = wanted[:56]
     names = (stem, *(f"{stem}_{k}" for k in range(2, MAX_ACTUATORS + 2)))
     name = next(name for name in names if name not in layout.names)
@@ -189,8 +205,8 @@ def center_of_gravity(layout: Layout) -> Vector:
 
 
 def balanced(layout: Layout, center: Vector) -> Layout:
-    """The layout with the centre of gravity at a place in the hull [m]. The body frame has its origin there,
-    so hull, actuators and the centre of buoyancy move the other way."""
+    """The layout with the centre of gravity at a place in the hull [m]. The body frame has its
+    origin there, so hull, actuators and the centre of buoyancy move the other way."""
     checked = numbers(center, "of the centre of gravity [m]", -2.0, 2.0)
     x, y, z = np.subtract(center_of_gravity(layout), checked).tolist()
 
@@ -200,7 +216,9 @@ def balanced(layout: Layout, center: Vector) -> Layout:
     body = layout.body or Body()
     hull = replace(body.hull or _drawn_hull(layout), center_m=moved(hull_of(layout).center))
     buoyancy = body.center_of_buoyancy_m
-    body = replace(body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy))
+    body = replace(
+        body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy)
+    )
     parts = tuple(replace(part, position=moved(part.position)) for part in layout.actuators)
     return replace(layout, actuators=parts, body=body)
 
@@ -213,12 +231,14 @@ def with_dynamics(layout: Layout, **values: Any) -> Layout:
 
 
 def modelled(part: Actuator, kind: str) -> Actuator:
-    """The actuator with another kind of model, see `Actuator.with_model`; as it is where its kind has no such
-    one. FinlabError: there is no such model, or it needs a file."""
+    """The actuator with another kind of model, see `Actuator.with_model`; as it is where its kind
+    has no such one. FinlabError: there is no such model, or it needs a file."""
     if not part.MODELS or kind == part.model_type:
         return part
     if kind == "table":
-        raise FinlabError(f"a table for {part.name} comes from a file; drop its CSV, or fit measurements")
+        raise FinlabError(
+            f"a table for {part.name} comes from a file; drop its CSV, or fit measurements"
+        )
     chosen(kind, "model", [model for own in KINDS.values() for model in own.MODELS])
     return part.with_model(kind) if kind in part.MODELS else part
 
@@ -234,8 +254,8 @@ def unlinked(links: Links, name: str) -> Links:
 
 
 def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
-    """The layout after the twin of `name`, if any, took its mirrored place; axes that pointed the other way
-    than the image's `before` stay so."""
+    """The layout after the twin of `name`, if any, took its mirrored place; axes that pointed the
+    other way than the image's `before` stay so."""
     twin = partner(links, name)
     if twin is None or twin not in layout.names:
         return layout

@@ -1,4 +1,5 @@
-"""Tour and lessons of `lessons.yaml`: prepared states with words; a lesson has a task and its check."""
+"""Tour and lessons of `lessons.yaml`: prepared states with words; a lesson has a task and its
+check."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,7 +47,9 @@ class Stop(Struct, frozen=True, forbid_unknown_fields=True):
 
 def _aligned(answer: Allocation) -> bool:
     """Whether something is delivered, and in the direction that was asked for."""
-    delivered, target = (wrench / answer.scale for wrench in (answer.wrench, np.nan_to_num(answer.target)))
+    delivered, target = (
+        wrench / answer.scale for wrench in (answer.wrench, np.nan_to_num(answer.target))
+    )
     size = float(np.linalg.norm(delivered) * np.linalg.norm(target))
     return size > 0.0 and float(delivered @ target) / size > ALIGNED
 
@@ -55,7 +58,9 @@ DONE: dict[str, Callable[[Core, Allocation], bool]] = {
     "two-ways": lambda session, answer: session.mode > 0 and answer.reachable,
     "refinement": lambda session, _: session.step is not None and session.step > 0,
     "temperature": lambda session, _: (session.state.temperature or 0.0) > 1.9,
-    "watts-or-effort": lambda session, answer: least_of(session.state.method) == "watts" and answer.reachable,
+    "watts-or-effort": lambda session, answer: (
+        least_of(session.state.method) == "watts" and answer.reachable
+    ),
     "null-space": lambda session, _: bool(session.shifts) and session.mode == 2,
     "lost-fin": lambda session, answer: bool(session.state.failed) and answer.reachable,
     "no-yaw": lambda session, answer: (
@@ -85,7 +90,8 @@ KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
 
 
 class Guide:
-    """A stop of the tour, or a lesson, that is open; the scene brings its camera back with the work."""
+    """A stop of the tour, or a lesson, that is open; the scene brings its camera back with the
+    work."""
 
     def __init__(self, session: Core) -> None:
         self._session = session
@@ -96,8 +102,8 @@ class Guide:
         """The work as it was."""
 
     def open(self, name: str) -> None:
-        """Prepare the state of a stop; what was there before comes back at the end. FinlabError: there is no
-        such stop."""
+        """Prepare the state of a stop; what was there before comes back at the end. FinlabError:
+        there is no such stop."""
         stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
         session = self._session
         if self.stop is None:
@@ -144,7 +150,8 @@ class Guide:
                 setattr(self._session, key, value)
 
     def take(self, answer: Allocation) -> None:
-        """See what the fins do now; an exercise that is done stays so until another stop is opened."""
+        """See what the fins do now; an exercise that is done stays so until another stop is
+        opened."""
         session = self._session
         if self.stop is not None and answer.layout == session.state.able:
             done = DONE.get(self.stop.name)

@@ -39,7 +39,9 @@ class Desk:
     @cached_property
     def opened(self) -> dict[str, str]:
         """What lies uppermost in the drawer of each task; nothing where a task has none."""
-        return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(self.drawers)
+        return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(
+            self.drawers
+        )
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,12 @@ GOAL_WORDS = {
     "worst single failure": "worst_single_failure",
 }
 """What may be improved, in words, and the name that the search knows."""
-GOAL_UNITS = {words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()}
+GOAL_UNITS = {
+    words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()
+}
 WAY = (0.05, 0.05, 0.05, 180.0)
-"""How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
+"""How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said
+otherwise."""
 
 Way = tuple[float, float, float, float]
 
@@ -100,7 +105,8 @@ class SearchRequest:
     def with_way(self, way: tuple[Any, ...]) -> "SearchRequest":
         """Other bounds of all."""
         x, y, z = (
-            number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False)
+            number(v, f"reach along {axis} [m]", 0.0, 0.5)
+            for v, axis in zip(way, "xyz", strict=False)
         )
         return replace(self, way=(x, y, z, number(way[3], "turn [°]", 0.0, 180.0)))
 

@@ -31,7 +31,8 @@ MAX_SPEED = 3.0
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak or torn actuator."""
 COMPARED = ("dual", "analytic", "qp", "mdn", "sqp", "paper")
-"""Methods for fins that answer quickly enough to be compared while one waits, the quick ones first."""
+"""Methods for fins that answer quickly enough to be compared while one waits, the quick ones
+first."""
 LEAST = {"watts": "dual", "effort": "mdn"}
 """What answers may keep least, and the method that does it best."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
@@ -51,7 +52,8 @@ class State:
     """How far draws may stray from the mixture's means; None for the method's own."""
     method: str = "dual"
     network: str = ""
-    """Which of the networks that are there method `paper` answers with; empty for the one it began with."""
+    """Which of the networks that are there method `paper` answers with; empty for the one it began
+    with."""
     policy: str = "closest"
     links: Links = ()
     speed: float = 0.0
@@ -59,7 +61,8 @@ class State:
 
     @cached_property
     def flow(self) -> Flow | None:
-        """Velocity (6,) relative to the water where an actuator feels it and it is not at rest; else None."""
+        """Velocity (6,) relative to the water where an actuator feels it and it is not at rest;
+        else None."""
         felt = self.speed != 0.0 and plant_of(self.layout).feels_flow
         return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
@@ -74,10 +77,13 @@ class State:
         return tuple(self.damage.lost)
 
     def asking(self, other: "State") -> "State":
-        """The same robot with the question of another state: what is asked for, of whom, and how."""
+        """The same robot with the question of another state: what is asked for, of whom, and
+        how."""
         robot = {key: getattr(self, key) for key in ("layout", "damage", "links")}
         fits = self.layout is other.layout
-        return replace(other, **robot, method=other.method if fits else method_for(self.layout, other.method))
+        return replace(
+            other, **robot, method=other.method if fits else method_for(self.layout, other.method)
+        )
 
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
@@ -97,7 +103,8 @@ class State:
         return replace(self, damage=replace(self.damage, lost=tuple(names)))
 
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
-        """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend that."""
+        """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend
+        that."""
         part = self.layout.part(name)
         chosen(kind, f"fault of {name}, a {part.type}", part.FAULTS)
         checked = None if value is None else _checked_fault(part, kind, value)
@@ -107,13 +114,18 @@ class State:
         damage.applied_to(self.layout)  # says what cannot be
         return replace(self, damage=damage)
 
-    def with_layout(self, layout: Layout, renamed: Mapping[str, str] = MappingProxyType({})) -> "State":
-        """Another layout; damage and links of actuators that still exist stay, also of those that are
-        `renamed` (old and new names). FinlabError: one of them cannot have its damage any more."""
+    def with_layout(
+        self, layout: Layout, renamed: Mapping[str, str] = MappingProxyType({})
+    ) -> "State":
+        """Another layout; damage and links of actuators that still exist stay, also of those that
+        are `renamed` (old and new names). FinlabError: one of them cannot have its damage any
+        more."""
         names = {old: renamed.get(old, old) for old in self.layout.names}
         now = {old: new for old, new in names.items() if new in layout.names}
         lost = {now.get(name) for name in self.failed}
-        damage = replace(self.damage.renamed(now), lost=[name for name in layout.names if name in lost])
+        damage = replace(
+            self.damage.renamed(now), lost=[name for name in layout.names if name in lost]
+        )
         links = tuple((now[a], now[b]) for a, b in self.links if a in now and b in now)
         method = method_for(layout, self.method)
         return replace(self, layout=layout, links=links, method=method)._with_damage(damage)
@@ -139,7 +151,9 @@ def _checked_fault(part: Actuator, kind: str, value: Any) -> Any:
     if kind == "stuck":
         return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)
     if not isinstance(part, Fin):  # the robot's own checks say what else is wrong
-        return tuple(number(one, f"command that {name} keeps", -math.inf, math.inf) for one in value)
+        return tuple(
+            number(one, f"command that {name} keeps", -math.inf, math.inf) for one in value
+        )
     amplitude, frequency, angle = value
     return (
         _angle(amplitude, f"amplitude of {name} [°]", 0.0, MAX_AMPLITUDE),
@@ -166,7 +180,8 @@ def method_for(layout: Layout, method: str) -> str:
 
 
 def least_of(method: str) -> str:
-    """What a method keeps least: a key of `LEAST`. The two with networks know the paper's effort alone."""
+    """What a method keeps least: a key of `LEAST`. The two with networks know the paper's effort
+    alone."""
     return "effort" if method in DRAWING else "watts"
 
 
@@ -191,7 +206,9 @@ def numbers(
     values: Sequence[Any], of: str, low: float, high: float, words: Sequence[str] = "xyz"
 ) -> tuple[float, ...]:
     """Some numbers within limits, by the words that they are called in a sentence."""
-    return tuple(number(v, f"{word} {of}", low, high) for v, word in zip(values, words, strict=True))
+    return tuple(
+        number(v, f"{word} {of}", low, high) for v, word in zip(values, words, strict=True)
+    )
 
 
 MERGE_WINDOW_S = 1.0
@@ -217,8 +234,9 @@ class History:
         self._merge_time = 0.0
 
     def commit(self, name: str, state: State, merge_key: str | None, timed: bool) -> None:
-        """Make `state` the present one by a step called `name`. Changes with the same `merge_key` in quick
-        succession share a step; those that are not `timed` however slow they are, until `end_merge`."""
+        """Make `state` the present one by a step called `name`. Changes with the same `merge_key`
+        in quick succession share a step; those that are not `timed` however slow they are, until
+        `end_merge`."""
         now = self._clock()
         same = merge_key is not None and merge_key == self.merge_key
         if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):

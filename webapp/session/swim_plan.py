@@ -39,7 +39,8 @@ class SwimSettings:
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
-    """Whether breaking and mending is announced to the allocator; else the monitor has to detect it."""
+    """Whether breaking and mending is announced to the allocator; else the monitor has to detect
+    it."""
 
     def with_value(self, key: str, value: Any) -> "SwimSettings":
         """One field changed. FinlabError: there is no such field, or not with this value."""
@@ -66,8 +67,8 @@ class SwimSettings:
         """The plan for the robot as it is now.
 
         Raises:
-            FinlabError: the scenario takes more fins away than the robot has, or the controller is not for
-                this robot.
+            FinlabError: the scenario takes more fins away than the robot has, or the controller is
+                not for this robot.
         """
         day = self.day
         layout = self.day.believed(state.able)
@@ -81,7 +82,8 @@ class SwimSettings:
 
 
 def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
-    """The fins that a day weakens or takes away: the first without which the robot can still be steered."""
+    """The fins that a day weakens or takes away: the first without which the robot can still be
+    steered."""
     count = day.lost if day.weak is None else 1
     working = [name for name in layout.names if name not in failed]
     if count and count >= len(working):

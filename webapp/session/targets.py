@@ -23,13 +23,14 @@ FIRST = PRESETS["Turn"]
 
 
 STEPS = (5, 5, 73)
-"""Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg apart."""
+"""Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg
+apart."""
 
 
 @lru_cache(maxsize=64)
 def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
-    """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the others
-    free, in a flow (6,) [m/s, rad/s]."""
+    """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the
+    others free, in a flow (6,) [m/s, rad/s]."""
     works = np.array([name not in failed for name in layout.names])
     reach: Array = _extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0)
     reach.setflags(write=False)
@@ -44,7 +45,8 @@ def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
 
 @lru_cache(maxsize=64)
 def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
-    """Largest force (n,) of each actuator, and what it gives at most along each axis either way (2, n, 6)."""
+    """Largest force (n,) of each actuator, and what it gives at most along each axis either way (2,
+    n, 6)."""
     plant = plant_of(layout)
     force = plant.force(plant.grid(STEPS), flow=None if flow is None else np.array(flow))
     wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
@@ -53,5 +55,6 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
 
 
 def slider_end(reach: float) -> float:
-    """Where a slider ends: a quarter beyond the reach, to two digits; 1 where there is no reach at all."""
+    """Where a slider ends: a quarter beyond the reach, to two digits; 1 where there is no reach at
+    all."""
     return float(f"{1.25 * reach:.1e}") if reach > 1e-6 else 1.0

@@ -1,4 +1,5 @@
-"""What a layout can do, and what is in reach of a question: score cards, attainable sets, ranges."""
+"""What a layout can do, and what is in reach of a question: score cards, attainable sets,
+ranges."""
 
 from dataclasses import dataclass
 from functools import lru_cache

@@ -17,7 +17,8 @@ from webapp.tasks.solver import NO_MODES, Modes, Reply
 from webapp.tasks.ways import Search, find_ways
 
 SEARCH_REST_S = 0.2
-"""How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
+"""How long there must be no newer answer before all its modes are searched for [s]: that takes a
+while."""
 PROVED = ("Allocate", "Log")
 """Tasks in which it is said how far an answer may be from the best."""
 STEP_S = 0.2
@@ -32,8 +33,8 @@ class Seen(NamedTuple):
     best: Allocation | None
     """The answer itself."""
     shown: Allocation | None
-    """What is on the robot: the answer with the chosen mode's command, or, while that is refined, with what
-    has become so far of the proposal that leads to it."""
+    """What is on the robot: the answer with the chosen mode's command, or, while that is refined,
+    with what has become so far of the proposal that leads to it."""
     in_reach: bool
     busy: bool
     error: str | None
@@ -66,8 +67,8 @@ class Answering:
 
     @property
     def modes(self) -> Modes:
-        """The ways to do what an answer does, known after a moment of rest; until then those of the answer
-        before, of which none can be chosen."""
+        """The ways to do what an answer does, known after a moment of rest; until then those of the
+        answer before, of which none can be chosen."""
         return self.search.answer or NO_MODES
 
     @property
@@ -115,13 +116,17 @@ class Answering:
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
         known = self._shown
-        if known is None or known[0] is not best or not np.array_equal(known[1], command, equal_nan=True):
+        if (
+            known is None
+            or known[0] is not best
+            or not np.array_equal(known[1], command, equal_nan=True)
+        ):
             known = self._shown = (best, command, best.with_command(command))
         return known[2]
 
     def ask(self) -> None:
-        """Have the present state answered; then have the answer proved, where that is said, and its modes
-        found, where these can be seen."""
+        """Have the present state answered; then have the answer proved, where that is said, and its
+        modes found, where these can be seen."""
         session = self._session
         self.slot.ask(session.state)
         reply = self.slot.answer
@@ -149,7 +154,8 @@ class Answering:
 
 
 class Refining:
-    """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said."""
+    """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is
+    said."""
 
     def __init__(self, context: Context, answering: Answering) -> None:
         self._session = context.session
@@ -164,7 +170,8 @@ class Refining:
         return self._due is not None
 
     def toggle(self) -> None:
-        """Play, from the proposals where the end is shown, or pause. FinlabError: nothing can be played."""
+        """Play, from the proposals where the end is shown, or pause. FinlabError: nothing can be
+        played."""
         if self.running:
             self.stop()
             return
@@ -172,7 +179,9 @@ class Refining:
         modes = self._answering.modes
         if self._answering.searching or not modes.steps:
             raise FinlabError("the network proposes nothing here whose refinement could be shown")
-        if modes.proposal_of(session.mode) is None:  # the answer of another method: then the network's best
+        if (
+            modes.proposal_of(session.mode) is None
+        ):  # the answer of another method: then the network's best
             session.mode = min(place for place in modes.ends if place >= 0)
         if session.step is None:
             session.step = 0

@@ -11,8 +11,8 @@ from webapp.tasks.slot import Slot
 from webapp.tasks.solver import Solver
 
 TRIES = 3
-"""Answers of each method, of whose times the shortest counts: the first one may have to load a network, and
-on a busy machine any may have to wait."""
+"""Answers of each method, of whose times the shortest counts: the first one may have to load a
+network, and on a busy machine any may have to wait."""
 
 Answer = Allocation | str
 
@@ -37,7 +37,8 @@ class Run(NamedTuple):
 
 
 class Comparison(Slot[State, Allocation]):
-    """The runs of one page: one question per method, so that those of other pages are answered in between."""
+    """The runs of one page: one question per method, so that those of other pages are answered in
+    between."""
 
     def __init__(self, context: Context) -> None:
         super().__init__(context.pools.answers, context.bell, partial(_quickest, context.solver))
@@ -64,7 +65,9 @@ class Comparison(Slot[State, Allocation]):
         came = super().attend()
         if came and self.answered is not None:
             answer = self.answer or self.error or "no answer"
-            self.run = self.run._replace(answers=(*self.run.answers, (self.answered.method, answer)))
+            self.run = self.run._replace(
+                answers=(*self.run.answers, (self.answered.method, answer))
+            )
             self._next(self.answered)
         return came
 

@@ -30,7 +30,8 @@ KINDS = (
     "measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, DB3, BAG)"
 )
 SHARED = (
-    "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a copy, on a "
+    "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a "
+    "copy, on a "
     "finlab of their own."
 )
 
@@ -89,7 +90,10 @@ class Designs:
         if opened.notes:
             self._notify(f"Opened {opened.layout.name}", " ".join(opened.notes), calm=True)
         for file in opened.missing:
-            text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
+            text = (
+                f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP "
+                "archive"
+            )
             self._notify("Without its hull", text)
 
     def save(self) -> None:
@@ -103,7 +107,8 @@ class Designs:
         self._deferred.make(partial(files.layout_file, layout), send, "save")
 
     def share(self) -> None:
-        """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
+        """Show the link that carries the design, and take it to the clipboard where the browser
+        lets us."""
         layout = self._session.state.layout
         target = self._session.state.target
 
@@ -115,8 +120,8 @@ class Designs:
         self._deferred.make(partial(packed, layout), show, "share")
 
     def bundle(self) -> None:
-        """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried out on the
-        page does not go to the robot."""
+        """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried
+        out on the page does not go to the robot."""
         now = self._session.state
         solver = self._solver
         shipped = State(now.layout, method=now.method)
@@ -168,8 +173,8 @@ class Opening:
         self._takers |= dict.fromkeys(suffixes.split(","), take)
 
     def open(self, name: str, content: bytes) -> None:
-        """A file that the browser has sent. FinlabError: it is of no kind that is opened, or whoever takes it
-        refuses it."""
+        """A file that the browser has sent. FinlabError: it is of no kind that is opened, or
+        whoever takes it refuses it."""
         suffix = PurePath(name).suffix.lower()
         robot = suffix in TABLES and in_worker(is_robot_table, content)
         take = self._takers.get(".yaml" if robot else suffix)
@@ -180,4 +185,6 @@ class Opening:
 
 def _refuse(_key: str, _text: str) -> None:
     """What several files, or a folder, get for an answer."""
-    raise FinlabError("one file can be dropped at a time; put a design and its files into one ZIP archive")
+    raise FinlabError(
+        "one file can be dropped at a time; put a design and its files into one ZIP archive"
+    )

@@ -48,7 +48,8 @@ class Fitted:
 
 
 class Fitting(Slot[Upload, Fitted]):
-    """One file at a time for one page; what came of it goes on the fin at once, and undo takes it off."""
+    """One file at a time for one page; what came of it goes on the fin at once, and undo takes it
+    off."""
 
     def __init__(self, context: Context) -> None:
         super().__init__(context.pools.long, context.bell, fitted, watched=True, title="Not fitted")
@@ -60,19 +61,22 @@ class Fitting(Slot[Upload, Fitted]):
         return (super().progress or "reading the file") if self.busy else None
 
     def start(self, actuator: str, name: str, content: bytes) -> None:
-        """Begin with a file for an actuator. FinlabError: another file is under way, the file is too large,
-        or its kind has no table."""
+        """Begin with a file for an actuator. FinlabError: another file is under way, the file is
+        too large, or its kind has no table."""
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
         short = short_name(name)
         if len(content) > MAX_BYTES:
             raise DataError(
-                f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter "
+                f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it "
+                "into shorter "
                 "series, write cycle means, or use `finlab fit fin`"
             )
         part = self._session.state.layout.part(actuator)
         if not part.MODELS:
-            raise FinlabError(f"{actuator} is a {part.type}, without a table; type its coefficients")
+            raise FinlabError(
+                f"{actuator} is a {part.type}, without a table; type its coefficients"
+            )
         self.forget()
         self.ask(Upload(part, short, content))
 
@@ -82,7 +86,9 @@ class Fitting(Slot[Upload, Fitted]):
         session = self._session
         if found is not None:
             old = found.upload.part
-            alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
+            alike = [
+                part.name for part in session.state.layout.actuators if _model(part) == _model(old)
+            ]
             if not alike:
                 raise FinlabError("no other actuator has the model that this one had")
             session.set_model(alike, **found.found)
@@ -107,7 +113,8 @@ class Fitting(Slot[Upload, Fitted]):
 
 
 def fitted(upload: Upload, work: Work[Upload]) -> Fitted:
-    """What a file is worth for its actuator. FinlabError: it cannot be read or fitted, or nobody waits."""
+    """What a file is worth for its actuator. FinlabError: it cannot be read or fitted, or nobody
+    waits."""
     done = Upload(upload.part, upload.name, b"")
     with as_file(upload.name, upload.content) as path:
         if not isinstance(upload.part, Fin):
@@ -118,7 +125,8 @@ def fitted(upload: Upload, work: Work[Upload]) -> Fitted:
 
 
 def _measured(path: Path, done: Upload, work: Work[Upload]) -> Fitted:
-    """A fin by noisy measurements; a fit whose result is not waited for ends before its next step."""
+    """A fin by noisy measurements; a fit whose result is not waited for ends before its next
+    step."""
     from finlab.fit.fin_fit import fin_csv, fit_fin
     from finlab.fit.measurements import read_measurements
 
@@ -140,7 +148,8 @@ def short_name(name: str) -> str:
 
 @contextmanager
 def as_file(name: str, content: bytes) -> Iterator[Path]:
-    """An upload as a file while it is read; what is wrong with it is said without the file's folder."""
+    """An upload as a file while it is read; what is wrong with it is said without the file's
+    folder."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         path.write_bytes(content)
@@ -172,7 +181,8 @@ def _bench(path: Path, done: Upload) -> Fitted:
 
 
 def _is_table(path: Path) -> bool:
-    """Whether a file is a finished force table: every amplitude with every frequency and direction, once."""
+    """Whether a file is a finished force table: every amplitude with every frequency and direction,
+    once."""
     try:
         read_table(path)
     except DataError:

@@ -36,8 +36,9 @@ class Room:
     """What a layout's actuators have to keep when they are moved."""
 
     def __init__(self, layout: Layout, apart: float) -> None:
-        """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
-        `apart` [m]; what is closer already, or overlaps, need not part, but comes no closer."""
+        """Blades, and what stands outside of the layout's hull now, stay outside; what two
+        actuators sweep is `apart` [m]; what is closer already, or overlaps, need not part, but
+        comes no closer."""
         self._hull = hull_of(layout).coarse()
         fins = layout.is_fin
         self._along = np.where(fins[:, None], ALONG, 0.0)
@@ -48,7 +49,9 @@ class Room:
 
     def broken(self, position: Array, frames: Array) -> Array:
         """How far positions (P, n, 3) [m] and own axes (P, n, 3, 3) break the rules (P,) [m]."""
-        inside = (self._outside & self._hull.contains(self._places(position, frames))).sum(axis=(-1, -2))
+        inside = (self._outside & self._hull.contains(self._places(position, frames))).sum(
+            axis=(-1, -2)
+        )
         close = np.maximum(self._needed - self.gaps(position, frames) - 1e-9, 0.0).sum(axis=-1)
         return np.asarray(INSIDE * inside + close)
 
@@ -90,8 +93,8 @@ class Improver(Slot[Search, Improvement]):
         return None if progress is None else progress.layout
 
     def start(self, state: State, request: SearchRequest) -> None:
-        """Search from a layout for places of what works; mirror pairs stay mirror pairs. FinlabError: a
-        search is running, nothing works, or nothing may move."""
+        """Search from a layout for places of what works; mirror pairs stay mirror pairs.
+        FinlabError: a search is running, nothing works, or nothing may move."""
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
         bounds = request.bounds(state.layout.without(state.failed))

@@ -60,7 +60,9 @@ class Jobs:
         task = session.desk.task
         self.answering.ask()
         if task == "Allocate":
-            self.ranging.ask(State(state.able, state.damage, target=state.target, speed=state.speed))
+            self.ranging.ask(
+                State(state.able, state.damage, target=state.target, speed=state.speed)
+            )
         drawn = session.display.drawn
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
             question = Question(state.able, state.failed, session.saved, drawn, state.flow)

@@ -46,7 +46,8 @@ class LogReading(Slot[LogFile, "Judgement"]):
         return (super().progress or "reading the log") if self.busy else None
 
     def choose_robot(self, by_page: object) -> None:
-        """Judge by the page's robot, or by the one that the log tells; a log that is there is judged anew."""
+        """Judge by the page's robot, or by the one that the log tells; a log that is there is
+        judged anew."""
         self.by_page = bool(by_page)
         if self.question is not None:
             self.open(self.question.name, self.question.content)
@@ -56,7 +57,9 @@ class LogReading(Slot[LogFile, "Judgement"]):
         self.forget()
         self.moment = None
         self._session.show_task("Log")
-        self.ask(LogFile(short_name(name), content, self._session.state.layout if self.by_page else None))
+        self.ask(
+            LogFile(short_name(name), content, self._session.state.layout if self.by_page else None)
+        )
 
     def jump(self, time: float) -> None:
         """Put the robot of the log, and the wrench that it asked for at a time [s], on the page."""

@@ -1,4 +1,5 @@
-"""Ways to do what an answer does, in its null space: the answer, what the sliders say, the mean of both."""
+"""Ways to do what an answer does, in its null space: the answer, what the sliders say, the mean of
+both."""
 
 import numpy as np
 
@@ -19,7 +20,8 @@ MEAN = "average of 1 and 2"
 
 
 def null_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
-    """The answer and, where its forces are shifted [N], the other way and the mean of both commands."""
+    """The answer and, where its forces are shifted [N], the other way and the mean of both
+    commands."""
     space = NullSpace(answer)
     count = min(len(space.basis), MOST)
     shift = np.zeros(len(space.basis))
@@ -31,18 +33,26 @@ def null_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
         other = space.commands(shift[None])[0]
         ways += [_way(answer, other, OTHER, "null space")]
         ways += [_way(answer, space.mean(answer.command, other), MEAN, "average")]
-    names, about = zip(*[_words(answer, space, k) for k in range(count)], strict=True) if count else ((), ())
+    names, about = (
+        zip(*[_words(answer, space, k) for k in range(count)], strict=True) if count else ((), ())
+    )
     ends = tuple((float(low), float(high)) for low, high in ranges)
-    return Modes(tuple(ways), len(ways), null=NullWays(names, about, ends, len(space.basis) - count))
+    return Modes(
+        tuple(ways), len(ways), null=NullWays(names, about, ends, len(space.basis) - count)
+    )
 
 
 def _words(answer: Allocation, space: NullSpace, direction: int) -> tuple[str, str]:
     """What a direction is called, by numbers of actuators, and their shares in it by name."""
     shares = space.takers(direction)
     most = sorted(shares, key=lambda name: -shares[name])
-    numbers = sorted(answer.layout.index(name) + 1 for name in most[:MOST_NAMED] if shares[name] > NAMED)
+    numbers = sorted(
+        answer.layout.index(name) + 1 for name in most[:MOST_NAMED] if shares[name] > NAMED
+    )
     more = " …" * (len(most) > MOST_NAMED and shares[most[MOST_NAMED]] > NAMED)
-    return " ".join(map(str, numbers)) + more, ", ".join(f"{name} {shares[name]:.2f}" for name in most)
+    return " ".join(map(str, numbers)) + more, ", ".join(
+        f"{name} {shares[name]:.2f}" for name in most
+    )
 
 
 def _way(answer: Allocation, command: Array, name: str, badge: str) -> NamedMode:

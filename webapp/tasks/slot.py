@@ -1,7 +1,7 @@
 """Questions that take time: asked on the event loop, answered on threads; the newest one counts.
 
-A `Slot` keeps what one page has asked of one kind, and what came of it. Nothing is locked: a question is
-frozen, an answer is never changed, and all that a slot holds belongs to the event loop.
+A `Slot` keeps what one page has asked of one kind, and what came of it. Nothing is locked: a
+question is frozen, an answer is never changed, and all that a slot holds belongs to the event loop.
 """
 
 import asyncio
@@ -162,12 +162,15 @@ class Slot(Generic[Question, Answer]):
         Args:
             pool: threads that answer.
             bell: rung for this slot when there is an answer, or progress.
-            solve: gives the answer to a question, on a thread; what it raises is the slot's `error`.
+            solve: gives the answer to a question, on a thread; what it raises is the slot's
+            `error`.
             rest_s: how long a question must not change before it is worked on [s].
-            live: whether what is under way is finished when the question changes, so that a page follows a
-                dragged slider; else it is cancelled.
-            watched: whether `solve` also gets the `Work`: to report, and to see that it is cancelled.
-            title: heading of the note that tells of an error; empty where the page says it elsewhere.
+            live: whether what is under way is finished when the question changes, so that a page
+                follows a dragged slider; else it is cancelled.
+            watched: whether `solve` also gets the `Work`: to report, and to see that it is
+            cancelled.
+            title: heading of the note that tells of an error; empty where the page says it
+            elsewhere.
         """
         self._pool = pool
         self._bell = bell
@@ -198,7 +201,8 @@ class Slot(Generic[Question, Answer]):
         return None if self._work is None else self._work.progress
 
     def ask(self, question: Question, at_once: bool = False) -> None:
-        """Have a question answered, unless it is the one that was asked last; `at_once` without a rest."""
+        """Have a question answered, unless it is the one that was asked last; `at_once` without a
+        rest."""
         if self.question is not None and question == self.question:
             return
         self.question = question
@@ -277,9 +281,11 @@ class Deferred:
         self._begun: dict[Hashable, tuple[Future[Any], Callable[[Any], object]]] = {}
         self._next: dict[Hashable, tuple[Callable[[], Any], Callable[[Any], object]]] = {}
 
-    def make(self, work: Callable[[], Answer], use: Callable[[Answer], object], kind: Hashable) -> None:
-        """Do what takes time on a thread, and use what it gives on the loop. What waits for one of its
-        `kind` to end gives way to a newer one."""
+    def make(
+        self, work: Callable[[], Answer], use: Callable[[Answer], object], kind: Hashable
+    ) -> None:
+        """Do what takes time on a thread, and use what it gives on the loop. What waits for one of
+        its `kind` to end gives way to a newer one."""
         self._next[kind] = work, use
         self._begin(kind)
 

@@ -1,4 +1,5 @@
-"""The solver: from a state to an answer with all that a page shows of it, by allocators that it keeps."""
+"""The solver: from a state to an answer with all that a page shows of it, by allocators that it
+keeps."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +26,8 @@ from webapp.session.state import DRAWING, State, chosen
 from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
-"""Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
+"""Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones
+dear."""
 
 
 class NamedMode(NamedTuple):
@@ -35,7 +37,8 @@ class NamedMode(NamedTuple):
     name: str
     """What makes it different from the others that are shown."""
     badge: str
-    """Whose it is: `network`, `optimum` where it is proved to be least, or another method's name."""
+    """Whose it is: `network`, `optimum` where it is proved to be least, or another method's
+    name."""
 
 
 class NullWays(NamedTuple):
@@ -59,7 +62,8 @@ class Modes:
     """The first `MAX_SHOWN` of them, the answer first, no two of the same name."""
     count: int
     ways: tuple[Candidates, ...] = ()
-    """What a network proposed, then the same K after each step of their refinement where that is told."""
+    """What a network proposed, then the same K after each step of their refinement where that is
+    told."""
     null: "NullWays | None" = None
     """The null space that these ways lie in, where that is looked at."""
     ends: tuple[int, ...] = ()
@@ -78,11 +82,15 @@ class Modes:
 NO_MODES = Modes((), 0)
 
 
-def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
-    """The modes of an answer, of itself as a candidate and others; `badge` says whose it is, `ways` are what
-    a network proposed for it, and its refinement."""
+def modes_of(
+    answer: Allocation, candidates: Candidates, badge: str, ways: tuple[Candidates, ...]
+) -> Modes:
+    """The modes of an answer, of itself as a candidate and others; `badge` says whose it is, `ways`
+    are what a network proposed for it, and its refinement."""
     layout = answer.layout
-    modes = find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
+    modes = find_modes(
+        candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper
+    )
     shown = named_modes(modes, badge)
     last = ways[-1].command
     signatures = mode_signature(last, force_sizes(layout, last))
@@ -103,14 +111,19 @@ def _names(modes: Sequence[Mode]) -> list[str]:
     """Who rests; modes of the same name are numbered."""
     names = [_resting_words(mode) for mode in modes]
     places = [names[:k].count(name) + 1 for k, name in enumerate(names)]
-    return [f"{name} ({place})" if place > 1 else name for name, place in zip(names, places, strict=True)]
+    return [
+        f"{name} ({place})" if place > 1 else name
+        for name, place in zip(names, places, strict=True)
+    ]
 
 
 def _resting_words(mode: Mode) -> str:
     still = [k for k in mode.resting if k in mode.still]
     hardly = [k for k in mode.resting if k not in still]
     both = ((still, "rest", "rests"), (hardly, "hardly push", "hardly pushes"))
-    parts = [f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in both if fins]
+    parts = [
+        f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in both if fins
+    ]
     return ", ".join(parts) or "all fins push"
 
 
@@ -147,8 +160,8 @@ class Solver:
     """Answers states. Used from one thread only, the worker's."""
 
     def __init__(self, checkpoint: str | Path | None = None, load: Load = choose_method) -> None:
-        """`checkpoint` is a name or folder for method `mdn` or `paper`, None for the shipped ones; `load` is
-        replaced in tests."""
+        """`checkpoint` is a name or folder for method `mdn` or `paper`, None for the shipped ones;
+        `load` is replaced in tests."""
         self._checkpoint = checkpoint
         self._load = load
         self._choices: dict[tuple[str, str], MethodChoice] = {}
@@ -163,8 +176,8 @@ class Solver:
         return Solver(self._checkpoint, self._load)
 
     def networks(self) -> dict[str, Path]:
-        """The networks that method `paper` may answer with now, by name: the shipped one, those that were
-        trained here, and the checkpoint, which may be of another method."""
+        """The networks that method `paper` may answer with now, by name: the shipped one, those
+        that were trained here, and the checkpoint, which may be of another method."""
         folders = [resolve_checkpoint(SHIPPED)]
         folders += sorted(path.parent for path in Path(RUNS).glob("*/config.json"))
         if self._checkpoint is not None:
@@ -173,8 +186,8 @@ class Solver:
         return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
 
     def allocator(self, state: State) -> Allocator:
-        """The allocator for a state's robot, method and settings, one of the last few or made now; fails
-        where it cannot be made."""
+        """The allocator for a state's robot, method and settings, one of the last few or made now;
+        fails where it cannot be made."""
         layout = state.layout
         method = state.method
         temperature = state.temperature if method in DRAWING else None
@@ -195,14 +208,17 @@ class Solver:
     def _choice(self, method: str, network: str) -> MethodChoice:
         """A method with its networks, loaded once."""
         if (method, network) not in self._choices:
-            checkpoint = self._checkpoint if method == "mdn" and self.first_network == SHIPPED else None
+            checkpoint = (
+                self._checkpoint if method == "mdn" and self.first_network == SHIPPED else None
+            )
             if network and network != SHIPPED:
                 checkpoint = self.networks()[chosen(network, "network", self.networks())]
             self._choices[method, network] = self._load(method, checkpoint=checkpoint)
         return self._choices[method, network]
 
     def reply(self, state: State) -> Reply:
-        """The answer to a state with all that a page shows of it, computed to the end. Fails as `solve`."""
+        """The answer to a state with all that a page shows of it, computed to the end. Fails as
+        `solve`."""
         answer = judged(self.solve(state))
         _ = answer.forces, answer.power, answer.effort  # here, not where the page is written
         in_reach = answer.reachable
@@ -211,19 +227,23 @@ class Solver:
         return Reply(state, answer, in_reach)
 
     def both(self, state: State) -> BothWays:
-        """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as `solve`."""
+        """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as
+        `solve`."""
         known = state.layout.interaction
         blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
         judge = replace(blind.layout, interaction=known)
         flow = None if state.flow is None else np.array(state.flow)
         blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
         both = BothWays(state, self.solve(state), blind)
-        _ = [(answer.err_norm, answer.power) for answer in both[1:]]  # here, not where the page is written
+        _ = [
+            (answer.err_norm, answer.power) for answer in both[1:]
+        ]  # here, not where the page is written
         return both
 
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
-        """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
-        milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
+        """The answer, and beside it all distinct ways to do the same that the network proposes:
+        tens of milliseconds. Method `paper` has a network of its own. Where they are not `seen` it
+        is only proved."""
         answer = reply.answer
         state = reply.state
         _ = answer.bound  # to prove what is least takes longer than to find it
@@ -250,7 +270,11 @@ class Solver:
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
-            state.target, damage=state.damage, policy=POLICIES[state.policy], flow=state.flow, seed=0
+            state.target,
+            damage=state.damage,
+            policy=POLICIES[state.policy],
+            flow=state.flow,
+            seed=0,
         )
 
 
@@ -262,8 +286,8 @@ def _is_papers(folder: Path) -> bool:
 
 
 def judged(answer: Allocation) -> Allocation:
-    """An answer whose candidates and samples have the wrench by the fins' own laws, as it has itself. A
-    method with a learned model ranks them by what that believes."""
+    """An answer whose candidates and samples have the wrench by the fins' own laws, as it has
+    itself. A method with a learned model ranks them by what that believes."""
     if answer.wrench_expected is None:
         return answer
 

@@ -19,11 +19,11 @@ NOW = 10
 """Periods of which the present power is the mean: it jumps with every beat."""
 
 TIME, ERROR, DEPTH_ERROR, POWER = range(4)
-"""Columns of a record: time [s], distance from where it should be [m], that of the depth [m], driving power
-of all fins with motor losses [W]."""
+"""Columns of a record: time [s], distance from where it should be [m], that of the depth [m],
+driving power of all fins with motor losses [W]."""
 SURGE, PLACE, FORCES = 4, 6, 9
-"""First columns of the asked and delivered surge (2) [N], the position (3) [m], and of the force of each fin
-(n) [N]; then comes the probability of each fin being broken (n)."""
+"""First columns of the asked and delivered surge (2) [N], the position (3) [m], and of the force of
+each fin (n) [N]; then comes the probability of each fin being broken (n)."""
 
 
 class Figures(NamedTuple):
@@ -89,7 +89,8 @@ def row_of(tick: Tick) -> Array:
 
 
 def figures_of(rows: Array, period_s: float) -> Figures | None:
-    """What a whole record (N, ...) with a row per period [s] comes to; None where it has no rows."""
+    """What a whole record (N, ...) with a row per period [s] comes to; None where it has no
+    rows."""
     if not len(rows):
         return None
     power = rows[:, POWER]
@@ -125,7 +126,9 @@ class Swimmer:
         self._found: dict[str, float] = {}
         self._capsized: float | None = None
         start = swim.log
-        self._about = {f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"}
+        self._about = {
+            f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"
+        }
         self.shown = self.moment()
 
     @property
@@ -143,7 +146,8 @@ class Swimmer:
         self._note_findings()
 
     def _note_findings(self) -> None:
-        """When the monitor detected an unannounced loss; forgotten once the fin is whole or taken for it."""
+        """When the monitor detected an unannounced loss; forgotten once the fin is whole or taken
+        for it."""
         swim = self.swim
         unknown = [name for name in swim.lost if name not in swim.told]
         self._found = {
@@ -176,7 +180,9 @@ class Swimmer:
             lost=swim.lost,
             failed=tuple(swim.damage.lost),
             found=tuple(self._found.items()),
-            doubted=tuple(name for name, chance in zip(self.fins, chances, strict=True) if chance > 0.5),
+            doubted=tuple(
+                name for name, chance in zip(self.fins, chances, strict=True) if chance > 0.5
+            ),
             controllable=swim.controllable,
             capsized=self._capsized,
             done=swim.done,

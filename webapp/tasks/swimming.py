@@ -1,4 +1,5 @@
-"""A robot that swims on the page: steps it at the pace of the clock, never further behind than a moment."""
+"""A robot that swims on the page: steps it at the pace of the clock, never further behind than a
+moment."""
 
 import time
 from collections import deque
@@ -139,7 +140,8 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
 
 
 def swum(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Moment]":
-    """A robot at its start; or some steps of one, as many as the others can wait for, and its moment then."""
+    """A robot at its start; or some steps of one, as many as the others can wait for, and its
+    moment then."""
     if isinstance(question, Plan):
         allocator = solver.allocator(State(question.layout, method=question.method))
         return Swimmer(question, closed_loop(question, allocator))
@@ -171,7 +173,8 @@ class Pace:
         self._past.clear()
 
     def start_anew(self) -> None:
-        """The clock begins to run, or is held: nothing is owed, nothing is known of the true speed."""
+        """The clock begins to run, or is held: nothing is owed, nothing is known of the true
+        speed."""
         self._owed = 0.0
         self._past.clear()
 

@@ -28,7 +28,10 @@ def ways_csv(answer: Allocation, modes: Modes) -> bytes:
     ]
     for drawn in modes.ways[-1:]:
         figures = drawn.command, drawn.source, drawn.err_norm, drawn.power, drawn.effort
-        rows += [_row(answer, command, "candidate", *rest) for command, *rest in zip(*figures, strict=True)]
+        rows += [
+            _row(answer, command, "candidate", *rest)
+            for command, *rest in zip(*figures, strict=True)
+        ]
     text = io.StringIO(newline="")
     table = csv.DictWriter(
         text, [*COMMON, *dict.fromkeys(key for row in rows for key in row if key not in COMMON)]
@@ -44,5 +47,8 @@ def _row(answer: Allocation, command: Array, *common: Any) -> dict[str, Any]:
     own: Any = command_record(answer.layout, command, forces)["actuators"]
     for part, force in zip(own, forces, strict=True):
         row |= {f"{part['name']}.{key}": value for key, value in (part["command"] or {}).items()}
-        row |= {f"{part['name']}.F{axis}_n": float(value) for axis, value in zip("xyz", force, strict=True)}
+        row |= {
+            f"{part['name']}.F{axis}_n": float(value)
+            for axis, value in zip("xyz", force, strict=True)
+        }
     return row

@@ -1,9 +1,9 @@
 """Upper bounds of what a fin with a measured table is worth at prices of its force.
 
-The interpolation of a table is cubic along each axis of a cell, and linear in the table's values: what a
-command is worth, price times force less power, is one such polynomial. The largest of its Bernstein
-coefficients bounds it from above. Cells that may hold more than the best corner are halved along all axes
-(de Casteljau), until bound and corner are close.
+The interpolation of a table is cubic along each axis of a cell, and linear in the table's values:
+what a command is worth, price times force less power, is one such polynomial. The largest of its
+Bernstein coefficients bounds it from above. Cells that may hold more than the best corner are
+halved along all axes (de Casteljau), until bound and corner are close.
 """
 
 from typing import Any
@@ -19,7 +19,8 @@ from finlab.axes import TURN
 MOST_KEPT = 4096
 """Cells of a table whose coefficients are kept."""
 MOST_CELLS = 30_000
-"""Cells in work at once: larger tables are bounded price by price; where halving leads to more, it ends."""
+"""Cells in work at once: larger tables are bounded price by price; where halving leads to more, it
+ends."""
 _HALVES = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
 _SPLIT = np.concatenate([_HALVES, _HALVES[::-1, ::-1]])
 """Coefficients (4,) of a polynomial to those of both halves of its interval (2 * 4)."""
@@ -49,9 +50,12 @@ class TableBound:
         self._kept = self._cells(np.eye(self._values.shape[-1])) if small else None
 
     def __call__(self, price: Array) -> Array:
-        """Returns powers (N,) [W] that no command's worth exceeds at prices (N, 3) [W/N] along own axes."""
+        """Returns powers (N,) [W] that no command's worth exceeds at prices (N, 3) [W/N] along own
+        axes."""
         step = 1 + MOST_CELLS // self._ends[..., 0, 0].size
-        return np.concatenate([self._block(price[k : k + step]) for k in range(0, len(price), step)])
+        return np.concatenate(
+            [self._block(price[k : k + step]) for k in range(0, len(price), step)]
+        )
 
     def _block(self, price: Array) -> Array:
         factor = np.zeros((len(price) + 1, self._values.shape[-1]))
@@ -87,8 +91,11 @@ class TableBound:
         return np.asarray(np.maximum(most, best) + ROUNDING * slack / NOTHING)
 
     def _cells(self, factor: Array) -> Array:
-        """Coefficients (N, d, a, f, 4, 4, 4) of all cells, of the table's columns by factors (N, 3 or 4)."""
-        part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(-1, *self._values.shape[:3])
+        """Coefficients (N, d, a, f, 4, 4, 4) of all cells, of the table's columns by factors (N, 3
+        or 4)."""
+        part = (factor @ self._values.reshape(-1, factor.shape[1]).T).reshape(
+            -1, *self._values.shape[:3]
+        )
         for (
             near,
             weight,
@@ -100,15 +107,17 @@ class TableBound:
         return np.ascontiguousarray(part.reshape(-1, *counts).transpose(0, 1, 3, 5, 2, 4, 6))
 
     def _bounds(self, paid: Array, power: Array, ends: Array) -> tuple[Array, Array]:
-        """Bounds (...) of cells with coefficients (..., 4, 4, 4) and ends (..., 3, 2), and their best corners
-        (...)."""
+        """Bounds (...) of cells with coefficients (..., 4, 4, 4) and ends (..., 3, 2), and their
+        best corners (...)."""
         corner = paid[..., ::3, ::3, ::3]
         if self._blade is None:
             # Power is never below 0, whatever the interpolation says.
             least = np.maximum(power[..., ::3, ::3, ::3], 0.0)
-            return np.minimum(_largest(paid - power, 3), _largest(paid, 3)), _largest(corner - least, 3)
-        # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0: above the
-        # tangent in the middle.
+            return np.minimum(_largest(paid - power, 3), _largest(paid, 3)), _largest(
+                corner - least, 3
+            )
+        # The blade's power is f^3 g(A) with g convex, a mean of max(0, a A^2 + b A^3) with b >= 0:
+        # above the tangent in the middle.
         amplitude = ends[..., 1, :]
         frequency = ends[..., 2, :]
         exact = self._blade.power(amplitude[..., None], frequency[..., None, :])
@@ -127,11 +136,17 @@ def _largest(values: Array, axes: int) -> Array:
     return np.asarray(values.reshape(*values.shape[:-axes], -1).max(axis=-1))
 
 
-def _split(pair: Array, ends: Array, row: NDArray[np.intp]) -> tuple[Array, Array, NDArray[np.intp]]:
+def _split(
+    pair: Array, ends: Array, row: NDArray[np.intp]
+) -> tuple[Array, Array, NDArray[np.intp]]:
     """The eighths of cells, each once."""
     for _ in range(3):
         pair = np.tensordot(pair, _SPLIT, ([2], [1]))
-    eighths = pair.reshape(-1, 2, 2, 4, 2, 4, 2, 4).transpose(0, 2, 4, 6, 1, 3, 5, 7).reshape(-1, 2, 4, 4, 4)
+    eighths = (
+        pair.reshape(-1, 2, 2, 4, 2, 4, 2, 4)
+        .transpose(0, 2, 4, 6, 1, 3, 5, 7)
+        .reshape(-1, 2, 4, 4, 4)
+    )
     first = ends[..., 0]
     last = ends[..., 1]
     middle = 0.5 * (first + last)
@@ -141,10 +156,12 @@ def _split(pair: Array, ends: Array, row: NDArray[np.intp]) -> tuple[Array, Arra
     return eighths[once], ends[once], row.repeat(8)[once]
 
 
-def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) -> tuple[Any, Array, Array]:
-    """Of the cells of an axis with knots (n,), cut at limits: the places (c, 4) of their neighbours in a
-    table with a rim, the Bernstein coefficients by the values there (c, 4, 4), and the ends (c, 2), twice
-    the first one outside the knots, where the nearer one counts."""
+def _axis(
+    knots: Array, periodic: bool, low: float, high: float, turns: bool
+) -> tuple[Any, Array, Array]:
+    """Of the cells of an axis with knots (n,), cut at limits: the places (c, 4) of their neighbours
+    in a table with a rim, the Bernstein coefficients by the values there (c, 4, 4), and the ends
+    (c, 2), twice the first one outside the knots, where the nearer one counts."""
     middle = 0.5 * (knots[0] + knots[-1])
     cuts = knots
     if turns:
@@ -161,7 +178,8 @@ def _axis(knots: Array, periodic: bool, low: float, high: float, turns: bool) ->
     powers, places = shapes(knots, periodic)
     a, b = ((within - places[cell, :1]) * places[cell, 1:]).T
     one = np.ones_like(a)
-    # The symmetric form of each power of the place in a cell, at three ends: its Bernstein coefficients.
+    # The symmetric form of each power of the place in a cell, at three ends: its Bernstein
+    # coefficients.
     blossom = np.array(
         [
             [one, a, a * a, a * a * a],

@@ -1,6 +1,7 @@
 """Fins: what one may be commanded, how fast it comes to that, and how it sits on the hull.
 
-Command: (half amplitude [rad], frequency [Hz], zero direction [rad]). Own frame: shaft, zero, shaft x zero.
+Command: (half amplitude [rad], frequency [Hz], zero direction [rad]). Own frame: shaft, zero, shaft
+x zero.
 """
 
 import math
@@ -26,7 +27,13 @@ from finlab.actuators.actuator import (
     weakened,
 )
 from finlab.actuators.fin.fin_laws import stack_laws
-from finlab.actuators.fin.fin_model import FIN_MODELS, MAX_FREQUENCY, FinModelSpec, Limits, Parameter
+from finlab.actuators.fin.fin_model import (
+    FIN_MODELS,
+    MAX_FREQUENCY,
+    FinModelSpec,
+    Limits,
+    Parameter,
+)
 from finlab.actuators.fin.fin_response import FinGroup, fin_table
 from finlab.actuators.law import ActuatorLaw, FinLaw
 from finlab.arrays import Array
@@ -51,8 +58,9 @@ Rate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
 class Servo(Checked):
     """The drive of one fin; what is left out is U-CAT's. Checked on construction.
 
-    Amplitude, frequency and zero direction each follow their command through a critically damped filter with
-    a double pole p, x'' = p (p (x* - x) - 2 x'): half of the way is done after 1.7 / p, nine tenths after
+    Amplitude, frequency and zero direction each follow their command through a critically damped
+    filter with a double pole p, x'' = p (p (x* - x) - 2 x'): half of the way is done after 1.7 / p,
+    nine tenths after
     3.9 / p. The defaults are U-CAT's, as far as something is known of them.
     """
 
@@ -67,26 +75,27 @@ class Servo(Checked):
     }
 
     amplitude_pole: Rate = 7.5
-    """Double pole of the amplitude [rad/s]; the oscillators that drive the fins in U-CAT's open simulator
-    (eeUVsim) have k_amp = 15, twice the pole."""
+    """Double pole of the amplitude [rad/s]; the oscillators that drive the fins in U-CAT's open
+    simulator (eeUVsim) have k_amp = 15, twice the pole."""
     frequency_pole: Rate = 7.5
-    """Double pole of the frequency [rad/s]. Our choice: nothing is published, and eeUVsim's oscillators take
-    a new frequency at once; but a drive that is to beat faster must gather speed as one that is to beat wider
-    must, so it has the pole of the amplitude."""
+    """Double pole of the frequency [rad/s]. Our choice: nothing is published, and eeUVsim's
+    oscillators take a new frequency at once; but a drive that is to beat faster must gather speed
+    as one that is to beat wider must, so it has the pole of the amplitude."""
     direction_pole: Rate = 3.5
     """Double pole of the zero direction [rad/s]; eeUVsim's k_zd = 7."""
     speed_limit: Rate = 4 * math.pi
-    """Fastest that the fin turns [rad/s]; two turns a second in U-CAT's UWSim plug-in. It cuts the amplitude
-    of fast flapping and slows the turning of a fin that flaps."""
+    """Fastest that the fin turns [rad/s]; two turns a second in U-CAT's UWSim plug-in. It cuts the
+    amplitude of fast flapping and slows the turning of a fin that flaps."""
 
     amplitude_rate: Rate = 1.0
-    """How fast the commanded amplitude changes at most from tick to tick [rad/s]: what the filter above
-    follows with a delay of two tenths of the amplitude."""
+    """How fast the commanded amplitude changes at most from tick to tick [rad/s]: what the filter
+    above follows with a delay of two tenths of the amplitude."""
     frequency_rate: Rate = 3.0
     """The same of the commanded frequency [Hz/s]."""
     direction_rate: Rate = 5.0
-    """The same of the commanded zero direction [rad/s]. A fin that is commanded to turn back at once pushes
-    wherever it points meanwhile; one that is commanded step by step gives the others time to compensate."""
+    """The same of the commanded zero direction [rad/s]. A fin that is commanded to turn back at
+    once pushes wherever it points meanwhile; one that is commanded step by step gives the others
+    time to compensate."""
 
 
 class FinCommand(
@@ -117,7 +126,12 @@ def _box(law: str, key: str, rule: Parameter) -> Box:
     unit = f" [{rule.unit}]".replace("^2", "²").replace("^3", "³") if rule.unit else ""
     hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
     return Box(
-        f"{key_words(key)}{unit}", key, hint, (abs(rule.default) or 1.0) / 20, law=law, usual=rule.default
+        f"{key_words(key)}{unit}",
+        key,
+        hint,
+        (abs(rule.default) or 1.0) / 20,
+        law=law,
+        usual=rule.default,
     )
 
 
@@ -143,20 +157,37 @@ class Fin(Actuator):
     LOOKS = "fin"
     OTHER = "Zero"
     BOXES = (
-        Box("A [°]", "amplitude", "Half of the beat: least and most, up to 90.", 5.0, True, pair=True),
+        Box(
+            "A [°]",
+            "amplitude",
+            "Half of the beat: least and most, up to 90.",
+            5.0,
+            True,
+            pair=True,
+        ),
         Box("f [Hz]", "frequency", f"Least and most, up to {MAX_FREQUENCY:g} Hz.", pair=True),
-        Box("φ [°]", "zero_direction", "From and to; −180 to 180 is any direction.", 5.0, True, pair=True),
+        Box(
+            "φ [°]",
+            "zero_direction",
+            "From and to; −180 to 180 is any direction.",
+            5.0,
+            True,
+            pair=True,
+        ),
     )
     MODELS = FORMULAS
-    LAW_BOXES = tuple(_box(law, key, rule) for law in FORMULAS for key, rule in FIN_MODELS[law].items())
+    LAW_BOXES = tuple(
+        _box(law, key, rule) for law in FORMULAS for key, rule in FIN_MODELS[law].items()
+    )
 
     name: Name
     """Unique within its layout; `--lost NAME` and the app refer to it."""
     position: tuple[Coordinate, Coordinate, Coordinate]
-    """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
+    """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity)
+    [m]."""
     mounting_angle: MountingAngle | None = None
-    """Azimuth of a horizontal shaft in the body xy plane, from +x, counter-clockwise [rad]; None where
-    `shaft` and `zero` are given."""
+    """Azimuth of a horizontal shaft in the body xy plane, from +x, counter-clockwise [rad]; None
+    where `shaft` and `zero` are given."""
     limits: Limits = Limits()
     """What the fin may be commanded."""
     model: FinModelSpec = FinModelSpec()
@@ -164,15 +195,16 @@ class Fin(Actuator):
     servo: Servo = Servo()
     """How fast it comes to what is commanded."""
     shaft: axes.Direction3 | None = None
-    """Unit vector out of the hull along the shaft, body frame; None where `mounting_angle` is given."""
+    """Unit vector out of the hull along the shaft, body frame; None where `mounting_angle` is
+    given."""
     zero: axes.Direction3 | None = None
-    """Unit vector across the shaft: the thrust's direction at zero direction 0; from there it turns towards
-    shaft x zero. None where
-    `mounting_angle` is given; zero is e_z x shaft then."""
+    """Unit vector across the shaft: the thrust's direction at zero direction 0; from there it turns
+    towards shaft x zero. None where `mounting_angle` is given; zero is e_z x shaft then."""
     uncertainty: Uncertainty | None = None
     """How far its force may be from that; None where nothing is known of it."""
     diameter: Diameter | None = None
-    """Of a disc as large as the area that it sweeps [m], for its jet; None where its blade is as large."""
+    """Of a disc as large as the area that it sweeps [m], for its jet; None where its blade is as
+    large."""
 
     def check_together(self) -> None:
         """See `Actuator`."""
@@ -186,7 +218,8 @@ class Fin(Actuator):
         object.__setattr__(self, "shaft", shaft)
         object.__setattr__(self, "zero", zero)
         if math.dist(zero, (-shaft[1], shaft[0], 0.0)) < SAME_AXIS:
-            # The shaft is horizontal, and zero where a mounting angle has it: one fin has one description.
+            # The shaft is horizontal, and zero where a mounting angle has it: one fin has one
+            # description.
             object.__setattr__(self, "mounting_angle", math.atan2(shaft[1], shaft[0]))
             object.__setattr__(self, "shaft", None)
             object.__setattr__(self, "zero", None)
@@ -248,7 +281,9 @@ class Fin(Actuator):
         return replace(self, model=FinModelSpec(self.model.type, tuple(parameters.items())))
 
     def with_model(self, kind: str) -> Self:
-        shared = tuple((key, value) for key, value in self.model.parameters if key in FIN_MODELS[kind])
+        shared = tuple(
+            (key, value) for key, value in self.model.parameters if key in FIN_MODELS[kind]
+        )
         return replace(self, model=FinModelSpec(kind, shared))
 
     @property
@@ -267,7 +302,9 @@ class Fin(Actuator):
     @property
     def delay_s(self) -> float:
         """See `Actuator`: 2 / p of its slowest double pole p."""
-        return 2.0 / min(self.servo.amplitude_pole, self.servo.frequency_pole, self.servo.direction_pole)
+        return 2.0 / min(
+            self.servo.amplitude_pole, self.servo.frequency_pole, self.servo.direction_pole
+        )
 
     def largest(self, speed: float) -> float:
         """See `Actuator`: a soft fin may push more with a smaller command than the largest."""
@@ -279,7 +316,9 @@ class Fin(Actuator):
         if faults.running is not None:
             amplitude, frequency, direction = ((value, value) for value in faults.running)
             return replace(self, model=model, limits=Limits(amplitude, frequency, direction))
-        amplitude, frequency = (weakened(ends, faults.weak) for ends in (own.amplitude, own.frequency))
+        amplitude, frequency = (
+            weakened(ends, faults.weak) for ends in (own.amplitude, own.frequency)
+        )
         limits = Limits(amplitude, frequency, held_limits(faults.stuck, own.zero_direction))
         return replace(self, model=model, limits=limits)
 
@@ -300,12 +339,13 @@ class Fin(Actuator):
         return super().direction_words
 
     def turned(self, frame: ArrayLike, position: ArrayLike | None = None, **changes: Any) -> Self:
-        """See `Actuator`: a shaft that is horizontal, with zero across it, becomes a mounting angle again."""
+        """See `Actuator`: a shaft that is horizontal, with zero across it, becomes a mounting angle
+        again."""
         return Actuator.turned(self, frame, position, mounting_angle=None, **changes)
 
     def image(self) -> Self:
-        """See `Actuator`: a horizontal shaft keeps its mounting angle, whose zero is the other way round
-        there."""
+        """See `Actuator`: a horizontal shaft keeps its mounting angle, whose zero is the other way
+        round there."""
         level = self.mounting_angle is not None
         frame = np.array(self.frame) * axes.MIRROR * ([[1.0], [-1.0], [1.0]] if level else 1.0)
         limits = self.limits
@@ -317,7 +357,8 @@ class Fin(Actuator):
         return self.turned(frame, np.array(self.position) * axes.MIRROR, limits=limits)
 
     def settled(self, frame: Array) -> Array:
-        """See `Actuator`: a fin that turns all round has zero where a mounting angle has it, or ahead."""
+        """See `Actuator`: a fin that turns all round has zero where a mounting angle has it, or
+        ahead."""
         low, high = self.limits.zero_direction
         if axes.is_full_turn(high - low):
             level = abs(frame[0, 2]) < axes.SHORT

@@ -12,7 +12,8 @@ from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Part, checked, given
 
 MAX_AMPLITUDE = math.pi / 2
-"""Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the hull."""
+"""Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the
+hull."""
 MAX_FREQUENCY = 20.0
 """Largest frequency a layout may allow [Hz]; ten times what such servos reach."""
 
@@ -30,7 +31,8 @@ LEAST_WIDTH = 1e-6
 
 @dataclass(frozen=True)
 class Limits(Checked):
-    """What one fin may be commanded. The defaults are the nominal limits. Checked on construction."""
+    """What one fin may be commanded. The defaults are the nominal limits. Checked on
+    construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = {
         "amplitude": "amplitude_rad",
@@ -44,7 +46,8 @@ class Limits(Checked):
     frequency: tuple[Frequency, Frequency] = (0.1, 2.1)
     """Frequency [Hz], (minimum, maximum)."""
     zero_direction: tuple[Direction, Direction] = (-math.pi, math.pi)
-    """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any direction."""
+    """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any
+    direction."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -54,18 +57,22 @@ class Limits(Checked):
                 raise LayoutError(f"minimum {low:g} is above maximum {high:g}; swap them", name)
             if name != "zero_direction" and (high < LEAST[name] or 0.0 < low < LEAST[name]):
                 raise LayoutError(
-                    f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got {low:g} "
+                    f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got "
+                    f"{low:g} "
                     f"and {high:g}; leave the fin out if it never moves",
                     name,
                 )
             if 0.0 < high - low < LEAST_WIDTH:
                 raise LayoutError(
-                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one value twice",
+                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one "
+                    "value twice",
                     name,
                 )
         width = self.zero_direction[1] - self.zero_direction[0]
         if width > TURN + FULL_TURN_TOLERANCE:
-            raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction")
+            raise LayoutError(
+                f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction"
+            )
 
     @property
     def lower(self) -> tuple[float, float, float]:
@@ -153,15 +160,17 @@ class FinModelSpec(Part):
 
     @classmethod
     def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
-        """The spec of a mapping with the model's name under `type` and its parameters beside it. Raises
-        LayoutError: unknown model, unknown parameter, or a value that is none."""
+        """The spec of a mapping with the model's name under `type` and its parameters beside it.
+        Raises LayoutError: unknown model, unknown parameter, or a value that is none."""
         return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
 
     def scaled(self, share: float) -> "FinModelSpec":
-        """The model of a fin that gives a share of the thrust at every command. Raises LayoutError: the fin
-        is a table, whose file would have to be another one."""
+        """The model of a fin that gives a share of the thrust at every command. Raises LayoutError:
+        the fin is a table, whose file would have to be another one."""
         if self.type not in SCALES_THRUST:
-            raise LayoutError("the thrust of a table cannot be scaled; name another CSV file", "type")
+            raise LayoutError(
+                "the thrust of a table cannot be scaled; name another CSV file", "type"
+            )
         name, exponent = SCALES_THRUST[self.type]
         rule = FIN_MODELS[self.type][name]
         value = min(max(float(self.values()[name]) * share**exponent, rule.low), rule.high)

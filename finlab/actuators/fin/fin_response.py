@@ -1,9 +1,10 @@
-"""The answer of a fin to a price: for each price the command that is worth most, by the fin's own law.
+"""The answer of a fin to a price: for each price the command that is worth most, by the fin's own
+law.
 
-The fin's amplitude and frequency maximize `v T(A, f) - P(A, f)` within its limits. That is found on a grid of
-commands and made exact by finer and finer grids around the best place: it needs no derivatives and holds for
-any law, convex or not. A fin whose force differs from one direction to the next has a gauge: the share of the
-force that the same cost gives in each direction.
+The fin's amplitude and frequency maximize `v T(A, f) - P(A, f)` within its limits. That is found on
+a grid of commands and made exact by finer and finer grids around the best place: it needs no
+derivatives and holds for any law, convex or not. A fin whose force differs from one direction to
+the next has a gauge: the share of the force that the same cost gives in each direction.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,16 +40,18 @@ class FinTable:
     half: float
     """Half of it [rad]; pi for a full circle."""
     gauge: Array | None
-    """Share (POINTS,) of the table's force in each direction, from 0 on; None where they are the same."""
+    """Share (POINTS,) of the table's force in each direction, from 0 on; None where they are the
+    same."""
     beat: Array
-    """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
+    """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j /
+    POINTS)^2`."""
     box: "_Box"
     """The law within the limits."""
     form: Form
     """How a force becomes a command."""
     deflection: Array
-    """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
-    same."""
+    """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it
+    is the same."""
 
     @cached_property
     def rises(self) -> bool:
@@ -66,8 +69,8 @@ class FinGroup(Group):
     """The fins of a robot as answers to prices: planes of forces, each compiled from its law."""
 
     def __init__(self, fins: Sequence[Any], effectiveness: Array) -> None:
-        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process.
-        Raises DataError: a table cannot be read, or a fin gives no thrust."""
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in
+        a process. Raises DataError: a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
         self._effectiveness = effectiveness
@@ -82,15 +85,17 @@ class FinGroup(Group):
         return [table.form for table in self._tables]
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
-        """See `Group`: from the commands of the table on both sides of each price, by the law; of fins that
-        were measured nothing. Where a price is below 0, or the force falls again towards its limits, from
-        a grid of commands."""
+        """See `Group`: from the commands of the table on both sides of each price, by the law; of
+        fins that were measured nothing. Where a price is below 0, or the force falls again towards
+        its limits, from a grid of commands."""
         result = np.full(price.shape, np.nan)
         for i, table in enumerate(self._tables):
             if table.box.law.measured:
                 continue
             own = price[:, i]
-            place = np.interp(own, price_grid(table.table.top), table.table.force) / self._largest[i]
+            place = (
+                np.interp(own, price_grid(table.table.top), table.table.force) / self._largest[i]
+            )
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(own, starts)
@@ -109,7 +114,9 @@ class FinGroup(Group):
             if table.box.law.measured:
                 places = [i for i, own in enumerate(self._tables) if own is table]
                 own = np.einsum("maw,nw->nma", self._effectiveness[places], price)
-                result[:, places] = _table_bound(table.box)(own.reshape(-1, 3)).reshape(len(price), -1)
+                result[:, places] = _table_bound(table.box)(own.reshape(-1, 3)).reshape(
+                    len(price), -1
+                )
         return result
 
 
@@ -122,7 +129,8 @@ def fin_table(fin: Any) -> FinTable:
         result = _compiled(fin.model, fin.limits, fin.stamp)
     if result is None:
         raise DataError(
-            f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
+            f"{fin.name}: gives no thrust within its limits, amplitudes "
+            f"{fin.limits.amplitude[0]:.4g} to "
             f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
             f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
         )
@@ -130,8 +138,11 @@ def fin_table(fin: Any) -> FinTable:
 
 
 @lru_cache(maxsize=512)
-def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> FinTable | None:
-    """The table of a fin, None where it gives no thrust; one whose file has changed is read again."""
+def _compiled(
+    model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
+) -> FinTable | None:
+    """The table of a fin, None where it gives no thrust; one whose file has changed is read
+    again."""
     law = make_law(model)
     box = _Box(law, np.array(limits.lower), np.array(limits.upper))
     strongest = box.largest()
@@ -178,8 +189,8 @@ class _Box:
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
-        """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by a coarse
-        grid."""
+        """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by
+        a coarse grid."""
         low = self.lower[2]
         high = self.upper[2]
         if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
@@ -188,7 +199,8 @@ class _Box:
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
-        """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""
+        """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse
+        grid."""
         command = np.tile(self.grid((GRID[0] // 2 + 1, GRID[1] // 2 + 1)), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
@@ -213,13 +225,15 @@ class _Box:
 
     def grid(self, shape: tuple[int, int] = GRID) -> Array:
         """Commands (G, 3) on a grid of amplitudes and frequencies."""
-        axes = [np.linspace(a, b, n) for a, b, n in zip(self.lower, self.upper, shape, strict=False)]
+        axes = [
+            np.linspace(a, b, n) for a, b, n in zip(self.lower, self.upper, shape, strict=False)
+        ]
         beat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         return self.command(beat)
 
     def best(self, price: Array, starts: Array | None = None) -> Array:
-        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best of starts (S, K, 2), or of
-        a grid, by Newton's method within the limits."""
+        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best of starts (S, K,
+        2), or of a grid, by Newton's method within the limits."""
         row = np.arange(len(price))
         if starts is None:
             grid = self.grid()
@@ -249,9 +263,12 @@ class _Box:
         return self.command(beat)
 
     def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
-        """Gradient (K, 2) and Hessian (K, 2, 2) of what commands are worth, by amplitude and frequency."""
+        """Gradient (K, 2) and Hessian (K, 2, 2) of what commands are worth, by amplitude and
+        frequency."""
         at = np.where(beat + probe > self.upper[:2], beat - probe, beat)
-        slope, *near = self._slope(price, np.stack([beat, at, at + probe * [1, 0], at + probe * [0, 1]]))
+        slope, *near = self._slope(
+            price, np.stack([beat, at, at + probe * [1, 0], at + probe * [0, 1]])
+        )
         with np.errstate(invalid="ignore", divide="ignore"):
             curve = np.stack([near[1] - near[0], near[2] - near[0]], axis=-1) / probe
         return slope, 0.5 * (curve + curve.swapaxes(-1, -2))
@@ -260,11 +277,14 @@ class _Box:
         command = self.command(beat)
         force, jacobian = self.law.force_and_jacobian(command)
         size = np.maximum(np.linalg.norm(force[..., 1:], axis=-1), 1e-300)
-        along = np.einsum("...ci,...i->...c", jacobian[..., :2, 1:], force[..., 1:]) / size[..., None]
+        along = (
+            np.einsum("...ci,...i->...c", jacobian[..., :2, 1:], force[..., 1:]) / size[..., None]
+        )
         return np.asarray(price[:, None] * along - self.law.power_gradient(command)[..., :2])
 
     def top_price(self, strongest: float) -> float:
-        """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
+        """The price [W/N] at which the fin gives its largest force, or nearly so where that has no
+        end."""
         corner = self.upper[None, :2]
         zero = np.zeros(1)
         if float(self.force(self.command(corner))[0]) >= strongest * (1.0 - ROUNDING):
@@ -298,16 +318,20 @@ def _table_bound(box: _Box) -> Callable[[Array], Array]:
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
-    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the amplitude,
-    the frequency, and both with a constant product."""
+    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the
+    amplitude, the frequency, and both with a constant product."""
     a = curve[:, 0, 0]
     b = curve[:, 0, 1]
     c = curve[:, 1, 1]
     det = a * c - b * b
-    ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]
+    ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [
+        beat * [1.0, -1.0]
+    ]
     steps = []
     with np.errstate(all="ignore"):
-        newton = np.stack([b * slope[:, 1] - c * slope[:, 0], b * slope[:, 0] - a * slope[:, 1]], axis=-1)
+        newton = np.stack(
+            [b * slope[:, 1] - c * slope[:, 0], b * slope[:, 0] - a * slope[:, 1]], axis=-1
+        )
         steps.append(np.where(((a < 0.0) & (det > 0.0))[:, None], newton / det[:, None], 0.0))
         for way in ways:
             up = np.einsum("ki,ki->k", way, slope)
@@ -317,7 +341,8 @@ def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
 
 
 def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
-    """Middle and half of the arc of force directions [rad], gauge (POINTS,) or None, and deflection."""
+    """Middle and half of the arc of force directions [rad], gauge (POINTS,) or None, and
+    deflection."""
     lower = box.lower
     upper = box.upper
     full = bool(is_full_turn(upper[2] - lower[2]))

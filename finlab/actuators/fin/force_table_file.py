@@ -1,11 +1,13 @@
-"""The CSV file of a force table: reading it, with a plain sentence for whatever is wrong, and writing one.
+"""The CSV file of a force table: reading it, with a plain sentence for whatever is wrong, and
+writing one.
 
-Its columns are A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, and P [W] where the power is
-known; A is the half amplitude, phi the zero direction, forces and power are cycle means, forces in the fin
-frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the power of a plate like U-CAT's
-fin. Standard deviations of the forces (sFx, sFy, sFz) say how far they may be from the truth. Rows come in
-any order but must fill a grid: every amplitude with every frequency with every zero direction. Spacing is
-free. Lines that begin with # say what to know of the table; other columns are passed over.
+Its columns are A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, and P [W] where the
+power is known; A is the half amplitude, phi the zero direction, forces and power are cycle means,
+forces in the fin frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the
+power of a plate like U-CAT's fin. Standard deviations of the forces (sFx, sFy, sFz) say how far
+they may be from the truth. Rows come in any order but must fill a grid: every amplitude with every
+frequency with every zero direction. Spacing is free. Lines that begin with # say what to know of
+the table; other columns are passed over.
 """
 
 import math
@@ -54,9 +56,9 @@ class ForceTable(NamedTuple):
 
 
 def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
-    """Returns the table in a CSV file. Raises DataError: the file is missing, lacks a column, holds something
-    that is not a finite number or whose unit cannot be right, its rows do not fill a grid with at least two
-    points per axis, or it has no thrust or no power to tell of."""
+    """Returns the table in a CSV file. Raises DataError: the file is missing, lacks a column, holds
+    something that is not a finite number or whose unit cannot be right, its rows do not fill a grid
+    with at least two points per axis, or it has no thrust or no power to tell of."""
     source = str(path)
     rows, deviation, lines, notes = _read_rows(table_bytes(path), source)
     _check_units(rows, source)
@@ -64,10 +66,13 @@ def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
     periodic, axes[2], values = _close_circle(axes[2], values, source)
     for name, axis in zip(COLUMNS, axes, strict=False):
         if len(axis) < 2:
-            raise DataError(f"{source}: column {name} has one value, expected at least 2 to interpolate")
+            raise DataError(
+                f"{source}: column {name} has one value, expected at least 2 to interpolate"
+            )
         if np.diff(axis).min() < LEAST_STEP:
             raise DataError(
-                f"{source}: two values of column {name} are {np.diff(axis).min():.2g} apart, expected "
+                f"{source}: two values of column {name} are {np.diff(axis).min():.2g} apart, "
+                "expected "
                 f"{LEAST_STEP:g} or more; write equal values with equal digits"
             )
     known = rows.shape[1] - 3
@@ -75,9 +80,14 @@ def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
 
 
 def write_table(
-    path: str | os.PathLike[str], law: Any, amplitude: Array, frequency: Array, zero_direction: Array
+    path: str | os.PathLike[str],
+    law: Any,
+    amplitude: Array,
+    frequency: Array,
+    zero_direction: Array,
 ) -> None:
-    """Writes the forces of a law on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
+    """Writes the forces of a law on a grid of amplitude [rad], frequency [Hz] and zero direction
+    [rad]."""
     axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     force = law.force(command)
@@ -85,22 +95,27 @@ def write_table(
     Path(path).write_text(text, encoding="utf-8")
 
 
-def table_text(notes: Iterable[str], header: Sequence[str], rows: Iterable[Any], digits: int) -> str:
-    """Returns the text of a CSV file: notes behind #, a header, rows of numbers with so many digits."""
+def table_text(
+    notes: Iterable[str], header: Sequence[str], rows: Iterable[Any], digits: int
+) -> str:
+    """Returns the text of a CSV file: notes behind #, a header, rows of numbers with so many
+    digits."""
     lines = (",".join(f"{value + 0.0:.{digits}g}" for value in row) for row in rows)
     return "\n".join([*(f"# {note}" for note in notes), ",".join(header), *lines, ""])
 
 
 def table_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Returns the contents of a table's file, which may lie in the zip archive of a bundle. Raises DataError:
-    there is no such file, or it is too large."""
+    """Returns the contents of a table's file, which may lie in the zip archive of a bundle. Raises
+    DataError: there is no such file, or it is too large."""
     return named_content(path, MAX_BYTES, "a CSV table of fin forces")
 
 
-def _read_rows(content: bytes, source: str) -> tuple[Array, Array, NDArray[np.intp], tuple[str, ...]]:
-    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the standard
-    deviations (rows, 3 or 0), the line (rows,) of the file that each row stands in, and the notes above the
-    header."""
+def _read_rows(
+    content: bytes, source: str
+) -> tuple[Array, Array, NDArray[np.intp], tuple[str, ...]]:
+    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the
+    standard deviations (rows, 3 or 0), the line (rows,) of the file that each row stands in, and
+    the notes above the header."""
     table = CsvTable(content, source)
     header = table.header
     missing = [name for name in COLUMNS if name not in header]
@@ -117,7 +132,8 @@ def _read_rows(content: bytes, source: str) -> tuple[Array, Array, NDArray[np.in
     rows, lines = table.numbers([header.index(name) for name in columns])
     if (rows[:, known:] < 0.0).any():
         raise DataError(
-            f"{source}: a column of {', '.join(DEVIATIONS)} has {rows[:, known:].min():.4g}, expected "
+            f"{source}: a column of {', '.join(DEVIATIONS)} has {rows[:, known:].min():.4g}, "
+            "expected "
             "standard deviations in N from 0"
         )
     return rows[:, :known], rows[:, known:], lines, table.notes
@@ -135,26 +151,32 @@ def _check_units(rows: Array, source: str) -> None:
         values = rows[:, (*COLUMNS, POWER_COLUMN).index(name)]
         for end in (values.max(), values.min()):
             if not 0.0 <= end <= most:
-                raise DataError(f"{source}: column {name} has {end:.4g}, expected {unit}, 0 to {most:.4g}")
+                raise DataError(
+                    f"{source}: column {name} has {end:.4g}, expected {unit}, 0 to {most:.4g}"
+                )
     if rows.shape[1] > len(COLUMNS) and not rows[:, len(COLUMNS)].any():
-        raise DataError(f"{source}: column P is 0 everywhere; leave it out where the power is not known")
+        raise DataError(
+            f"{source}: column P is 0 everywhere; leave it out where the power is not known"
+        )
     span = np.ptp(rows[:, 2])
     if span > TURN + FILE_TURN_TOLERANCE:
         raise DataError(
-            f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283)"
+            f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn "
+            "(6.283)"
         )
     largest = np.abs(rows[:, 3:6]).max()
     thrust = np.abs(rows[:, 4:6]).max()
     if largest > MOST or thrust < LEAST:
         raise DataError(
-            f"{source}: thrust goes up to {thrust:.3g}, the largest force is {largest:.3g}, expected "
+            f"{source}: thrust goes up to {thrust:.3g}, the largest force is {largest:.3g}, "
+            "expected "
             f"{LEAST:g} to {MOST:g} N"
         )
 
 
 def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array], Array]:
-    """Returns the three axes and the values (n_A, n_f, n_phi, columns behind them) of rows that fill a
-    grid."""
+    """Returns the three axes and the values (n_A, n_f, n_phi, columns behind them) of rows that
+    fill a grid."""
     uniques = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
     axes = [values for values, _ in uniques]
     shape = tuple(len(axis) for axis in axes)
@@ -165,7 +187,8 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
         first = order[repeated[0]]
         second = order[repeated[0] + 1]
         raise DataError(
-            f"{source}: the same A, f, phi appears in two rows, lines {lines[first]} and {lines[second]}; "
+            f"{source}: the same A, f, phi appears in two rows, lines {lines[first]} and "
+            f"{lines[second]}; "
             "keep one"
         )
     if len(place) != math.prod(shape):
@@ -176,7 +199,8 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
         )
         raise DataError(
             f"{source}: {len(rows)} rows do not fill the grid of {shape[0]} amplitudes, {shape[1]} "
-            f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; the row {at} is "
+            f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; the row "
+            f"{at} is "
             "missing (write equal values with equal digits)"
         )
     values = np.empty((math.prod(shape), rows.shape[1] - 3))
@@ -185,14 +209,16 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
 
 
 def _close_circle(angle: Array, values: Array, source: str) -> tuple[bool, Array, Array]:
-    """Returns whether the zero directions cover the circle, and the grid without a repeated end point."""
+    """Returns whether the zero directions cover the circle, and the grid without a repeated end
+    point."""
     span = angle[-1] - angle[0]
     if abs(span - TURN) <= FILE_TURN_TOLERANCE:
         forces = values[..., :3]
         scale = np.abs(forces).max()
         if not np.allclose(forces[:, :, 0], forces[:, :, -1], rtol=0.0, atol=0.05 * scale + 1e-12):
             raise DataError(
-                f"{source}: forces at phi = {angle[0]:.4g} and one turn later differ; they are the same"
+                f"{source}: forces at phi = {angle[0]:.4g} and one turn later differ; they are "
+                "the same"
             )
         return True, angle[:-1], values[:, :, :-1]
     # A full circle given without its end point leaves a last gap like the others.

@@ -34,14 +34,17 @@ class GridLaw(FinLaw):
         return grid_numbers(grid.axes, grid.values[..., :3], TURN if grid.periodic else 0.0)
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""
+        """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the
+        table."""
         xp = library_of(command)
         if xp is not np:
             values = self.force(command.detach().cpu().numpy())
             return xp.from_numpy(np.ascontiguousarray(values)).to(command)
         return self._grids(command, 1)[..., 0, 0, 0, :3].astype(command.dtype, copy=False)
 
-    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+    def force_and_jacobian(
+        self, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         """See `FinLaw`; exact derivatives of the interpolation."""
         result = self._grids(command, 2)[..., :3]
         return result[..., 0, 0, 0, :], _jacobian(result)
@@ -70,9 +73,10 @@ class TableLaw(GridLaw):
         notes: tuple[str, ...] = (),
         deviation: Array | None = None,
     ) -> None:
-        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and values (a, f, d, 3 or
-        4): forces [N], and power [W] where it is known. The forces' standard deviations (a, f, d, 3) [N] are
-        None or (a, f, d, 0) where unknown. A periodic grid has no second end of the circle."""
+        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and values (a, f,
+        d, 3 or 4): forces [N], and power [W] where it is known. The forces' standard deviations (a,
+        f, d, 3) [N] are None or (a, f, d, 0) where unknown. A periodic grid has no second end of
+        the circle."""
         self.grid = Grid(axes, values, periodic)
         """What was measured."""
         super().__init__([self.grid])
@@ -81,7 +85,8 @@ class TableLaw(GridLaw):
         self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
         self.deviation = deviation if deviation is not None and deviation.shape[-1] else None
-        """Standard deviations of the forces at the grid's points (a, f, d, 3) [N], where they are known."""
+        """Standard deviations of the forces at the grid's points (a, f, d, 3) [N], where they are
+        known."""
 
 
 def _jacobian(mixed: Array) -> Array:
@@ -96,7 +101,8 @@ def read_table(path: str | os.PathLike[str]) -> TableLaw:
 
 
 def kept_table(path: str) -> TableLaw:
-    """Returns the law in a CSV file, read again when the file has changed; errors as for `read_table`."""
+    """Returns the law in a CSV file, read again when the file has changed; errors as for
+    `read_table`."""
     return _read(path, file_stamp(path))
 
 

@@ -1,4 +1,5 @@
-"""Actuators that cannot be commanded, since damage or limits leave them one command: what they give."""
+"""Actuators that cannot be commanded, since damage or limits leave them one command: what they
+give."""
 
 from typing import NamedTuple
 

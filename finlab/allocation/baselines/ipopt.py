@@ -1,8 +1,8 @@
 """Method `ipopt`: CasADi and IPOPT over the forces of the actuators; needs the extra `ipopt`.
 
-The wrench is linear in the forces, but for the drag of foils, and what a force costs is known from the
-compiled actuators: one or two variables for each remain. One start finds the least where no arc is wider
-than half a turn but no full circle, and no fin is uneven. Dead bands are passed over.
+The wrench is linear in the forces, but for the drag of foils, and what a force costs is known from
+the compiled actuators: one or two variables for each remain. One start finds the least where no arc
+is wider than half a turn but no full circle, and no fin is uneven. Dead bands are passed over.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,13 @@ from finlab.axes import TURN
 from finlab.errors import AllocationError
 
 LEVELS = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 65)) ** 4
-"""Shares of the range of sizes at which a cost is looked up: dense at both ends, where costs bend."""
+"""Shares of the range of sizes at which a cost is looked up: dense at both ends, where costs
+bend."""
 DIRECTIONS = np.linspace(-1.0, 1.0, 97)
 """Places in an arc at which an uneven fin is looked up, from end to end."""
 SMOOTH = 1e-4
-"""Share of its largest force below which the size of a force is rounded off: it has slopes at rest, too."""
+"""Share of its largest force below which the size of a force is rounded off: it has slopes at rest,
+too."""
 REST = 1e-3
 """Share of its largest force up to which an actuator that cannot rest is taken for one that can."""
 NARROW = 1e-6
@@ -39,10 +41,12 @@ NARROW = 1e-6
 
 
 class ForceProgram:
-    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint, normalized by
-    `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
+    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint,
+    normalized by `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
 
-    def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
+    def __init__(
+        self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]
+    ) -> None:
         self._inverse = inverse
         n = inverse.plant.n
         self._most = np.maximum(inverse.largest, 1e-9)
@@ -82,7 +86,9 @@ class ForceProgram:
         most = self._most[:, None]
         answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
         force = np.array(answer["x"], np.float64).reshape(start.shape) * most
-        return np.asarray(self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0])
+        return np.asarray(
+            self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0]
+        )
 
     def starts(self, target: Array, n_random: int, seed: int) -> Array:
         """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
@@ -95,7 +101,8 @@ class ForceProgram:
 
 
 class _Held:
-    """One actuator that has one command alone: what it gives is beside the forces, its variables are 0."""
+    """One actuator that has one command alone: what it gives is beside the forces, its variables
+    are 0."""
 
     limits = ()
     convex = True
@@ -110,11 +117,14 @@ class _Held:
 
 
 class _Line:
-    """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and 0."""
+    """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and
+    0."""
 
     limits = ()
 
-    def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
+    def __init__(
+        self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int
+    ) -> None:
         reverse = 0.0 if line.reverse is None else line.reverse.largest
         low = max(line.low, -reverse) / most
         high = min(line.high, line.table.largest) / most
@@ -171,7 +181,10 @@ class _Plane:
         force = table.largest * (low + (1.0 - low) * LEVELS)
         watts = power_of(plane, force)
         cost = _spline(casadi, LEVELS, watts)
-        self.cost, self.full_cost = cost((size / high - low) / max(1.0 - low, 1e-9)), float(watts[-1])
+        self.cost, self.full_cost = (
+            cost((size / high - low) / max(1.0 - low, 1e-9)),
+            float(watts[-1]),
+        )
         """See `_Line`."""
         self.limits: list[tuple[Any, float, float]] = [(size - high, -np.inf, 0.0)]
         """Values in CasADi, and between which two numbers they must lie."""
@@ -208,15 +221,18 @@ SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
 class IpoptSettings(TimeLimitedSettings):
     """Settings of method `ipopt`."""
 
-    n_starts: int = number(8, 0, 10_000, "random starts per target, beside the pseudo-inverse's answer")
+    n_starts: int = number(
+        8, 0, 10_000, "random starts per target, beside the pseudo-inverse's answer"
+    )
 
 
 class Ipopt(ModelBased):
-    """IPOPT on power, with the wrench as a constraint; an `AllocationError` where CasADi is not installed.
+    """IPOPT on power, with the wrench as a constraint; an `AllocationError` where CasADi is not
+    installed.
 
-    Where one start is not enough it is run from random ones, too. Each end is made exact by the laws; the
-    cheapest that meets the target is the answer, else the nearest. After the time limit no start begins; each
-    may take half as long.
+    Where one start is not enough it is run from random ones, too. Each end is made exact by the
+    laws; the cheapest that meets the target is the answer, else the nearest. After the time limit
+    no start begins; each may take half as long.
     """
 
     name = "ipopt"

@@ -1,8 +1,9 @@
 """Methods `qp` and `paper_sqp`, the paper's optimizers (its section on baseline methods).
 
-Both keep the normalized tracking error J_norm (its Eq. 8) least within the box of each fin's limits, by least
-squares over a linear map of commands to wrenches. `qp` linearizes once per layout, `paper_sqp` again at every
-iterate. Commands are positions between the limits, 0 at the lower and 1 at the upper one.
+Both keep the normalized tracking error J_norm (its Eq. 8) least within the box of each fin's
+limits, by least squares over a linear map of commands to wrenches. `qp` linearizes once per layout,
+`paper_sqp` again at every iterate. Commands are positions between the limits, 0 at the lower and 1
+at the upper one.
 """
 
 from dataclasses import dataclass
@@ -28,7 +29,8 @@ HALVINGS = 30
 
 
 class LinearMap:
-    """The actuation map of a layout, linearized by central differences at the middle of the limits."""
+    """The actuation map of a layout, linearized by central differences at the middle of the
+    limits."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.reference = (plant.lower + plant.upper) / 2
@@ -42,10 +44,11 @@ class LinearMap:
 
 
 class Qp(ModelBased):
-    """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
+    """Linearized once per layout, solved per target by SciPy's active-set
+    `lsq_linear(method="bvls")`.
 
-    Minimizes `||(w_ref + J du - target) / sigma||^2 + ||du||^2` over commands as positions
-    between their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
+    Minimizes `||(w_ref + J du - target) / sigma||^2 + ||du||^2` over commands as positions between
+    their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
     no part. (What the paper's QP regularizes it does not say.)
     """
 
@@ -71,19 +74,23 @@ class Qp(ModelBased):
 class PaperSqpSettings(TimeLimitedSettings):
     """Settings of method `paper_sqp`; the paper prints none of them."""
 
-    n_starts: int = number(8, 1, 10_000, "starts per target: the middle of the limits, then random ones")
+    n_starts: int = number(
+        8, 1, 10_000, "starts per target: the middle of the limits, then random ones"
+    )
     n_steps: int = number(60, 1, 10_000, "most quadratic programs per start")
-    regularization: float = number(1e-4, 0.0, 1e6, "weight of the squared step, as a share of the ranges")
+    regularization: float = number(
+        1e-4, 0.0, 1e6, "weight of the squared step, as a share of the ranges"
+    )
 
 
 class PaperSqp(ModelBased):
     """The paper's sequential quadratic programming: linearize at the iterate, box QP, line search.
 
-    At the iterate u with the normalized residual r = (target - w(u)) / sigma and the Jacobian J of w / sigma,
-    the step d keeps `||J d - r||^2 + regularization ||d||^2` least with u + d inside the limits; it is halved
-    until J_norm = `||r||^2` falls by enough. Jacobians are those of the fins' own laws, in closed form. What
-    commands cost plays no part. The next start is tried where one ends off the target; the answer is the end
-    with the least error.
+    At the iterate u with the normalized residual r = (target - w(u)) / sigma and the Jacobian J of
+    w / sigma, the step d keeps `||J d - r||^2 + regularization ||d||^2` least with u + d inside the
+    limits; it is halved until J_norm = `||r||^2` falls by enough. Jacobians are those of the fins'
+    own laws, in closed form. What commands cost plays no part. The next start is tried where one
+    ends off the target; the answer is the end with the least error.
     """
 
     name = "paper_sqp"
@@ -108,8 +115,8 @@ class PaperSqp(ModelBased):
         return answers
 
     def descent(self, target: Array, start: Array) -> tuple[Array, list[float]]:
-        """Returns the command (n, 3) to which a start (n, 3) leads for a target (6,) [N, N m], and J_norm of
-        every iterate, the start's first."""
+        """Returns the command (n, 3) to which a start (n, 3) leads for a target (6,) [N, N m], and
+        J_norm of every iterate, the start's first."""
         plant = self.plant
         width = self.plant.width
         free = width.ravel() > 0.0
@@ -124,11 +131,15 @@ class PaperSqp(ModelBased):
             jacobian = (plant.linearize(command)[1] / self.sigma[:, None] * width.ravel())[:, free]
             place = ((command - plant.lower).ravel()[free] / width.ravel()[free]).clip(0.0, 1.0)
             step = np.zeros(free.size)
-            step[free] = box_qp(jacobian, missing, self.settings.regularization, -place, 1.0 - place)
+            step[free] = box_qp(
+                jacobian, missing, self.settings.regularization, -place, 1.0 - place
+            )
             slope = -2.0 * float(missing @ (jacobian @ step[free]))
             length = 1.0
             for _ in range(HALVINGS):
-                tried = np.clip(command + length * step.reshape(-1, 3) * width, plant.lower, plant.upper)
+                tried = np.clip(
+                    command + length * step.reshape(-1, 3) * width, plant.lower, plant.upper
+                )
                 after = residual(tried)
                 if after @ after <= errors[-1] + SUFFICIENT * length * min(slope, 0.0):
                     break
@@ -144,9 +155,11 @@ class PaperSqp(ModelBased):
 
 
 def box_qp(matrix: Array, wanted: Array, weight: float, low: Array, high: Array) -> Array:
-    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between
-    limits (k,), each `low` below its `high`, by SciPy's active-set method; `matrix` is (6, k), `weight` at
+    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between limits
+    (k,), each `low` below its `high`, by SciPy's active-set method; `matrix` is (6, k), `weight` at
     least 0."""
     k = len(low)
     both = np.vstack([matrix, np.sqrt(weight) * np.eye(k)])
-    return np.asarray(lsq_linear(both, np.concatenate([wanted, np.zeros(k)]), (low, high), method="bvls").x)
+    return np.asarray(
+        lsq_linear(both, np.concatenate([wanted, np.zeros(k)]), (low, high), method="bvls").x
+    )

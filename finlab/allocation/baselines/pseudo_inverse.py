@@ -1,6 +1,8 @@
-"""Pseudo-inverse of the forces, each turned into its cheapest command, and all methods that begin there.
+"""Pseudo-inverse of the forces, each turned into its cheapest command, and all methods that begin
+there.
 
-Methods `analytic` and `fixed_frequency` are that alone; the base of the others has it for their starts.
+Methods `analytic` and `fixed_frequency` are that alone; the base of the others has it for their
+starts.
 """
 
 from abc import abstractmethod
@@ -32,8 +34,9 @@ _FULL = 0.0, np.pi
 
 
 class PseudoInverse:
-    """What does not depend on the target, of a robot in the flow that it has, rows scaled by `sigma` (6,).
-    Forces are along each actuator's own two directions; the second one of a line is 0."""
+    """What does not depend on the target, of a robot in the flow that it has, rows scaled by
+    `sigma` (6,). Forces are along each actuator's own two directions; the second one of a line is
+    0."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.plant = plant
@@ -50,13 +53,19 @@ class PseudoInverse:
         """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
         self.beside = compiled.beside + kept
         """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is held."""
-        along = compiled.robot.effectiveness * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
+        along = (
+            compiled.robot.effectiveness
+            * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
+        )
         along[self.held] = 0.0
         self.effectiveness: Array = along.reshape(-1, 6).T
         """Wrench (6, 2 n) per newton along each actuator's directions."""
         self.largest = np.array([_largest(each) for each in self.responses])
         """The largest force (n,) of each in any direction [N]."""
-        arcs = [(each.middle, each.half) if isinstance(each, Plane) else _FULL for each in self.responses]
+        arcs = [
+            (each.middle, each.half) if isinstance(each, Plane) else _FULL
+            for each in self.responses
+        ]
         self._middle, self._half = np.array(arcs).T
         most = np.repeat(np.maximum(self.largest, 1e-9), 2)
         scaled = self.effectiveness * most / sigma[:, None]
@@ -72,8 +81,8 @@ class PseudoInverse:
         return ((targets - self.beside) @ self.inverse).reshape(len(targets), self.plant.n, 2)
 
     def decoded(self, force: Array) -> Array:
-        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N]; what an actuator cannot give is cut
-        off."""
+        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N]; what an actuator cannot give is
+        cut off."""
         angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
         held = np.clip(angle, -self._half, self._half)
         excess = np.minimum(np.abs(angle - held), 0.5 * np.pi)
@@ -104,7 +113,8 @@ USUAL_SHARE = 0.1
 
 
 class ModelBased(LeastErrorMethod):
-    """A method that optimizes over the actuators' own laws and tables, those that score every method."""
+    """A method that optimizes over the actuators' own laws and tables, those that score every
+    method."""
 
     settings_class: ClassVar[type[Settings]] = Settings
 
@@ -123,12 +133,12 @@ class ModelBased(LeastErrorMethod):
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:
-        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all targets, so
-        that a target gets the same answer alone and among others."""
+        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all
+        targets, so that a target gets the same answer alone and among others."""
 
     def _best(self, target: Array, commands: Array, steps: int) -> Array:
-        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps, the
-        cheapest one (n, 3) that meets it, else the one with the smallest error."""
+        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps,
+        the cheapest one (n, 3) that meets it, else the one with the smallest error."""
         problem = CommandProblem.of(self.plant, self.sigma)
         ends = refine(problem, target[None] / self.sigma, commands, steps)
         missed = ends.error > SOLVED
@@ -147,8 +157,9 @@ class TimeLimitedSettings(Settings):
 
 
 class Analytic(ModelBased):
-    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
-    each gives by its cheapest command. What does not fit is clipped, the rest not redistributed."""
+    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest
+    force, which each gives by its cheapest command. What does not fit is clipped, the rest not
+    redistributed."""
 
     name = "analytic"
     takes = "any actuator"
@@ -162,19 +173,23 @@ class FixedFrequencySettings(Settings):
     """Settings of method `fixed_frequency`."""
 
     frequency: float = number(
-        2.1, 0.01, 100.0, "at which all fins beat, within the limits of each; U-CAT's are 1.1 and 2.1", "Hz"
+        2.1,
+        0.01,
+        100.0,
+        "at which all fins beat, within the limits of each; U-CAT's are 1.1 and 2.1",
+        "Hz",
     )
 
 
 class FixedFrequency(ModelBased):
-    """U-CAT's on-board law: all fins beat at one frequency; force sets the amplitude, its direction the zero
-    direction.
+    """U-CAT's on-board law: all fins beat at one frequency; force sets the amplitude, its direction
+    the zero direction.
 
-    With the law `drag` of a fin, `A = 1/2 arccos(1 - F / (2 rho Cd S rc^2 (2 pi f)^2))`; other laws are
-    inverted in the same way. Where a fin is asked for more than it can give, all forces are scaled down
-    together, as on board all amplitudes are. A fin of less force than that of its least amplitude stops: it
-    takes its least amplitude and frequency. Forces are those of the pseudo-inverse, which on U-CAT's layout
-    replaces the on-board rules made for it.
+    With the law `drag` of a fin, `A = 1/2 arccos(1 - F / (2 rho Cd S rc^2 (2 pi f)^2))`; other laws
+    are inverted in the same way. Where a fin is asked for more than it can give, all forces are
+    scaled down together, as on board all amplitudes are. A fin of less force than that of its least
+    amplitude stops: it takes its least amplitude and frequency. Forces are those of the
+    pseudo-inverse, which on U-CAT's layout replaces the on-board rules made for it.
     """
 
     name = "fixed_frequency"

@@ -1,4 +1,5 @@
-"""Method `sqp`: sequential quadratic programming by SciPy, the least cost under the wrench as constraint."""
+"""Method `sqp`: sequential quadratic programming by SciPy, the least cost under the wrench as
+constraint."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,18 +33,25 @@ Solve = Callable[[Array, Array], Array]
 class SqpSettings(TimeLimitedSettings):
     """Settings of method `sqp`."""
 
-    objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
+    objective: Name = choice(
+        "power", ("power", "effort"), "kept least: watts, or the paper's effort"
+    )
     n_steps: int = number(100, 1, 10_000, "most quadratic programs per start")
     n_starts: int = number(
-        2, 1, 10_000, "starts per target beside the pseudo-inverse's: the middle of the limits, random ones"
+        2,
+        1,
+        10_000,
+        "starts per target beside the pseudo-inverse's: the middle of the limits, random ones",
     )
 
 
 class Sqp(ModelBased):
-    """Sequential quadratic programming, as the paper's; but the paper's keeps the normalized error least.
+    """Sequential quadratic programming, as the paper's; but the paper's keeps the normalized error
+    least.
 
-    Starts are brought onto the target, or as near as they come; from those that reach it the cost falls along
-    it. The cheapest end that meets the target is the answer, else the one with the smallest error.
+    Starts are brought onto the target, or as near as they come; from those that reach it the cost
+    falls along it. The cheapest end that meets the target is the answer, else the one with the
+    smallest error.
     """
 
     name = "sqp"
@@ -74,8 +82,8 @@ class Sqp(ModelBased):
 
 
 def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
-    """Returns what finds the commands of least cost, by the meter, near a start that deliver a target, by
-    SciPy's SLSQP with at most some steps; `sigma` (6,) divides the wrenches."""
+    """Returns what finds the commands of least cost, by the meter, near a start that deliver a
+    target, by SciPy's SLSQP with at most some steps; `sigma` (6,) divides the wrenches."""
     axes = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None])
     width = plant.width
     free = width.ravel() > 0.0

@@ -1,9 +1,9 @@
 """Where pods turn when the wrenches of the next ticks are known.
 
-Beside the wrench of now, that of a later tick is answered, within what the drives allow until then, and with
-what turning costs over that time. Its angles are those that the pods will want. Their small part is left, as
-turning there and back with every wave gains little; half of the rest is wanted now, the next tick wants half
-of what then remains.
+Beside the wrench of now, that of a later tick is answered, within what the drives allow until then,
+and with what turning costs over that time. Its angles are those that the pods will want. Their
+small part is left, as turning there and back with every wave gains little; half of the rest is
+wanted now, the next tick wants half of what then remains.
 """
 
 from typing import Any
@@ -33,8 +33,8 @@ def turning_ahead(method: Any, reference: Array, now: Now) -> Now:
         now: what holds, with the commands before.
 
     Returns:
-        The same with angles (n,) [rad], NaN of actuators that are no pods, are lost, or have no known
-        command before, and with what it costs to stand elsewhere.
+        The same with angles (n,) [rad], NaN of actuators that are no pods, are lost, or have no
+        known command before, and with what it costs to stand elsewhere.
     """
     assert now.previous is not None
     last = min(len(reference), MOST_AHEAD)

@@ -1,4 +1,5 @@
-"""A layout compiled for the dual: the answers of its actuators, and the commands for the forces found."""
+"""A layout compiled for the dual: the answers of its actuators, and the commands for the forces
+found."""
 
 from copy import copy
 from functools import cached_property
@@ -28,7 +29,8 @@ class Compiled:
         period_s: float = 0.1,
         doubt: Array | None = None,
     ) -> None:
-        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a yardstick
+        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a
+        yardstick
         (6,) and ticks of a period; what a squared force costs beside its power is `doubt`, see
         `price_of_doubt`. Errors as for `FinGroup`."""
         self.count = layout.n
@@ -46,7 +48,9 @@ class Compiled:
             same = all(a is b for pair in tables for a, b in zip(pair, tables[0], strict=True))
             if same and len(tables) == len(group.responses) > 1:
                 first = slice(places[0], places[0] + 1)
-                self._alike += [(group, groups_of(layout.actuators[first], plant.effectiveness[first])[0][1])]
+                self._alike += [
+                    (group, groups_of(layout.actuators[first], plant.effectiveness[first])[0][1])
+                ]
         self._prepare()
 
     def _prepare(self) -> None:
@@ -64,7 +68,8 @@ class Compiled:
                 responses[place] = doubted
                 forms[place] = form
         self.beside = self.beside_of_working(np.ones(self.count, bool))
-        """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
+        """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without
+        lift."""
         self.robot = DualRobot(
             responses,
             forms,
@@ -82,12 +87,14 @@ class Compiled:
         return sum(each, np.zeros(6)) * self._counts
 
     def at(self, inflow: Array | None) -> "Compiled":
-        """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
+        """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own
+        frames."""
         if not any(group.feels_flow for _, group in self.groups):
             return self
         other = copy(self)
         other.groups = [
-            (places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups
+            (places, group.at(None if inflow is None else inflow[places]))
+            for places, group in self.groups
         ]
         other._prepare()
         return other
@@ -96,18 +103,21 @@ class Compiled:
     def _directions(self) -> Array:
         """Directions (n, 2, 3) of each actuator's forces in its own axes."""
         own = np.zeros((self.count, 2, 6))
-        for places, group in groups_of(self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))):
+        for places, group in groups_of(
+            self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))
+        ):
             for place, response in zip(places, group.responses, strict=True):
                 own[place] = response.rows
         return own[..., :3]
 
     def forces_along(self, force: Array) -> Array:
-        """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own axes."""
+        """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own
+        axes."""
         return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
     def radial_worth(self, group: Group, places: Places, worth: Worth) -> Array | None:
-        """Returns what forces are worth by the laws of a group at some places; see `Group.radial_worth`.
-        Where all actuators are alike, one answers for all."""
+        """Returns what forces are worth by the laws of a group at some places; see
+        `Group.radial_worth`. Where all actuators are alike, one answers for all."""
         ahead = worth.ahead[:, places]
         back = worth.back[:, places]
         ends = np.stack([worth.low[0, places], worth.high[0, places]], axis=-1)
@@ -119,9 +129,10 @@ class Compiled:
 
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
-    """Returns what a squared force of each actuator costs for the squared effectiveness of each axis (n, 6)
-    [W, W/m^2 per N^2] where a miss of 1 % of the yardstick `scale` (6,) costs `robust` [W], growing with the
-    square; None where nothing does. A `DataError` where a force table cannot be read."""
+    """Returns what a squared force of each actuator costs for the squared effectiveness of each
+    axis (n, 6) [W, W/m^2 per N^2] where a miss of 1 % of the yardstick `scale` (6,) costs `robust`
+    [W], growing with the square; None where nothing does. A `DataError` where a force table cannot
+    be read."""
     if robust == 0.0:
         return None
     from finlab.physics.expected_miss import uncertainties
@@ -131,8 +142,8 @@ def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
 
 
 def proved_power(compiled: Compiled, wrench: Array, price: Array, now: Now = STILL) -> Array:
-    """Returns the power (N,) [W] that no answer undercuts which gives wrenches (N, 6) with what may be given
-    now, by prices (N, 6) [W/N, W/(N m)]."""
+    """Returns the power (N,) [W] that no answer undercuts which gives wrenches (N, 6) with what may
+    be given now, by prices (N, 6) [W/N, W/(N m)]."""
     worth = compiled.robot.core.worth(price, now)
     most = worth.most.copy()
     for places, group in compiled.groups:

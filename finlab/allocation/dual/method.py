@@ -1,8 +1,9 @@
 """The default method: least watts by the dual, exact by the actuators' own laws.
 
-The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has compiled, within
-what may be given now: limits, rates from the command before, losses. What its tables leave undone, by the
-actuators' own laws, is removed by Levenberg-Marquardt steps on the commands, within the same limits.
+The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has
+compiled, within what may be given now: limits, rates from the command before, losses. What its
+tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the
+commands, within the same limits.
 """
 
 from collections.abc import Callable
@@ -39,7 +40,11 @@ class DualSettings(Settings):
     """What can be set of the default method."""
 
     robust: float = number(
-        0.0, 0.0, 1e9, "what an expected miss of 1 % of the yardstick is worth, growing with its square", "W"
+        0.0,
+        0.0,
+        1e9,
+        "what an expected miss of 1 % of the yardstick is worth, growing with its square",
+        "W",
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
     calm: float = number(
@@ -51,8 +56,8 @@ class Dual(Method):
     """Exact and cheapest on any actuators whose laws are known, without a network."""
 
     name = "dual"
-    # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
-    # only push it on.
+    # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
+    # one may only push it on.
     policy_under_way = "direction"
     begins_at_prices = True
     takes_losses = True
@@ -142,7 +147,9 @@ class Dual(Method):
         # Turning is what makes pods late, and they turn ahead: what is asked for is given now.
         return target if self.turns_ahead else super().in_time(target, reference)
 
-    def solve_now(self, targets: Array, policy: Policy, now: Now, prices: Array | None = None) -> Solution:
+    def solve_now(
+        self, targets: Array, policy: Policy, now: Now, prices: Array | None = None
+    ) -> Solution:
         """Solves for targets with what may be given now, in the water of `flow`.
 
         Args:
@@ -174,8 +181,8 @@ class Dual(Method):
     def solution(
         self, command: Array, aim: Array, price: Array, value: Array, notes: set[str], now: Now
     ) -> Solution:
-        """Returns commands (N, n, 3) for wrenches (N, 6) as a solution, with the bound that prices (N, 6) and
-        values (N,) [W] prove, and sentences."""
+        """Returns commands (N, n, 3) for wrenches (N, 6) as a solution, with the bound that prices
+        (N, 6) and values (N,) [W] prove, and sentences."""
         if now.lost is not None:
             command[:, now.lost] = np.nan
         bound: Callable[[Array], Array] = partial(self.bound, aim, price, value, now)
@@ -188,8 +195,8 @@ class Dual(Method):
         )
 
     def calm_power(self, now: Now, command: Array) -> Array:
-        """Power (N,) [W] that commands (N, n, 3) take now beyond those that give the same wrenches where
-        turning costs nothing."""
+        """Power (N,) [W] that commands (N, n, 3) take now beyond those that give the same wrenches
+        where turning costs nothing."""
         works, given = self._working(command, now)
         wrench = self.problem_now(now).wrench(given) * self.scale
         other = self.solve_now(wrench, CLOSEST, now._replace(calm=0.0)).command
@@ -198,8 +205,8 @@ class Dual(Method):
         return np.asarray(np.maximum(power - least, 0.0))
 
     def _working(self, command: Array, now: Now) -> tuple[NDArray[np.bool_], Array]:
-        """Returns which actuators (n,) work, and commands (N, n, 3) with numbers in place of the lost ones'
-        NaN, whose forces and powers do not count."""
+        """Returns which actuators (n,) work, and commands (N, n, 3) with numbers in place of the
+        lost ones' NaN, whose forces and powers do not count."""
         works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
         return works, np.where(works[:, None], command, self.plant.lower)
 
@@ -212,13 +219,15 @@ class Dual(Method):
             problem = problem.standing(works, counts)
         return problem if now.previous is None else problem.after(self.rates.box(now.previous))
 
-    def _kept_on_the_ray(self, target: Array, row: int, found: Found, command: Array, now: Now) -> str:
+    def _kept_on_the_ray(
+        self, target: Array, row: int, found: Found, command: Array, now: Now
+    ) -> str:
         """Keeps one answer on the ray of its target, where the laws differ from the core's tables.
 
         Args:
             target: wrench (6,) [N, N m] along which the answer is to lie.
-            row: of the answer in `found` and `command`, which are overwritten by the largest share of the
-                target that the laws give (Eq. 14), found by bisection.
+            row: of the answer in `found` and `command`, which are overwritten by the largest share
+                of the target that the laws give (Eq. 14), found by bisection.
             found: aims (N, 6), prices and values of all answers.
             command: (N, n, 3).
             now: what may be given.
@@ -266,8 +275,8 @@ class Dual(Method):
         return ""
 
     def _cancelled(self, now: Now) -> Array | None:
-        """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None without
-        any."""
+        """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
+        without any."""
         lower = self.layout.lower
         width = self.layout.upper - lower
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
@@ -276,8 +285,8 @@ class Dual(Method):
         return self._meeting(self.problem_now(now), np.zeros(6), start)
 
     def _meeting(self, problem: CommandProblem, wrench: Array, starts: Array) -> Array | None:
-        """The cheapest command (n, 3) that gives a normalized wrench (6,) where steps from starts (R, n, 3)
-        lead; None where none does."""
+        """The cheapest command (n, 3) that gives a normalized wrench (6,) where steps from starts
+        (R, n, 3) lead; None where none does."""
         ends = refine(problem, wrench[None], starts, 2 * ROUNDS, EXACT)
         met = ends.command[ends.error <= NEARLY]
         if len(met) == 0:
@@ -300,7 +309,8 @@ class Dual(Method):
         return self._spans[key]
 
     def not_held(self, targets: Array, now: Now) -> set[str]:
-        """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
+        """The sentence about axes that come together only, and that targets (N, 6) ask for
+        apart."""
         robot = self.compiled.robot
         basis = self._span(now)
         scaled = targets / robot.scale
@@ -312,7 +322,8 @@ class Dual(Method):
         if not axes:
             return set()
         return {
-            f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not count, leave "
+            f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not "
+            "count, leave "
             "it out of the layout's axes, or name it in free"
         }
 
@@ -337,11 +348,12 @@ class Dual(Method):
             price: multipliers (N, 6) of them [W/N, W/(N m)].
             value: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
             now: what may be given.
-            command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as the laws
-                come.
+            command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as
+                the laws come.
 
         Returns:
-            Power (N,) [W] that no answer undercuts which gives these wrenches now; never above theirs.
+            Power (N,) [W] that no answer undercuts which gives these wrenches now; never above
+            theirs.
         """
         works, command = self._working(command, now)
         force = np.where(works[:, None], self.plant.force(command), 0.0)
@@ -356,7 +368,8 @@ class Dual(Method):
         bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
         largest_power = self.compiled.robot.largest_power
         if not self._measured:
-            # The value is one of tables, which are off by a share of full power, at the least forces by more.
+            # The value is one of tables, which are off by a share of full power, at the least
+            # forces by more.
             value_by_laws = (1.0 - 10.0 * CLOSE) * value - NEARLY * largest_power
             value_by_laws = np.minimum(value_by_laws, power)
             is_of_aim = _sizes((wrench - aim) / self.scale) <= NEARLY
@@ -364,7 +377,9 @@ class Dual(Method):
         elif works.all():
             # The prices are those of the smooth shapes that stand for tables.
             rows = np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)
-            bound[rows] = np.maximum(bound[rows], self._bound_of_tables(wrench, price, command, rows, now))
+            bound[rows] = np.maximum(
+                bound[rows], self._bound_of_tables(wrench, price, command, rows, now)
+            )
 
         # Above the power it is off by what tables are off; by more than that it proves nothing.
         above_by_tables = (1.0 + 10.0 * CLOSE) * power + NEARLY * largest_power
@@ -374,14 +389,16 @@ class Dual(Method):
     def _bound_of_tables(
         self, wrench: Array, price: Array, command: Array, rows: NDArray[np.intp], now: Now
     ) -> Array:
-        """Lower bounds (R,) [W] for some rows (R,) of answers, at prices that are raised by the measured
-        tables themselves."""
+        """Lower bounds (R,) [W] for some rows (R,) of answers, at prices that are raised by the
+        measured tables themselves."""
         from finlab.allocation.dual.price_ascent import raised_price
 
         if len(rows) == 0:
             return np.empty(0)
         questions = zip(wrench[rows], price[rows], command[rows], strict=True)
-        raised = np.stack([raised_price(self.plant, self.scale, *question) for question in questions])
+        raised = np.stack(
+            [raised_price(self.plant, self.scale, *question) for question in questions]
+        )
         return proved_power(self.compiled, wrench[rows], raised, now)
 
     @cached_property
@@ -390,23 +407,24 @@ class Dual(Method):
 
     @property
     def unproved(self) -> bool:
-        """Whether the bound would be one of something else than the power of the answer: with what doubt
-        costs."""
+        """Whether the bound would be one of something else than the power of the answer: with what
+        doubt costs."""
         return self.compiled.doubt is not None
 
     def forces(
         self, targets: Array, policy: Policy | None, prices: Array | None = None, now: Now = STILL
     ) -> Found:
-        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place, of
-        what may be given now; for a single one the search begins at prices (6,) of the wrench."""
+        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their
+        place, of what may be given now; for a single one the search begins at prices (6,) of the
+        wrench."""
         core = self.compiled.robot.core
         if len(targets) == 1:
             return core.one(targets[0], policy, prices, now)
         return core.many(targets, policy, now)
 
     def exact(self, found: Found, now: Now = STILL) -> Array:
-        """Commands (N, n, 3) that give what was found exactly, by the plant, within what may be given now; or
-        as near to it as they come."""
+        """Commands (N, n, 3) that give what was found exactly, by the plant, within what may be
+        given now; or as near to it as they come."""
         command = found.command
         problem = self.problem_now(now)
         missing = problem.wrench(command) - found.aim / self.scale
@@ -414,7 +432,8 @@ class Dual(Method):
             missing = np.where(problem.counts, missing, 0.0)
         if (each := missing.ravel()).dot(each) <= EXACT**2:
             return command
-        # Where the core's tables say what the laws say, it has done all that steps on commands can do.
+        # Where the core's tables say what the laws say, it has done all that steps on commands can
+        # do.
         error = _sizes(missing)
         rough = np.flatnonzero((error > found.error + EXACT) | (found.within & (error > NEARLY)))
         if not len(rough):
@@ -433,7 +452,8 @@ class Dual(Method):
         return self.plant.rested(command)
 
     def error(self, command: Array, aim: Array, now: Now = STILL) -> Array:
-        """Distance (N,), on the yardstick, of what commands (N, n, 3) give now from wrenches (N, 6)."""
+        """Distance (N,), on the yardstick, of what commands (N, n, 3) give now from wrenches (N,
+        6)."""
         missing = self.problem_now(now).wrench(command) - aim / self.scale
         return _sizes(missing if now.free is None else np.where(now.free, 0.0, missing))
 

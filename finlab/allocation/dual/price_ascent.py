@@ -1,7 +1,8 @@
 """Better prices for a bound, where those of an answer stand for other forces than the laws give.
 
-The dual of commands drawn around the answer, its maxima smoothed, is climbed by Newton's method while the
-smoothing fades. Any prices prove a bound, so that the draw decides how high it is and not whether it holds.
+The dual of commands drawn around the answer, its maxima smoothed, is climbed by Newton's method
+while the smoothing fades. Any prices prove a bound, so that the draw decides how high it is and not
+whether it holds.
 """
 
 import numpy as np
@@ -16,8 +17,8 @@ HEATS = np.geomspace(0.3, 0.003, 14)
 
 
 def raised_price(plant: Plant, scale: Array, wrench: Array, price: Array, command: Array) -> Array:
-    """Returns prices (6,) [W/N, W/(N m)] for a wrench (6,) that a command (n, 3) gives, from others on, by a
-    plant; errors count on the yardstick `scale` (6,)."""
+    """Returns prices (6,) [W/N, W/(N m)] for a wrench (6,) that a command (n, 3) gives, from others
+    on, by a plant; errors count on the yardstick `scale` (6,)."""
     low = plant.layout.lower
     high = plant.layout.upper
     draw = np.random.default_rng(0).uniform(-1.0, 1.0, (DRAWN, *command.shape)) * (high - low)

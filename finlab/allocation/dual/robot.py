@@ -1,4 +1,5 @@
-"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and tables."""
+"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and
+tables."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -7,7 +8,16 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.response import POINTS, Form, Line, Plane, RadialTable, Response, power_of, price_grid
+from finlab.actuators.response import (
+    POINTS,
+    Form,
+    Line,
+    Plane,
+    RadialTable,
+    Response,
+    power_of,
+    price_grid,
+)
 from finlab.arrays import CLOSE, NEARLY, NOTHING, AnyArray, Array
 from finlab.axes import TURN
 from finlab.core.calls import MAGIC, Core
@@ -16,7 +26,8 @@ from finlab.core.library import VERSION
 
 
 class DualRobot:
-    """One robot, prepared of the responses of its n actuators: forces along one or two directions of each."""
+    """One robot, prepared of the responses of its n actuators: forces along one or two directions
+    of each."""
 
     def __init__(
         self,
@@ -34,13 +45,14 @@ class DualRobot:
         Args:
             responses: what each actuator offers for prices.
             forms: how the forces of each become commands.
-            limits: least and largest commands (n, 3), largest changes in a tick (n, 3), and which angles
-                turn freely (n, 3).
+            limits: least and largest commands (n, 3), largest changes in a tick (n, 3), and which
+                angles turn freely (n, 3).
             effectiveness: wrench (n, 3, 6) per newton along the actuators' own axes [1, m].
             yardstick: scale (6,) of errors [N, N m].
-            beside: wrench (6,) on top of that of the forces [N, N m], such as the drag of foils; None for
-                none.
-            doubt: what a squared force of each foil costs beside its power (n,) [W/N^2]; None for nothing.
+            beside: wrench (6,) on top of that of the forces [N, N m], such as the drag of foils;
+                None for none.
+            doubt: what a squared force of each foil costs beside its power (n,) [W/N^2]; None for
+            nothing.
             counts: 1 of axes (6,) that the robot commands, else 0; None where it commands all.
         """
         n = len(responses)
@@ -88,8 +100,8 @@ class DualRobot:
         return np.stack([largest, second], axis=1)
 
     def _gains(self) -> Array:
-        """Forces over prices (n, 2) [N^2/W] at the largest force, by half of it; of drag, which grows with
-        the square of lift, by the square of its share."""
+        """Forces over prices (n, 2) [N^2/W] at the largest force, by half of it; of drag, which
+        grows with the square of lift, by the square of its share."""
         usual_price = np.array([[_usual_price(response)] for response in self.responses])
         gain = self.most[:, :1] / usual_price
         share = self.most / self.most[:, :1]
@@ -104,8 +116,8 @@ class DualRobot:
         return np.where(size > NOTHING * largest, size, 1.0)
 
     def span(self, works: NDArray[np.bool_], counts: NDArray[np.bool_]) -> Array:
-        """Returns directions (6, r) of scaled wrenches, orthonormal, that the actuators which work (n,) drive
-        in the axes that count (6,)."""
+        """Returns directions (6, r) of scaled wrenches, orthonormal, that the actuators which work
+        (n,) drive in the axes that count (6,)."""
         scaled = self.effectiveness * self._sizes[..., None] / self.scale
         is_driven = works[:, None, None] & counts
         columns = np.where(is_driven, scaled, 0.0).reshape(-1, 6).T
@@ -241,7 +253,9 @@ class _Tables:
         return TableOffsets(
             ahead=self.radial(response.table),
             back=self.radial(response.reverse),
-            gauge=self.offset(gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))),
+            gauge=self.offset(
+                gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))
+            ),
             law=self.offset(law, lambda: cast(Array, law)),
             beat=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
@@ -273,17 +287,17 @@ def _counted(rows: Array, kind: str) -> Array:
 def gauge_numbers(gauge: Array, deflection: Array) -> Array:
     """Returns a gauge as the core takes it.
 
-    A force in direction psi is at most gauge(psi) times that of the table, so a price in direction theta is
-    worth the support function h(theta) = max over psi of gauge(psi) cos(theta - psi). The parabola through
-    the best three directions stands for the gauge between them.
+    A force in direction psi is at most gauge(psi) times that of the table, so a price in direction
+    theta is worth the support function h(theta) = max over psi of gauge(psi) cos(theta - psi). The
+    parabola through the best three directions stands for the gauge between them.
 
     Args:
         gauge: radii (G,) in G even directions around the circle.
         deflection: angles (POINTS,) [rad] from the command's direction to the force's.
 
     Returns:
-        POINTS, then in each of as many directions the support function, its derivative, the gauge and the
-        deflection.
+        POINTS, then in each of as many directions the support function, its derivative, the gauge
+        and the deflection.
     """
     count = len(gauge)
     theta = np.arange(POINTS) * TURN / POINTS
@@ -293,7 +307,8 @@ def gauge_numbers(gauge: Array, deflection: Array) -> Array:
     best = reached.argmax(axis=1)
     row = np.arange(POINTS)
 
-    # The parabola h(x) = h_1 + x (h_2 - h_0) / 2 + x^2 (h_0 - 2 h_1 + h_2) / 2 around the best direction.
+    # The parabola h(x) = h_1 + x (h_2 - h_0) / 2 + x^2 (h_0 - 2 h_1 + h_2) / 2 around the best
+    # direction.
     h0 = reached[row, (best - 1) % count]
     h1 = reached[row, best]
     h2 = reached[row, (best + 1) % count]
@@ -314,8 +329,8 @@ def gauge_numbers(gauge: Array, deflection: Array) -> Array:
 
 
 def _usual_price(response: Response) -> float:
-    """Price [W/N] of an actuator's largest force where power grows as its power of 1.5 from half of it on: at
-    the peak of a soft fin the price itself says nothing of the forces below."""
+    """Price [W/N] of an actuator's largest force where power grows as its power of 1.5 from half of
+    it on: at the peak of a soft fin the price itself says nothing of the forces below."""
     prices = []
     for table in filter(None, (response.table, response.reverse)):
         middle = 0.5 * (table.force[0] + table.force[-1])
@@ -325,7 +340,8 @@ def _usual_price(response: Response) -> float:
 
 
 def _needs_no_reverse(plane: Plane) -> bool:
-    """Whether a plane that turns all round gives forward what it gives in reverse, at no more power."""
+    """Whether a plane that turns all round gives forward what it gives in reverse, at no more
+    power."""
     ahead = plane.table
     back = plane.reverse
     if back is None or plane.half < np.pi:

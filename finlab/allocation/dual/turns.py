@@ -1,11 +1,12 @@
-"""Answers where actuators act on each other, in turns: the dual of the model made linear at the last answer.
+"""Answers where actuators act on each other, in turns: the dual of the model made linear at the
+last answer.
 
-With y the forces and o(y) what the actuators do to each other, a turn takes o(y) for its value and slope at
-the last forces. Its answer is exact and cheapest on that linear model; Levenberg-Marquardt steps make it
-exact on the whole one, and shorter steps are taken where it is no cheaper. Where the turns settle, the
-gradient of the power lies in the range of the slope of the whole model: the conditions of Karush, Kuhn and
-Tucker hold there (sequential convex programming). The turns themselves are in
-finlab/core/src/sequential_convex.c.
+With y the forces and o(y) what the actuators do to each other, a turn takes o(y) for its value and
+slope at the last forces. Its answer is exact and cheapest on that linear model; Levenberg-Marquardt
+steps make it exact on the whole one, and shorter steps are taken where it is no cheaper. Where the
+turns settle, the gradient of the power lies in the range of the slope of the whole model: the
+conditions of Karush, Kuhn and Tucker hold there (sequential convex programming). The turns
+themselves are in finlab/core/src/sequential_convex.c.
 """
 
 from typing import Any
@@ -37,7 +38,8 @@ WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 
 
 def whole_of(dual: Any) -> Whole:
-    """Returns the robot of a method `Dual` in the core, with what its actuators do to each other."""
+    """Returns the robot of a method `Dual` in the core, with what its actuators do to each
+    other."""
     plant = dual.plant
     robot = dual.compiled.robot
     known = plant.interaction
@@ -48,8 +50,8 @@ def whole_of(dual: Any) -> Whole:
 
 
 def settled(dual: Any, targets: Array, policy: Policy, now: Now, prices: Array | None) -> Solution:
-    """Returns the answers of method `dual` to targets (N, 6), with what may be given now; arguments as for
-    `Dual.solve`."""
+    """Returns the answers of method `dual` to targets (N, 6), with what may be given now; arguments
+    as for `Dual.solve`."""
     parts: list[tuple[Array, Array, Array]] = []
     notes: set[str] = set()
     for target in targets:
@@ -67,7 +69,8 @@ def settled(dual: Any, targets: Array, policy: Policy, now: Now, prices: Array |
 
 
 def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array | None) -> Found:
-    """What turns from the previous command, or from several beginnings, come to, for one target (6,)."""
+    """What turns from the previous command, or from several beginnings, come to, for one target
+    (6,)."""
     whole: Whole = dual.whole
     if now.previous is not None:
         return whole.settled(target, None, IN_A_TICK, policy, prices, now).found
@@ -86,7 +89,9 @@ def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array |
             if left <= 0:
                 break
             force = tried[k].found.force[0]
-            other = whole.settled(target, force, ROUNDS, policy, laws.price[0], now, most_steps=left)
+            other = whole.settled(
+                target, force, ROUNDS, policy, laws.price[0], now, most_steps=left
+            )
             left -= other.steps
             best = other if _beats(other, best) else best
         return best.power < (1.0 - 10.0 * CLOSE) * before.power
@@ -110,8 +115,8 @@ def _beats(one: Ended, other: Ended) -> bool:
 
 
 def _on_the_ray(dual: Any, target: Array, command: Array, now: Now) -> tuple[Array, Array]:
-    """The command (1, n, 3) near to another one that gives the largest share of a target (1, 6) that steps
-    come to, and that wrench."""
+    """The command (1, n, 3) near to another one that gives the largest share of a target (1, 6)
+    that steps come to, and that wrench."""
     along = target / dual.scale
     problem = dual.problem_now(now)
     share = float((problem.wrench(command) * along).sum() / max((along * along).sum(), 1e-300))
@@ -134,10 +139,10 @@ def _on_the_ray(dual: Any, target: Array, command: Array, now: Now) -> tuple[Arr
 
 
 def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
-    """Other forces (12, n, 2) to begin at than (n, 2): those of planes turned one way or the other, in the
-    patterns of Walsh, then all of them turned and changed in size at random. A jet that meets a neighbour in
-    a symmetric robot has no slope that would turn it aside, and which of two jets gives way is a choice
-    between minima."""
+    """Other forces (12, n, 2) to begin at than (n, 2): those of planes turned one way or the other,
+    in the patterns of Walsh, then all of them turned and changed in size at random. A jet that
+    meets a neighbour in a symmetric robot has no slope that would turn it aside, and which of two
+    jets gives way is a choice between minima."""
     planes = np.flatnonzero(~lines)
     rng = np.random.default_rng(0)
     signs = WALSH[np.arange(len(planes)) % len(WALSH)]
@@ -149,5 +154,7 @@ def _turned_aside(force: Array, lines: NDArray[np.bool_]) -> Array:
     size[:, lines] = rng.uniform(0.0, 2.0, (len(size), lines.sum()))
     cos = np.cos(angle)
     sin = np.sin(angle)
-    turned = np.stack([cos * force[:, 0] - sin * force[:, 1], sin * force[:, 0] + cos * force[:, 1]], axis=-1)
+    turned = np.stack(
+        [cos * force[:, 0] - sin * force[:, 1], sin * force[:, 0] + cos * force[:, 1]], axis=-1
+    )
     return np.asarray(size[..., None] * turned)

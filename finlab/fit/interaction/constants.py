@@ -1,7 +1,8 @@
-"""Constants of the formula of jets, fitted to samples of one robot by least squares on their logarithms.
+"""Constants of the formula of jets, fitted to samples of one robot by least squares on their
+logarithms.
 
-Few samples leave some of the constants open; a normal prior about the usual values, in which a factor of two
-is one standard deviation, holds those.
+Few samples leave some of the constants open; a normal prior about the usual values, in which a
+factor of two is one standard deviation, holds those.
 """
 
 from dataclasses import asdict, replace
@@ -65,7 +66,9 @@ def fit_constants(samples: Samples) -> Fitted:
     share, floor = parts_of_error(rest, each, size)
     by_constants = noise * fit.jac[: rest.size]
     measured = (floor * size) ** 2 + (share * each) ** 2 + 1e-12
-    known = (by_constants / measured.reshape(-1, 1)).T @ by_constants + np.eye(len(start)) / PRIOR**2
+    known = (by_constants / measured.reshape(-1, 1)).T @ by_constants + np.eye(
+        len(start)
+    ) / PRIOR**2
     spread = ((by_constants @ np.linalg.inv(known)) * by_constants).sum()
     uncertain = np.sqrt(share**2 + spread / max((each**2).sum(), 1e-12))
     jets = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
@@ -74,9 +77,9 @@ def fit_constants(samples: Samples) -> Fitted:
 
 
 def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]:
-    """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares together are
-    the variances of normal errors (N, 6), what a model lacks and noise: root mean squares over all shares,
-    each as likely as it makes the errors."""
+    """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares
+    together are the variances of normal errors (N, 6), what a model lacks and noise: root mean
+    squares over all shares, each as likely as it makes the errors."""
     shares = np.geomspace(3e-3, 10.0, 60)
     floors = np.geomspace(1e-4, 0.3, 40)
     costs = np.empty((len(shares), len(floors)))
@@ -85,7 +88,9 @@ def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]
         costs[i] = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
     likely = np.exp(-0.5 * (costs - costs.min()))
     likely /= likely.sum()
-    return float(np.sqrt(likely.sum(axis=1) @ shares**2)), float(np.sqrt(likely.sum(axis=0) @ floors**2))
+    return float(np.sqrt(likely.sum(axis=1) @ shares**2)), float(
+        np.sqrt(likely.sum(axis=0) @ floors**2)
+    )
 
 
 def _size(rows: Array) -> float:

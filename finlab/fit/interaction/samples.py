@@ -1,10 +1,11 @@
-"""Forward data of what actuators do to each other: robots, commands, and the wrenches that these caused.
+"""Forward data of what actuators do to each other: robots, commands, and the wrenches that these
+caused.
 
-An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI units, NaN
-where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame, NaN where it was not
-measured. A CSV file holds the samples of one robot: `NAME.number` for each actuator, such as `bow.force`, or
-`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A folder holds a CSV file for each robot, beside
-its layout file of the same name.
+An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI
+units, NaN where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame,
+NaN where it was not measured. A CSV file holds the samples of one robot: `NAME.number` for each
+actuator, such as `bow.force`, or `left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A
+folder holds a CSV file for each robot, beside its layout file of the same name.
 """
 
 import json
@@ -60,7 +61,9 @@ def left_by_laws(samples: Samples) -> Left:
     plant = Plant(layout)
     scale = yardstick(layout)
     own = plant.force(samples.command)
-    return Left(body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale)
+    return Left(
+        body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale
+    )
 
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:
@@ -79,8 +82,8 @@ def write_samples(path: Path, samples: Sequence[Samples]) -> None:
 
 
 def read_samples(path: Path) -> list[Samples]:
-    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do not fit
-    the robots; LayoutError: a robot is none."""
+    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do
+    not fit the robots; LayoutError: a robot is none."""
     if path.is_dir():
         if tables := sorted(path.glob("*.csv")):
             return [_beside(table) for table in tables]
@@ -91,7 +94,8 @@ def read_samples(path: Path) -> list[Samples]:
     if not isinstance(values, list) or not values:
         raise DataError(f"{path}: layouts: expected JSON text of a list of layout files")
     robots = [
-        parse_layout(v, f"{path}: layouts[{k}]", path.parent, may_open=False) for k, v in enumerate(values)
+        parse_layout(v, f"{path}: layouts[{k}]", path.parent, may_open=False)
+        for k, v in enumerate(values)
     ]
     count, n = (arrays["command"].shape + (0, 0, 0))[1:3]
     most = max(n, max(robot.n for robot in robots))
@@ -103,7 +107,8 @@ def read_samples(path: Path) -> list[Samples]:
         own = command[known][:, : layout.n].astype(np.float64)
         if not np.isfinite(own).all():
             raise DataError(
-                f"{path}: command: NaN or infinity for an actuator of {layout.name}, expected numbers"
+                f"{path}: command: NaN or infinity for an actuator of {layout.name}, expected "
+                "numbers"
             )
         result.append(Samples(layout, own, wrench[known].astype(np.float64)))
     return result
@@ -113,12 +118,18 @@ def _beside(table: Path) -> Samples:
     for suffix in (".yaml", ".yml", ".json"):
         if (robot := table.with_suffix(suffix)).exists():
             return read_table(load_layout(robot), table)
-    raise DataError(f"{table}: expected a layout file of the same name beside it, such as {table.stem}.yaml")
+    raise DataError(
+        f"{table}: expected a layout file of the same name beside it, such as {table.stem}.yaml"
+    )
 
 
 def read_table(layout: Layout, path: Path) -> Samples:
     """Returns the samples of one robot in a CSV file; errors as for `read_samples`."""
     wanted = [*sum(command_columns(layout), []), *AXES]
     units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": TURNS["deg"]}
-    table = read_columns(path, {name: name for name in wanted}, wanted, ", ".join(wanted), units).values
-    return Samples(layout, commands_in(table, layout), np.stack([table[axis] for axis in AXES], axis=-1))
+    table = read_columns(
+        path, {name: name for name in wanted}, wanted, ", ".join(wanted), units
+    ).values
+    return Samples(
+        layout, commands_in(table, layout), np.stack([table[axis] for axis in AXES], axis=-1)
+    )

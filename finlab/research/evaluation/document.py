@@ -1,6 +1,8 @@
-"""A document as a list of blocks, the same in Markdown or as plain text, and numbers as people read them.
+"""A document as a list of blocks, the same in Markdown or as plain text, and numbers as people read
+them.
 
-A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
+A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark
+in small.
 """
 
 import math
@@ -82,15 +84,17 @@ class Table:
     rows: Sequence[Row]
 
     def cell(self, row: Row, column: Column) -> str:
-        """The text of a row's cell, its interval in brackets behind it; empty where the row has no such
-        key."""
+        """The text of a row's cell, its interval in brackets behind it; empty where the row has no
+        such key."""
         show = FORMATS[column.format]
         value = row.get(column.key)
         ends = row.get(column.interval or "")
         if value is None:
             return ""
         return (
-            f"{show(value)} ({show(ends[0])} – {show(ends[1])})" if ends and None not in ends else show(value)
+            f"{show(value)} ({show(ends[0])} – {show(ends[1])})"
+            if ends and None not in ends
+            else show(value)
         )
 
 
@@ -99,7 +103,10 @@ Block = str | Table  # a string is Markdown
 
 def to_markdown(*blocks: Block) -> str:
     """Blocks as the Markdown of a page, tables with pipes; rows that are ours in bold."""
-    return "\n\n".join(block if isinstance(block, str) else _text_table(block) for block in blocks) + "\n"
+    return (
+        "\n\n".join(block if isinstance(block, str) else _text_table(block) for block in blocks)
+        + "\n"
+    )
 
 
 def _text_table(table: Table) -> str:
@@ -125,5 +132,7 @@ def _plain(block: Block) -> str:
         lines = (line.strip("#* ").replace("`", "") for line in block.splitlines())
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
     head = [column.heading for column in block.columns]
-    cells = [[block.cell(row, column).replace("`", "") for column in block.columns] for row in block.rows]
+    cells = [
+        [block.cell(row, column).replace("`", "") for column in block.columns] for row in block.rows
+    ]
     return aligned(head, cells, [not column.is_number for column in block.columns])

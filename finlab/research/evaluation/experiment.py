@@ -1,8 +1,8 @@
 """An experiment is one value: what is asked, what is run, and the columns of its rows.
 
-The verb `finlab eval NAME`, its `--json FILE`, and the section of the report (question, table, size)
-follow from it. Each module of `EXPERIMENTS` holds one under the name `experiment`, and is imported when it is
-asked for.
+The verb `finlab eval NAME`, its `--json FILE`, and the section of the report (question, table,
+size) follow from it. Each module of `EXPERIMENTS` holds one under the name `experiment`, and is
+imported when it is asked for.
 """
 
 import inspect
@@ -26,7 +26,8 @@ EXPERIMENTS = (
     *("wrench", "thrusters", "latency", "ablation", "temperature"),
     *("trajectory", "faults", "velocity", "swims", "interaction"),
 )
-"""Names, those of their modules in `finlab.research.evaluation.experiments`, in the order of the report."""
+"""Names, those of their modules in `finlab.research.evaluation.experiments`, in the order of the
+report."""
 # largest whole number of an option, and of a seed
 MOST = 1_000_000
 MOST_SEED = 2**63 - 1
@@ -40,14 +41,14 @@ class Experiment:
     name: str  # of the verb and of the report's section
     question: str  # one sentence, in Markdown, which is the help of the verb, too
     columns: tuple[Column, ...]
-    """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
-    `<key>_interval`."""
+    """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are
+    under `<key>_interval`."""
     run: Callable[..., Iterable[Row]]
-    """From keyword options to rows of plain values. The options of the verb are its parameters: their types
-    (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None), their defaults and
-    their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
-    parameter `layout` is given by position. Times depend on the machine; all other values on the options
-    alone."""
+    """From keyword options to rows of plain values. The options of the verb are its parameters:
+    their types (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None),
+    their defaults and their words under `Args` in its docstring. An int whose default is 0 may be
+    0, any other is at least 1. A parameter `layout` is given by position. Times depend on the
+    machine; all other values on the options alone."""
     note: str = ""  # how the columns are to be read, in Markdown
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
@@ -67,21 +68,27 @@ class Experiment:
         return {name: each.replace(annotation=types[name]) for name, each in parameters.items()}
 
     def check(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """All options: those chosen, and the defaults of the others. Raises DataError: an unknown option, or
-        a number out of range."""
+        """All options: those chosen, and the defaults of the others. Raises DataError: an unknown
+        option, or a number out of range."""
         options = self.options()
         if unknown := [name for name in chosen if name not in options]:
-            raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
+            raise DataError(
+                f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}"
+            )
         values = {name: chosen.get(name, each.default) for name, each in options.items()}
         for name, value in values.items():
             least = 0 if options[name].default == 0 else 1
             most = MOST_SEED if name == "seed" else MOST
             if type(value) is int and not least <= value <= most:
                 said = f"at least {least}" if value < least else f"at most {most}"
-                raise DataError(f"{name.replace('_', '-')}: expected a number of {said}, got {value}")
+                raise DataError(
+                    f"{name.replace('_', '-')}: expected a number of {said}, got {value}"
+                )
             for number in value if isinstance(value, tuple) else (value,):
                 if isinstance(number, float) and not math.isfinite(number):
-                    raise DataError(f"{name.replace('_', '-')}: expected a finite number, got {number}")
+                    raise DataError(
+                        f"{name.replace('_', '-')}: expected a finite number, got {number}"
+                    )
         return values
 
     def command(self, options: Mapping[str, Any]) -> str:
@@ -100,8 +107,9 @@ class Experiment:
         return shlex.join(words)
 
     def each_row(self, **chosen: Any) -> Iterator[Row]:
-        """Run it, row by row; options as in `check`. A number that is not finite becomes None. Raises
-        DataError: as `check`, and options that the run itself refuses; AllocationError: an unknown method."""
+        """Run it, row by row; options as in `check`. A number that is not finite becomes None.
+        Raises DataError: as `check`, and options that the run itself refuses; AllocationError: an
+        unknown method."""
         yield from map(_finite, self.run(**self.check(chosen)))
 
     def rows(self, **chosen: Any) -> list[Row]:
@@ -110,7 +118,9 @@ class Experiment:
 
     def table(self, rows: Sequence[Row]) -> Table:
         """The rows of the default method stand out; below them are those that the paper prints."""
-        ours = [{**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows]
+        ours = [
+            {**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows
+        ]
         printed = [] if self.printed is None else self.printed(rows)
         return Table(self.columns, [*ours, *printed])
 
@@ -130,7 +140,8 @@ def check_names(option: str, names: Sequence[str], known: Collection[str]) -> No
 
 
 def progress(items: Iterable[Item], unit: str, title: str | None = None) -> Iterable[Item]:
-    """The items one by one, with a bar on stderr that is gone at the end; none where that is no terminal."""
+    """The items one by one, with a bar on stderr that is gone at the end; none where that is no
+    terminal."""
     # disable=None: a bar on a terminal, nothing elsewhere
     return tqdm(items, title, unit=unit, disable=None, leave=False, file=sys.stderr)
 

@@ -15,28 +15,39 @@ from threadpoolctl import threadpool_limits
 import finlab
 from finlab.errors import DataError
 from finlab.research.evaluation.document import Block, Row, to_markdown
-from finlab.research.evaluation.experiment import EXPERIMENTS, check_names, load_experiment, progress
+from finlab.research.evaluation.experiment import (
+    EXPERIMENTS,
+    check_names,
+    load_experiment,
+    progress,
+)
 from finlab.whole_file import make_folder, write_whole
 
 # what a report's folder holds
 PAGE = "report.md"
 TABLES = "tables.json"
-SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
+# of a report, unless another one is given; kept apart from those on which methods were developed
+SEED = 6143
 ABOUT = (
-    "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
-    "learned one fin law from samples, were given these, so errors show how well methods solve, not how "
-    "well a model fits a fin in the water. No robot swam and no fin was measured for this report: fin laws "
+    "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, "
+    "which has "
+    "learned one fin law from samples, were given these, so errors show how well methods solve, "
+    "not how "
+    "well a model fits a fin in the water. No robot swam and no fin was measured for this report: "
+    "fin laws "
     "are means over a cycle in still water, bodies, water and sensors are simulated. Methods and "
     f"controllers were developed on other seeds than {SEED}."
 )
 Size = Literal["quick", "full"]
 
 
-def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)) -> Path:
-    """Make the report. Page and rows are written after each experiment, so that they are there if it is
-    stopped; each runs on one thread, so that times are of one core. Returns the page in the folder `out`,
-    which is made if need be. Raises DataError: an unknown name of an experiment, or a file that cannot be
-    written."""
+def make_report(
+    out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)
+) -> Path:
+    """Make the report. Page and rows are written after each experiment, so that they are there if
+    it is stopped; each runs on one thread, so that times are of one core. Returns the page in the
+    folder `out`, which is made if need be. Raises DataError: an unknown name of an experiment, or a
+    file that cannot be written."""
     check_names("sections", names, ("all", *EXPERIMENTS))
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
@@ -48,7 +59,11 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
     command += "" if "all" in names else f" --sections {','.join(chosen)}"
     command += f" --seed {seed}" if seed != SEED else ""
     note = "" if size == "full" else " A quick look on few cases: intervals are wide."
-    head = ["# finlab evaluation", f"Allocation methods and simulated swims, side by side.{note}", ABOUT]
+    head = [
+        "# finlab evaluation",
+        f"Allocation methods and simulated swims, side by side.{note}",
+        ABOUT,
+    ]
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
         options = dict(experiment.quick if size == "quick" else experiment.full)
@@ -65,7 +80,8 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
 
 
 def _commit() -> str:
-    """The commit of the source tree, and whether it was changed since; of an installation the version."""
+    """The commit of the source tree, and whether it was changed since; of an installation the
+    version."""
     version = f"version {finlab.__version__}"
     tree = Path(finlab.__file__).parents[1]
     if not (tree / ".git").exists():
@@ -82,7 +98,8 @@ def _end(made: str) -> list[str]:
         made,
         f"On {platform.machine()}, python {platform.python_version()}, "
         + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
-        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent "
+        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "
+        "Layout-independent "
         "actuation allocator for fin-actuated marine robots",
     ]
     return ["## How this was made", "\n".join(f"- {line}" for line in lines)]

@@ -28,29 +28,37 @@ from finlab.research.random_layouts import (
 from finlab.research.random_layouts import Draw as ActuatorDraw
 
 OOD_BOX = (0.45, 0.45, 0.20)
-"""Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
+"""Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training
+box."""
 OOD_FINS = (6, 8)  # least and most fins in split `ood-fins`
 MANY_FINS = (9, 12)  # least and most fins in split `many-fins`
 NEAR_ANGLE = math.radians(2.0)
-"""Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
+"""Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as
+parallel."""
 NEAR_POSITION = 0.005
-"""Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
+"""Nearly coincident fins of split `near-singular` lie within this of each other along each axis
+[m]."""
 DOMAIN = 0x7E57  # leads the seed of every test case; training seeds begin otherwise
-OWN_SIGMA = (*("fins", "fins-mixed", "tables"), *("thrusters", "azimuths", "mixed-actuators", "any-shaft"))
-"""Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
-training: errors there are relative to what the robot can do."""
+OWN_SIGMA = (
+    *("fins", "fins-mixed", "tables"),
+    *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
+)
+"""Splits whose robots are each measured by their own wrenches, which are smaller or larger than
+those of training: errors there are relative to what the robot can do."""
 N_SIGMA = 4096  # uniform commands from which such a robot's yardstick is computed
 LEAST_SIGMA = 0.05
-"""Least deviation on an axis, as a share of the largest one among the forces, or among the torques."""
+"""Least deviation on an axis, as a share of the largest one among the forces, or among the
+torques."""
 
 GRID = (8, 9, 12)
-"""Amplitudes, frequencies and zero directions of a table; the first two range over the fin's limits, the last
-over the circle."""
+"""Amplitudes, frequencies and zero directions of a table; the first two range over the fin's
+limits, the last over the circle."""
 NOISE = 0.03  # standard deviation of each component of a force, as a share of it
 
 
 class Case(NamedTuple):
-    """One layout with targets that its healthy fins can deliver, and what errors on it are divided by."""
+    """One layout with targets that its healthy fins can deliver, and what errors on it are divided
+    by."""
 
     layout: Layout  # all fins, lost ones included
     targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
@@ -67,11 +75,16 @@ class Case(NamedTuple):
 def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
     """The test cases of a split, one of `SPLITS`: layouts, and targets for each of them.
 
-    Layout k and its first targets depend on the split, the seed and k alone, so that a small run is the
-    beginning of a large one. Raises DataError: unknown split, fewer than one, or a negative seed."""
+    Layout k and its first targets depend on the split, the seed and k alone, so that a small run is
+    the beginning of a large one. Raises DataError: unknown split, fewer than one, or a negative
+    seed."""
     if name not in SPLITS:
         raise DataError(f"split: expected one of {', '.join(SPLITS)}, got {name!r}")
-    for value, what, least in ((n_layouts, "layouts", 1), (n_targets, "targets", 1), (seed, "seed", 0)):
+    for value, what, least in (
+        (n_layouts, "layouts", 1),
+        (n_targets, "targets", 1),
+        (seed, "seed", 0),
+    ):
         if value < least:
             raise DataError(f"{what}: expected a number of at least {least}, got {value}")
     return [make_case(name, n_targets, seed, k) for k in range(n_layouts)]
@@ -89,7 +102,8 @@ def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
 
 
 def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
-    """A robot's own yardstick of errors (6,): what its wrenches deviate by under uniform commands."""
+    """A robot's own yardstick of errors (6,): what its wrenches deviate by under uniform
+    commands."""
     deviation = plant.wrench(plant.sample(rng, (N_SIGMA,))).std(axis=0).reshape(2, 3)
     least = LEAST_SIGMA * deviation.max(axis=1, keepdims=True)
     return np.asarray(np.maximum(deviation, least).reshape(6))
@@ -113,7 +127,8 @@ def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ..
 
 
 def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-    """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of fins."""
+    """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of
+    fins."""
     layout = random_layout(rng, name)
     (first, *others) = layout.fins
     angle = layout.mounting_angle[0]
@@ -125,13 +140,17 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
             for fin, turn in zip(others, turns, strict=True)
         ]
     else:
-        x, y, z = (np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)).tolist()
+        x, y, z = (
+            np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)
+        ).tolist()
         turned = float(wrapped(angle + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
         fins = [replace(others[0], position=(x, y, z), mounting_angle=turned), *others[1:]]
     return replace(layout, actuators=(first, *fins)), ()
 
 
-def _fins(rng: np.random.Generator, name: str, mixed: bool = False) -> tuple[Layout, tuple[str, ...]]:
+def _fins(
+    rng: np.random.Generator, name: str, mixed: bool = False
+) -> tuple[Layout, tuple[str, ...]]:
     """All fins of one random model, or each of a random model of its own."""
     layout = random_layout(rng, name)
     model = random_fin_model(rng)
@@ -149,7 +168,8 @@ def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...
 
 
 def _noisy_table(rng: np.random.Generator, fin: Fin, name: str) -> Fin:
-    """A fin with a table of its model in place of the model; the file of that name is written once."""
+    """A fin with a table of its model in place of the model; the file of that name is written
+    once."""
     path = Path(_table_folder().name) / f"{name}.csv"
     if not path.exists():
         ranges = zip((fin.limits.amplitude, fin.limits.frequency), GRID, strict=False)
@@ -187,9 +207,13 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     "azimuths": (19, _robots(random_azimuth, count=(2, 6))),
     "mixed-actuators": (
         20,
-        _robots(*(random_shaft_fin, random_thruster, random_azimuth, random_tilt), count=(4, 10), each=True),
+        _robots(
+            *(random_shaft_fin, random_thruster, random_azimuth, random_tilt),
+            count=(4, 10),
+            each=True,
+        ),
     ),
     "any-shaft": (21, _robots(random_shaft_fin, count=(2, 8))),
 }
-"""Name -> a number that is part of the seed and of no other split, and how a layout and its lost fins are
-drawn."""
+"""Name -> a number that is part of the seed and of no other split, and how a layout and its lost
+fins are drawn."""

@@ -1,1 +1,2 @@
-"""Networks that learn what actuators do to each other: drawn samples and training. They need torch."""
+"""Networks that learn what actuators do to each other: drawn samples and training. They need
+torch."""

@@ -27,9 +27,9 @@ def with_jets(layout: Layout, command: Array, jets: Jets = JETS) -> Array:
 def drawn(
     judge: Judge, layouts: int, commands: int, seed: int, noise: float, count: tuple[int, int]
 ) -> list[Samples]:
-    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and wrenches
-    with normal noise, a share of each axis' root mean square. They depend on the seed and the number
-    alone. Raises DataError: the judge gives wrenches of another shape."""
+    """Returns samples of random robots of `count` actuators, least to most: uniform commands, and
+    wrenches with normal noise, a share of each axis' root mean square. They depend on the seed and
+    the number alone. Raises DataError: the judge gives wrenches of another shape."""
     result = []
     for k in range(layouts):
         rng = np.random.default_rng([31_000, seed, k])
@@ -37,7 +37,11 @@ def drawn(
         command = Plant(layout).sample(rng, (commands,))
         wrench = np.asarray(judge(layout, command), np.float64)
         if wrench.shape != (commands, 6):
-            raise DataError(f"the plant gave an array of shape {wrench.shape}, expected ({commands}, 6)")
+            raise DataError(
+                f"the plant gave an array of shape {wrench.shape}, expected ({commands}, 6)"
+            )
         size = np.sqrt((wrench**2).mean(axis=0))
-        result.append(Samples(layout, command, wrench + noise * size * rng.normal(size=wrench.shape)))
+        result.append(
+            Samples(layout, command, wrench + noise * size * rng.normal(size=wrench.shape))
+        )
     return result

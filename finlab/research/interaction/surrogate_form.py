@@ -1,7 +1,7 @@
 """The form of the paper's surrogate (Eq. 4), trained on what the laws leave, for comparison.
 
-A perceptron gives each actuator's share of [x_i, u_i], place and force in the body frame, and a descriptor of
-all stretches and shifts the sum.
+A perceptron gives each actuator's share of [x_i, u_i], place and force in the body frame, and a
+descriptor of all stretches and shifts the sum.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,15 +20,18 @@ from finlab.physics.objective import yardstick
 def trained_surrogate(
     samples: Sequence[Samples], seed: int, steps: int = 1500, batch: int = 512
 ) -> Callable[[Layout], Callable[[Array], Array]]:
-    """Trains it, and returns what it says of a robot: from forces (K, n, 3) [N] in the body frame to what
-    comes beside their wrenches (K, 6) [N, N m]."""
+    """Trains it, and returns what it says of a robot: from forces (K, n, 3) [N] in the body frame
+    to what comes beside their wrenches (K, 6) [N, N m]."""
     torch.manual_seed(seed)
-    net = nn.Sequential(nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3))
+    net = nn.Sequential(
+        nn.Linear(7, 256), nn.GELU(), nn.Linear(256, 128), nn.GELU(), nn.Linear(128, 3)
+    )
     describe = nn.Sequential(nn.Linear(7, 64), nn.GELU())
     affine = nn.Linear(64, 12)
 
     def rows(layout: Layout, force: Array, scale: Array, n: int) -> torch.Tensor:
-        """Features (K, n, 9): place, force and size, whether there is an actuator, and the unit of arms."""
+        """Features (K, n, 9): place, force and size, whether there is an actuator, and the unit of
+        arms."""
         x = np.zeros((len(force), n, 9))
         x[:, : layout.n, :3] = layout.position / 0.3
         x[:, : layout.n, 3:6] = force / scale[0]
@@ -69,7 +72,9 @@ def trained_surrogate(
 
         def function(force: Array) -> Array:
             with torch.no_grad():
-                return np.asarray(wrench(rows(layout, force, scale, layout.n)).double().numpy() * scale)
+                return np.asarray(
+                    wrench(rows(layout, force, scale, layout.n)).double().numpy() * scale
+                )
 
         return function
 

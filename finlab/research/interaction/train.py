@@ -1,8 +1,8 @@
 """Training of the networks of a learned interaction, from forward data of many robots.
 
-What the laws of the actuators leave of each measured wrench, on the robot's yardstick, is the sum of the
-messages. Their features and vectors do not depend on the weights, so they are made once; a step of training
-is two small networks on the rows of some samples.
+What the laws of the actuators leave of each measured wrench, on the robot's yardstick, is the sum
+of the messages. Their features and vectors do not depend on the weights, so they are made once; a
+step of training is two small networks on the rows of some samples.
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,9 @@ class Rows(NamedTuple):
         first = self.starts[samples]
         count = self.starts[samples + 1] - self.starts[samples]
         owner = torch.repeat_interleave(torch.arange(len(samples)), count)
-        place = torch.arange(len(owner)) - torch.repeat_interleave(torch.cumsum(count, 0) - count, count)
+        place = torch.arange(len(owner)) - torch.repeat_interleave(
+            torch.cumsum(count, 0) - count, count
+        )
         rows = torch.repeat_interleave(first, count) + place
         return self.features[rows], self.vectors[rows], owner
 
@@ -75,8 +77,8 @@ class DataSet(NamedTuple):
 
 
 def data_set(samples: Sequence[Samples]) -> DataSet:
-    """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots, or none
-    with a jet."""
+    """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots,
+    or none with a jet."""
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
     left = []
     size = []
@@ -102,9 +104,11 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
     return DataSet(rows, remains, sizes, torch.from_numpy(np.concatenate(robot)))
 
 
-def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
-    """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R, k, 6),
-    and how many rows each of forces (K, n, 3) [N] has (K,)."""
+def messages_of(
+    places: Places, force: Array, scale: Array
+) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
+    """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R,
+    k, 6), and how many rows each of forces (K, n, 3) [N] has (K,)."""
     pairs = Pairs(places)
     lever = LearnedInteraction({}, 1.0, places).lever / scale
     source = force[:, pairs.source]
@@ -125,10 +129,14 @@ def messages_of(places: Places, force: Array, scale: Array) -> dict[str, tuple[A
 
 
 def train(
-    samples: Sequence[Samples], folder: Path, settings: LoopSettings, seed: int = 0, resume: bool = False
+    samples: Sequence[Samples],
+    folder: Path,
+    settings: LoopSettings,
+    seed: int = 0,
+    resume: bool = False,
 ) -> float:
-    """Trains three networks, writes their file, and log and state, into a folder, and returns the root mean
-    square error on robots that were held out, on the yardstick."""
+    """Trains three networks, writes their file, and log and state, into a folder, and returns the
+    root mean square error on robots that were held out, on the yardstick."""
     data = data_set(samples)
     robots = torch.from_numpy(np.random.default_rng(seed).permutation(len(samples)))
     held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT * len(samples)))])
@@ -157,7 +165,9 @@ def train(
         shipped = {name: torch.from_numpy(np.asarray(value)) for name, value in run.shipped.items()}
         each = torch.stack([told(shipped, member, data, unknown) for member in range(MEMBERS)])
     error = (each.mean(dim=0) - data.left[unknown]).double().numpy()
-    trust, _ = parts_of_error(error, each.std(dim=0).double().numpy(), data.size[unknown].double().numpy())
+    trust, _ = parts_of_error(
+        error, each.std(dim=0).double().numpy(), data.size[unknown].double().numpy()
+    )
     write_network(folder / WEIGHTS_FILE, run.shipped, trust)
     return float(np.sqrt((error**2).sum(axis=1).mean()))
 
@@ -169,7 +179,8 @@ def told(weights: dict[str, Any], member: int, data: DataSet, samples: Tensor) -
         features, vectors, owner = data.rows[name].of(samples)
         for layer in range(LAYERS):
             features = (
-                features @ weights[f"{name}.{layer}.weight"][member] + weights[f"{name}.{layer}.bias"][member]
+                features @ weights[f"{name}.{layer}.weight"][member]
+                + weights[f"{name}.{layer}.bias"][member]
             )
             features = torch.tanh(features) if layer + 1 < LAYERS else features
         result = result.index_add(0, owner, (features[..., None] * vectors).sum(dim=1))
@@ -184,7 +195,9 @@ def first_weights(seed: int) -> dict[str, Tensor]:
         sizes = (form.features, *(WIDTH,) * (LAYERS - 1), form.vectors)
         for layer, (into, out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
             scale = (0.1 if layer + 1 == LAYERS else 1.0) / into**0.5
-            weights[f"{name}.{layer}.weight"] = scale * torch.randn((MEMBERS, into, out), generator=draw)
+            weights[f"{name}.{layer}.weight"] = scale * torch.randn(
+                (MEMBERS, into, out), generator=draw
+            )
             weights[f"{name}.{layer}.bias"] = torch.zeros((MEMBERS, 1, out))
     return weights
 

@@ -1,1 +1,2 @@
-"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, refinement makes them exact."""
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, refinement makes them
+exact."""

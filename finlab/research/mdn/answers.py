@@ -16,21 +16,23 @@ from finlab.research.mdn.effort_fins import EffortFins, Projected
 from finlab.research.mdn.features import RobotView, robot_view
 
 EXACT = 1e-5
-"""Normalized error up to which an answer is exact and effort decides: a thousandth of what counts as
-delivered."""
+"""Normalized error up to which an answer is exact and effort decides: a thousandth of what counts
+as delivered."""
 
 
 PROMISING = 0.02
-"""Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
+"""Normalized error in force space below which a descent has succeeded: refinement removes the
+rest."""
 SAME = 0.03
-"""Mean difference over the fins, in roots of shares of the largest force, from which ways are two."""
+"""Mean difference over the fins, in roots of shares of the largest force, from which ways are
+two."""
 LAST = 1e12
 """Added to the rank of a way that is chosen already."""
 NEARLY = 5e-5
 """Normalized error by which inexact answers may differ and count as equally near."""
 INEXACT = 1e9
-"""Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
-ends near zero, since the effort divides by that end."""
+"""Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero
+directions ends near zero, since the effort divides by that end."""
 
 OTHER, NOW = -1, -2
 """Origins of answers that no network has proposed: other starts, and how the robot moves now."""
@@ -61,8 +63,8 @@ class EffortRobot(NamedTuple):
 
 
 def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
-    """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by. Raises DataError: a fin's force
-    table cannot be read."""
+    """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by. Raises DataError: a
+    fin's force table cannot be read."""
     layout = plant.layout
     turning = ZERO_DIRECTION / effort_scale(layout.upper)[:, 2] ** 2
     idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])
@@ -88,7 +90,8 @@ class Steps(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """P refined answers to each of N targets, best first: the exact ones by effort, then the others."""
+    """P refined answers to each of N targets, best first: the exact ones by effort, then the
+    others."""
 
     command: Array
     """(N, P, n, 3)."""
@@ -109,8 +112,8 @@ class Answers(NamedTuple):
 def follow(
     robot: EffortRobot, target: Array, force: AnyArray, keep: int, steps: Steps, kept: int = 0
 ) -> Answers:
-    """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex: the `keep` most promising
-    descents are refined, the first `kept` proposals among these whatever they promise."""
+    """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex: the `keep` most
+    promising descents are refined, the first `kept` proposals among these whatever they promise."""
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
     *_, reached = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
@@ -126,12 +129,17 @@ def follow(
 
 
 def traced(robot: EffortRobot, target: Array, force: AnyArray, steps: Steps) -> list[Array]:
-    """Commands (K, n, 3) for one normalized target (6,): first of forces (K, n), complex, as proposed, then
-    after each step of their refinement."""
+    """Commands (K, n, 3) for one normalized target (6,): first of forces (K, n), complex, as
+    proposed, then after each step of their refinement."""
     each = np.repeat(target[None], len(force), axis=0)
     reached = list(descend(robot.forces, each, force, steps.descent))
     gauges = [np.broadcast_to(at.gauge, force.shape) for at in reached]
-    parts = [at.unit for at in reached], [at.size for at in reached], [at.wanted for at in reached], gauges
+    parts = (
+        [at.unit for at in reached],
+        [at.size for at in reached],
+        [at.wanted for at in reached],
+        gauges,
+    )
     command, _ = realize(robot.forces, Projected._make(map(np.concatenate, parts)))
     ways = list(command.reshape(len(reached), *force.shape, 3))
     for _ in range(steps.commands):
@@ -166,10 +174,12 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     return Answers._make(values[place, order] for values in answers)
 
 
-def distinct(score: Array, root: AnyArray, keep: int, apart: float) -> tuple[NDArray[np.intp], Array]:
-    """Places (N, P) of scores (N, K), `keep` at most, the least first, and their ranks; those last, ranked
-    behind `LAST`, whose forces (N, K, n), as roots of shares, differ by less than `apart` from ones before
-    them: several proposals mostly lead to the same forces."""
+def distinct(
+    score: Array, root: AnyArray, keep: int, apart: float
+) -> tuple[NDArray[np.intp], Array]:
+    """Places (N, P) of scores (N, K), `keep` at most, the least first, and their ranks; those last,
+    ranked behind `LAST`, whose forces (N, K, n), as roots of shares, differ by less than `apart`
+    from ones before them: several proposals mostly lead to the same forces."""
     left = score.copy()
     row = np.arange(len(score))
     chosen = np.empty((len(score), min(keep, score.shape[1])), np.intp)

@@ -1,19 +1,20 @@
-"""From rough forces to the least effort near them that delivers a wrench, in the space of planar forces.
+"""From rough forces to the least effort near them that delivers a wrench, in the space of planar
+forces.
 
-Each fin gives a planar force y_i, so the wrench is linear: w = sum_i B_i y_i. The effort of a force grows
-more slowly than the force, so the cheapest allocation rests some fins, and there are many local minima. Each
-proposal is driven downhill by solving, again and again, the quadratic problem that touches the efforts at
-the present forces from above,
+Each fin gives a planar force y_i, so the wrench is linear: w = sum_i B_i y_i. The effort of a force
+grows more slowly than the force, so the cheapest allocation rests some fins, and there are many
+local minima. Each proposal is driven downhill by solving, again and again, the quadratic problem
+that touches the efforts at the present forces from above,
 
     min sum_i g_i (y - y_i) + 1/2 (y - y_i) H_i (y - y_i)   s.t.   sum_i B_i y_i = w,
 
-through its six multipliers l: y = shift + M B_i^T l with M = H^-1. Along a force, H is the curvature of the
-quadratic about the origin that touches the effort, or the effort's own where it is convex; across the force
-it is (dc/dT) / T. A fin that is asked for more than it can has all its mobility cut in proportion, again and
-again until it holds.
+through its six multipliers l: y = shift + M B_i^T l with M = H^-1. Along a force, H is the
+curvature of the quadratic about the origin that touches the effort, or the effort's own where it is
+convex; across the force it is (dc/dT) / T. A fin that is asked for more than it can has all its
+mobility cut in proportion, again and again until it holds.
 
-Planar forces are complex numbers (see `effort_fins`). A symmetric 2 x 2 matrix M maps p to a p + b conj(p),
-with a real.
+Planar forces are complex numbers (see `effort_fins`). A symmetric 2 x 2 matrix M maps p to a p + b
+conj(p), with a real.
 """
 
 from collections.abc import Iterator
@@ -28,7 +29,8 @@ from finlab.research.mdn import effort_fins
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
 HALF_STEPS = 5
-"""Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
+"""Steps after which forces go only half the way: those that are not settled by then jump to and
+fro."""
 
 
 class EffortProblem(NamedTuple):
@@ -37,7 +39,8 @@ class EffortProblem(NamedTuple):
     effectiveness: Array
     """Normalized wrench per newton (2n, 6), of each fin's horizontal and vertical force in turn."""
     products: Array
-    """What a, real b and imaginary b of each fin's M add to B M B^T (3n, 36), slightly regularized."""
+    """What a, real b and imaginary b of each fin's M add to B M B^T (3n, 36), slightly
+    regularized."""
     fins: effort_fins.EffortFins
     """What the fins can do, and with what effort."""
     direction_cost: Array
@@ -65,8 +68,8 @@ def effort_problem(
 def descend(
     problem: EffortProblem, target: Array, force: AnyArray, steps: int
 ) -> Iterator[effort_fins.Projected]:
-    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give of them,
-    then what each of `steps` problems makes of it."""
+    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give
+    of them, then what each of `steps` problems makes of it."""
     fins = problem.fins
     reached = fins.project(force)
     yield reached
@@ -100,7 +103,9 @@ def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Arr
     row = problem.fins.lookup(reached.size / reached.gauge)
     direction = reached.direction
     turn = wrapped(direction - problem.fins.deflection(direction))
-    command = np.stack([row[..., effort_fins.AMPLITUDE], row[..., effort_fins.FREQUENCY], turn], axis=-1)
+    command = np.stack(
+        [row[..., effort_fins.AMPLITUDE], row[..., effort_fins.FREQUENCY], turn], axis=-1
+    )
     effort = row[..., effort_fins.EFFORT] + problem.direction_cost * turn * turn
     return command, effort.sum(-1)
 
@@ -108,8 +113,8 @@ def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Arr
 def _respond(
     problem: EffortProblem, reached: effort_fins.Projected, cut: Array
 ) -> tuple[AnyArray, Array, AnyArray]:
-    """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by the
-    quadratics that touch the efforts at the present forces."""
+    """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by
+    the quadratics that touch the efforts at the present forces."""
     row = problem.fins.lookup(reached.size / reached.gauge)
     direction = reached.direction
     # The same command gives less in weaker directions, so a newton more costs more there.

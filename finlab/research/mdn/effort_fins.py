@@ -1,9 +1,10 @@
 """The fins of one robot, side by side: the forces that they can give, and the least effort of each.
 
-For sizes of force between the smallest and the largest one, the pair of amplitude and frequency with the
-least effort is found on a grid of commands, in the fin's strongest direction. The arc of directions, and by
-how much a fin is weaker in the others, are those of the compiled fins of the default method. What the zero
-direction adds to the effort is left out here: it does not depend on the size.
+For sizes of force between the smallest and the largest one, the pair of amplitude and frequency
+with the least effort is found on a grid of commands, in the fin's strongest direction. The arc of
+directions, and by how much a fin is weaker in the others, are those of the compiled fins of the
+default method. What the zero direction adds to the effort is left out here: it does not depend on
+the size.
 
 A planar force is a complex number: its horizontal part, and 1j times its vertical part, in newton.
 """
@@ -29,8 +30,8 @@ AMPLITUDES, FREQUENCIES = 193, 49
 FLAT = 1e-5
 """By how much, as a share, a force may fall short of a size and still count as giving it."""
 CONVEX = 0.3
-"""Least elasticity of the marginal effort that is followed; below it, and where effort is concave, a steeper
-quadratic is touched, which never overshoots."""
+"""Least elasticity of the marginal effort that is followed; below it, and where effort is concave,
+a steeper quadratic is touched, which never overshoots."""
 STIFFEST = 10.0
 """Elasticities above this one count as this one."""
 MARGINAL = 1e-3
@@ -38,11 +39,12 @@ MARGINAL = 1e-3
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
 PLACES = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
-"""From the angle of a force in the table to its place among the levels, of which none is past the last."""
+"""From the angle of a force in the table to its place among the levels, of which none is past the
+last."""
 
 AMPLITUDE, FREQUENCY, EFFORT, MOBILITY, STIFFNESS = range(5)
-"""Columns of a table: amplitude [rad], frequency [Hz], effort, logarithm of the mobility T / (dc/dT),
-elasticity of dc/dT."""
+"""Columns of a table: amplitude [rad], frequency [Hz], effort, logarithm of the mobility T /
+(dc/dT), elasticity of dc/dT."""
 
 
 class Projected(NamedTuple):
@@ -79,7 +81,8 @@ class EffortFins:
     table: Array
     """What sizes between them cost (n, LEVELS, 5), see the columns above."""
     gauge: Array | None
-    """Share (n, POINTS) of the same command's force in each direction; None where all fins are even."""
+    """Share (n, POINTS) of the same command's force in each direction; None where all fins are
+    even."""
     lean: Array
     """Direction of the force minus zero direction (n, POINTS) [rad], by the first."""
     middle: Array
@@ -89,8 +92,8 @@ class EffortFins:
 
     @classmethod
     def of(cls, layout: Layout) -> Self:
-        """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no thrust
-        within the limits."""
+        """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no
+        thrust within the limits."""
         compiled = [fin_table(fin) for fin in layout.fins]
         costs = [_costs(fin, fin.stamp) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)
@@ -117,7 +120,8 @@ class EffortFins:
 
     @cached_property
     def _steps(self) -> Array:
-        """Rows of all tables, and how much is added to them up to the next ones (n * LEVELS, 2, 5)."""
+        """Rows of all tables, and how much is added to them up to the next ones (n * LEVELS, 2,
+        5)."""
         rows = self.table.reshape(-1, self.table.shape[-1])
         return np.stack([rows, np.diff(rows, axis=0, append=rows[-1:])], axis=1)
 
@@ -127,12 +131,15 @@ class EffortFins:
         return np.arange(len(self.largest)) * LEVELS
 
     def deflection(self, direction: Array) -> Array:
-        """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero directions."""
+        """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero
+        directions."""
         return self._around(self.lean, direction)
 
     def gauges(self, direction: Array) -> Array:
         """Shares (..., n) of the table's force in directions (..., n) [rad]."""
-        return np.ones(len(self.half)) if self.gauge is None else self._around(self.gauge, direction)
+        return (
+            np.ones(len(self.half)) if self.gauge is None else self._around(self.gauge, direction)
+        )
 
     def _around(self, values: Array, direction: Array) -> Array:
         """Of values (n, POINTS), those nearest to directions (..., n)."""
@@ -140,7 +147,8 @@ class EffortFins:
         return np.asarray(values.ravel().take(cell + np.arange(len(values)) * POINTS))
 
     def lookup(self, size: Array) -> Array:
-        """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest directions."""
+        """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest
+        directions."""
         place = size - self.smallest
         place /= self.largest - self.smallest + LEAST
         np.minimum(np.maximum(place, 0.0, out=place), 1.0, out=place)
@@ -172,27 +180,32 @@ class EffortFins:
 
 @lru_cache(maxsize=512)
 def _costs(fin: Fin, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
-    """Sizes of force (LEVELS,) [N] and their table (LEVELS, 5); a force table whose file has changed is read
-    again."""
+    """Sizes of force (LEVELS,) [N] and their table (LEVELS, 5); a force table whose file has
+    changed is read again."""
     box = fin_table(fin).box
     scale = effort_scale(box.upper)
     ends = zip(box.lower, box.upper, (AMPLITUDES, FREQUENCIES), strict=False)
     amplitude, frequency = (np.linspace(low, high, count) for low, high, count in ends)
     grid = np.stack(np.meshgrid(amplitude, frequency, indexing="ij"), axis=-1)
     force = box.force(box.command(grid))
-    # Dense near zero, where both commands grow like fourth roots, and near the top, which may be flat.
+    # Dense near zero, where both commands grow like fourth roots, and near the top, which may be
+    # flat.
     share = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, LEVELS)) ** 4
     size = force[0, 0] + (force.max() - force[0, 0]) * share
     # Between grid points the square root of the force is nearly a straight line.
     rising = np.sqrt(np.maximum.accumulate(force, axis=1))
-    rising += np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)  # where it stays, the first
+    rising += (
+        np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)
+    )  # where it stays, the first
     taken = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
     effort = effort_of_shares(amplitude[:, None] / scale[0], taken / scale[1], 0.0)
     effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FLAT) + 1e-15] = np.inf
     best = effort.argmin(axis=0)
     level = np.arange(LEVELS)
     slopes = _slopes(effort[best, level], size)
-    return size, np.stack([amplitude[best], taken[best, level], effort[best, level], *slopes], axis=-1)
+    return size, np.stack(
+        [amplitude[best], taken[best, level], effort[best, level], *slopes], axis=-1
+    )
 
 
 def _slopes(effort: Array, size: Array) -> tuple[Array, Array]:

@@ -1,13 +1,15 @@
-"""Features of a robot and its targets for the network of method `mdn`, and the proposals that follow from it.
+"""Features of a robot and its targets for the network of method `mdn`, and the proposals that
+follow from it.
 
-The cheapest forces y_i = F_i x_i, F_i the largest force of fin i, solve min sum c_i(x_i) s.t. C x = w, where
-C holds the normalized wrenches of full forces. The same forces solve it when P x = p is asked for instead,
-with P = C^T (C C^T)^-1 C, which says how fins can stand in for each other, and p = C^T (C C^T)^-1 w, the
-least shares that give w. Neither knows of sizes, levers or axes any more, so one network serves robots of any
-size.
+The cheapest forces y_i = F_i x_i, F_i the largest force of fin i, solve min sum c_i(x_i) s.t. C x =
+w, where C holds the normalized wrenches of full forces. The same forces solve it when P x = p is
+asked for instead, with P = C^T (C C^T)^-1 C, which says how fins can stand in for each other, and p
+= C^T (C C^T)^-1 w, the least shares that give w. Neither knows of sizes, levers or axes any more,
+so one network serves robots of any size.
 
-Each fin is described in a frame of its own that turns with the direction of its p_i; planar vectors are
-complex numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
+Each fin is described in a frame of its own that turns with the direction of its p_i; planar vectors
+are complex numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node
+features:
 
 =====  ============================================================================================
 index  meaning
@@ -82,8 +84,12 @@ def robot_view(problem: EffortProblem) -> RobotView:
     fins = problem.fins
     n = len(problem.fins.maximum)
     full = fins.half >= np.pi
-    evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
-    direction = fins.middle + fins.half * np.where(full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None])
+    evenly = np.linspace(-1.0, 1.0, AROUND + 1)[
+        :-1, None
+    ]  # around a circle, no direction counts twice
+    direction = fins.middle + fins.half * np.where(
+        full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None]
+    )
     gauge = np.broadcast_to(fins.gauges(direction), direction.shape)
     unit = np.exp(1j * direction)
     top = np.maximum(fins.table[:, -1, EFFORT], 1e-12)
@@ -118,20 +124,25 @@ def robot_view(problem: EffortProblem) -> RobotView:
     a = 0.5 * ((xx + zz) + 1j * (zx - xz))
     b = 0.5 * ((xx - zz) + 1j * (zx + xz))
     return RobotView(
-        np.stack(static, axis=-1), np.stack([a, b]), solver[:, 0::2] + 1j * solver[:, 1::2], fins.maximum
+        np.stack(static, axis=-1),
+        np.stack([a, b]),
+        solver[:, 0::2] + 1j * solver[:, 1::2],
+        fins.maximum,
     )
 
 
 def see(view: RobotView, target: AnyArray) -> Seen:
     """What the network sees of normalized targets (N, 6) on one robot."""
     wanted = target @ view.solver
-    many = (np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks))
+    many = (
+        np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks)
+    )
     return features(wanted, *many)
 
 
 def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
-    """The features of N targets p (N, n), complex, each on a robot of its own: `static` (N, n, 20) as in
-    `RobotView`, and both parts of the blocks of P (N, n, n), complex."""
+    """The features of N targets p (N, n), complex, each on a robot of its own: `static` (N, n, 20)
+    as in `RobotView`, and both parts of the blocks of P (N, n, n), complex."""
     rows, n = wanted.shape
     size = np.abs(wanted)
     frame = np.where(size > 1e-9, wanted, 1.0)
@@ -169,12 +180,17 @@ class Proposal(NamedTuple):
 
 
 def propose(
-    mixture: ForceMixture, view: RobotView, seen: Seen, n_candidates: int, temperature: float, seed: int
+    mixture: ForceMixture,
+    view: RobotView,
+    seen: Seen,
+    n_candidates: int,
+    temperature: float,
+    seed: int,
 ) -> Proposal:
     """K proposals for N targets on one robot, from the network's mixture for what it sees of them.
 
-    The components' means come first, by falling weight. Where K exceeds their number M, the rest are drawn by
-    the components' weights, with variances times the temperature.
+    The components' means come first, by falling weight. Where K exceeds their number M, the rest
+    are drawn by the components' weights, with variances times the temperature.
     """
     weight, mean, std = mixture.complex_parts()
     rows, m, n = mean.shape

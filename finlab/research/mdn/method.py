@@ -1,9 +1,11 @@
-"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is made exact.
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is made
+exact.
 
-The paper's idea with exact physics behind it. The network gives a joint mixture over the planar forces of all
-fins; its components stand for different ways. Each proposal is followed downhill to the least effort near it
-and made exact by the fins' own laws. What no component stands for is not found: nothing else is tried. The
-answers are exact because of the refinement, and cheap because of the network.
+The paper's idea with exact physics behind it. The network gives a joint mixture over the planar
+forces of all fins; its components stand for different ways. Each proposal is followed downhill to
+the least effort near it and made exact by the fins' own laws. What no component stands for is not
+found: nothing else is tried. The answers are exact because of the refinement, and cheap because of
+the network.
 
 Where a target is out of reach the default method says which wrench is to be delivered in its place.
 """
@@ -71,7 +73,8 @@ def names_of(proposal: Proposal) -> tuple[str, ...]:
 
 
 class Mdn(LearnedMethod):
-    """Exact answers of little effort, refined from what a network proposes and from nothing else."""
+    """Exact answers of little effort, refined from what a network proposes and from nothing
+    else."""
 
     name = "mdn"
     takes: ClassVar[Takes] = "fins"
@@ -79,7 +82,9 @@ class Mdn(LearnedMethod):
     settings_class = MdnSettings
     settings: MdnSettings
 
-    def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights
+    ) -> None:
         self.config = weights.network_of(ForceNetworkConfig)
         super().__init__(layout, settings, scale, weights)
         self.sigma = USUAL_SHARE * scale
@@ -119,10 +124,13 @@ class Mdn(LearnedMethod):
         return tuple([every.rows(slice(k, k + count)) for k in range(0, len(every.command), count)])
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
-        """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""
+        """The network's proposals for normalized targets (N, 6); by default as many as the settings
+        say."""
         count = count or self.settings.n_candidates
         seen = see(self.robot.view, target)
-        return propose(self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed)
+        return propose(
+            self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed
+        )
 
     def mixture(self, seen: Seen) -> ForceMixture:
         """What the network gives for what it sees of some targets."""
@@ -135,13 +143,15 @@ class Mdn(LearnedMethod):
         missed = answers.error[:, 0] > self.robot.exact
         if missed.any():
             first = Answers._make(values[missed] for values in answers)
-            for kept, new in zip(answers, self._at_last(policy, target[missed], first), strict=True):
+            for kept, new in zip(
+                answers, self._at_last(policy, target[missed], first), strict=True
+            ):
                 kept[missed] = new
         return Found(proposal, answers)
 
     def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
-        """Answers to normalized targets (M, 6) that were missed at first: after more steps, or that of the
-        default method, which tells what is to be delivered out of reach."""
+        """Answers to normalized targets (M, 6) that were missed at first: after more steps, or that
+        of the default method, which tells what is to be delivered out of reach."""
         robot = self.robot
         answers = refined(robot, target, answers.command, answers.origin, MORE)
         missed = answers.error[:, 0] > robot.exact
@@ -160,8 +170,9 @@ class Mdn(LearnedMethod):
         return Dual(self.layout, Dual.settings_class(), self.scale)
 
     def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
-        """What is found for one target within what the servos allow after a previous command (n, 3): the way
-        that the robot moves now is kept, and where another is worth it, all fins go towards that."""
+        """What is found for one target within what the servos allow after a previous command (n,
+        3): the way that the robot moves now is kept, and where another is worth it, all fins go
+        towards that."""
         first = free.answers
         plant = self.plant
         rates = Rates(plant, self.layout.rates * self.settings.period_s)
@@ -173,7 +184,9 @@ class Mdn(LearnedMethod):
         reached = follow(near, target, force, self.settings.n_refined, STEPS, kept=1)
         reached = reached._replace(origin=np.where(reached.origin == 0, NOW, reached.origin - 1))
         now_first = np.argsort(reached.origin[0] != NOW, kind="stable")
-        reached = ranked(near, Answers._make(values[:, now_first] for values in reached), SWITCH_GAIN)
+        reached = ranked(
+            near, Answers._make(values[:, now_first] for values in reached), SWITCH_GAIN
+        )
         if reached.error[0, 0] > near.exact:
             reached = refined(near, target, reached.command, reached.origin, MORE)
         if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * reached.effort[0, 0]:
@@ -190,7 +203,8 @@ class Mdn(LearnedMethod):
         return reached.answers.command[0], tuple(names[k] if k >= 0 else STARTS[k] for k in origin)
 
     def _cheapest(self, proposal: Proposal) -> tuple[Array, tuple[str, ...]]:
-        """The cheapest commands (K, n, 3) with the forces proposed for a single target, and their names."""
+        """The cheapest commands (K, n, 3) with the forces proposed for a single target, and their
+        names."""
         forces = self.robot.forces
         command, _ = realize(forces, forces.fins.project(proposal.force[0].astype(complex)))
         return command, names_of(proposal)

@@ -1,7 +1,9 @@
-"""The network of method `mdn`: fins and pairs of fins in, a joint mixture over the forces of all fins out.
+"""The network of method `mdn`: fins and pairs of fins in, a joint mixture over the forces of all
+fins out.
 
-Transformer layers over the fins whose attention is GATv2's (Brody, Alon, Yahav, ICLR 2022) with features of
-pairs: fin i scores leaky(source_j + target_i + pair_ij), and what it scores is also the message.
+Transformer layers over the fins whose attention is GATv2's (Brody, Alon, Yahav, ICLR 2022) with
+features of pairs: fin i scores leaky(source_j + target_i + pair_ij), and what it scores is also the
+message.
 """
 
 import math
@@ -23,7 +25,8 @@ LOG_STD = (-2.0, 2.0)
 
 @dataclass(frozen=True)
 class ForceNetworkConfig:
-    """The network of method `mdn`: its sizes, the arrays that follow from them, and what it gives."""
+    """The network of method `mdn`: its sizes, the arrays that follow from them, and what it
+    gives."""
 
     features: ClassVar[str] = "forces"
     """What it is fed, by its name in files."""
@@ -53,7 +56,10 @@ class ForceNetworkConfig:
             name = f"layers.{i}"
             look = f"layers.{i}.look"
             shapes |= {f"{look}.attention": (self.heads, width // self.heads)}
-            shapes |= {f"{look}.target.weight": (width, width), f"{look}.pair.weight": (width, PAIR_SIZE)}
+            shapes |= {
+                f"{look}.target.weight": (width, width),
+                f"{look}.pair.weight": (width, PAIR_SIZE),
+            }
             shapes |= linear_shapes(f"{look}.source", width, width)
             shapes |= linear_shapes(f"{look}.out", width, width)
             shapes |= linear_shapes(f"{name}.up", width, self.feedforward)
@@ -102,7 +108,7 @@ class ForceMixture(NamedTuple):
         return temper * layers.log_sum_exp(each / temper)
 
     def complex_parts(self) -> tuple[AnyArray, AnyArray, AnyArray]:
-        """Weights (B, M), means (B, M, n) as complex numbers, and standard deviations (B, M, n); of numpy
-        arrays."""
+        """Weights (B, M), means (B, M, n) as complex numbers, and standard deviations (B, M, n); of
+        numpy arrays."""
         mean = (self.mean[..., 0] + 1j * self.mean[..., 1]).swapaxes(1, 2)
         return layers.softmax(self.logits), mean, np.exp(self.log_std).swapaxes(1, 2)

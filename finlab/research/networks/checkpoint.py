@@ -1,4 +1,5 @@
-"""Reads checkpoints: a folder with `model.safetensors` and `config.json`. No torch, no pickle; strict.
+"""Reads checkpoints: a folder with `model.safetensors` and `config.json`. No torch, no pickle;
+strict.
 
 `config.json` holds everything needed to rebuild the networks and to trust them: format and version,
 sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights.
@@ -40,8 +41,8 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
 
 
 def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
-    """The contents of a checkpoint by those of its files; errors call it `source`. Raises CheckpointError:
-    missing, corrupt, of an unknown version, or made by something else."""
+    """The contents of a checkpoint by those of its files; errors call it `source`. Raises
+    CheckpointError: missing, corrupt, of an unknown version, or made by something else."""
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
@@ -49,7 +50,8 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
     sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
     if sha256 != config.get("sha256"):
         raise CheckpointError(
-            f"{source}/{WEIGHTS_FILE}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or "
+            f"{source}/{WEIGHTS_FILE}: its SHA-256 is not the one in {CONFIG_FILE}; the file was "
+            "changed or "
             "cut off"
         )
     try:
@@ -102,7 +104,8 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
 
 
 def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
-    """Write a checkpoint folder, and return what is in it. Raises DataError: it cannot be written."""
+    """Write a checkpoint folder, and return what is in it. Raises DataError: it cannot be
+    written."""
     make_folder(folder)
     for name, content in checkpoint_files(weights).items():
         write_whole(folder / name, content, DataError)
@@ -110,18 +113,20 @@ def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
 
 
 def read_normalization(folder: Path) -> Normalization:
-    """Only the wrench statistics of a checkpoint, for methods that need no network. Raises CheckpointError:
-    as `parse_checkpoint`."""
+    """Only the wrench statistics of a checkpoint, for methods that need no network. Raises
+    CheckpointError: as `parse_checkpoint`."""
     config = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,))
     try:
         return Normalization.parse(config.get("normalization"))
     except ValueError as error:
-        raise CheckpointError(f"{folder}/{CONFIG_FILE}: normalization is missing or malformed") from error
+        raise CheckpointError(
+            f"{folder}/{CONFIG_FILE}: normalization is missing or malformed"
+        ) from error
 
 
 def network_features(folder: Path) -> str | None:
-    """What the network of a checkpoint is fed, such as "raw" of the paper's; None where it holds none. Raises
-    CheckpointError: as `parse_checkpoint`."""
+    """What the network of a checkpoint is fed, such as "raw" of the paper's; None where it holds
+    none. Raises CheckpointError: as `parse_checkpoint`."""
     network = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,)).get("network")
     return str(network.get("features")) if isinstance(network, dict) else None
 
@@ -129,11 +134,14 @@ def network_features(folder: Path) -> str | None:
 def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
     """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
 
-    A bare name is never looked up in the current folder, so that a folder called `default` there does
-    not take the shipped one's place; write `./default` for it. Raises CheckpointError: there is neither.
+    A bare name is never looked up in the current folder, so that a folder called `default` there
+    does not take the shipped one's place; write `./default` for it. Raises CheckpointError: there
+    is neither.
     """
     path = Path(checkpoint)
-    if path.name == str(checkpoint) and (str(checkpoint) in shipped_checkpoints() or not path.is_dir()):
+    if path.name == str(checkpoint) and (
+        str(checkpoint) in shipped_checkpoints() or not path.is_dir()
+    ):
         return checkpoint_path(str(checkpoint))
     if not path.is_dir():
         raise CheckpointError(f"{path}: no such checkpoint folder")
@@ -143,7 +151,9 @@ def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
 def _files(folder: Path, names: tuple[str, ...] = tuple(LARGEST)) -> dict[str, bytes]:
     """Those of a checkpoint's files that are there."""
     there = [name for name in names if os.path.lexists(folder / name)]
-    return {n: read_file(folder / n, LARGEST[n], "a checkpoint's file", CheckpointError) for n in there}
+    return {
+        n: read_file(folder / n, LARGEST[n], "a checkpoint's file", CheckpointError) for n in there
+    }
 
 
 def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) -> dict[str, Any]:
@@ -157,7 +167,8 @@ def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) ->
         raise CheckpointError(f"{place}: not a finlab checkpoint (expected format {FORMAT!r})")
     if type(config.get("version")) is not int or config["version"] != VERSION:
         raise CheckpointError(
-            f"{place}: checkpoint version {config.get('version')!r}, this finlab reads version {VERSION}; "
+            f"{place}: checkpoint version {config.get('version')!r}, this finlab reads version "
+            f"{VERSION}; "
             "use the finlab that made it, or train again"
         )
     return config
@@ -165,4 +176,6 @@ def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) ->
 
 def _part(prefix: str, tensors: State) -> dict[str, Any]:
     """The arrays of one network, by their names inside it."""
-    return {k.removeprefix(prefix + "."): v for k, v in tensors.items() if k.startswith(prefix + ".")}
+    return {
+        k.removeprefix(prefix + "."): v for k, v in tensors.items() if k.startswith(prefix + ".")
+    }

@@ -1,7 +1,9 @@
-"""The layers of the networks, each written once: numpy answers with them, PyTorch trains through them.
+"""The layers of the networks, each written once: numpy answers with them, PyTorch trains through
+them.
 
-A network is a function of its weights, a mapping from PyTorch's names to arrays or tensors, and of its
-inputs. On a robot the weights are numpy arrays in single precision and no tensor library is needed.
+A network is a function of its weights, a mapping from PyTorch's names to arrays or tensors, and of
+its inputs. On a robot the weights are numpy arrays in single precision and no tensor library is
+needed.
 """
 
 import math
@@ -60,9 +62,9 @@ def graph_attention(
     w: Weights, name: str, x: Values, pairs: Values | None = None, mask: Values | None = None
 ) -> Values:
     """A GATv2 layer (Brody, Alon, Yahav, ICLR 2022) on complete graphs with self loops: features
-    (B, n, width) of the same; heads are concatenated. Features of pairs (B, n, n, F), where there are any,
-    count in what is scored, and what is scored is then the message, too. No node listens to one where `mask`
-    (B, n) is False."""
+    (B, n, width) of the same; heads are concatenated. Features of pairs (B, n, n, F), where there
+    are any, count in what is scored, and what is scored is then the message, too. No node listens
+    to one where `mask` (B, n) is False."""
     xp = library_of(x)
     vectors = w[f"{name}.attention"]
     source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
@@ -70,16 +72,20 @@ def graph_attention(
     hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)
     hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
     score = xp.einsum("...hc,hc->...h", hidden, vectors)
-    weight = softmax(score if mask is None else xp.where(mask[:, None, :, None], score, -math.inf), 2)
+    weight = softmax(
+        score if mask is None else xp.where(mask[:, None, :, None], score, -math.inf), 2
+    )
     if pairs is not None:
         return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
     message = source.reshape(*source.shape[:2], *vectors.shape)
     return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
 
 
-def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
-    """Scaled dot-product attention of a Transformer (Vaswani et al., 2017): features (B, n, width) of the
-    same; `mask` as in `graph_attention`."""
+def self_attention(
+    w: Weights, name: str, heads: int, x: Values, mask: Values | None = None
+) -> Values:
+    """Scaled dot-product attention of a Transformer (Vaswani et al., 2017): features (B, n, width)
+    of the same; `mask` as in `graph_attention`."""
     width = x.shape[-1]
     packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
     qkv = linear(packed, "in", x)
@@ -136,8 +142,8 @@ def single_precision(weights: Mapping[str, Any]) -> dict[str, Any]:
 def single_threaded_products() -> Callable[[], AbstractContextManager[object]]:
     """A context in which numpy's products run on one thread.
 
-    Where threadpoolctl is missing, as on a robot that carries only the runtime, the context does nothing;
-    there OPENBLAS_NUM_THREADS=1 in the environment has the same effect.
+    Where threadpoolctl is missing, as on a robot that carries only the runtime, the context does
+    nothing; there OPENBLAS_NUM_THREADS=1 in the environment has the same effect.
     """
     try:
         from threadpoolctl import ThreadpoolController

@@ -1,4 +1,5 @@
-"""Base of the allocation methods that ask trained networks: where these are read, and what they know."""
+"""Base of the allocation methods that ask trained networks: where these are read, and what they
+know."""
 
 import hashlib
 import os
@@ -33,8 +34,8 @@ class LearnedMethod(Method):
         """Returns the networks of a checkpoint.
 
         Args:
-            checkpoint: a checkpoint folder, the name of a shipped checkpoint, or its contents; None for the
-                one that is shipped for the method.
+            checkpoint: a checkpoint folder, the name of a shipped checkpoint, or its contents; None
+                for the one that is shipped for the method.
 
         Raises:
             CheckpointError: it is missing, corrupt or foreign.
@@ -43,10 +44,14 @@ class LearnedMethod(Method):
             return checkpoint
         if checkpoint is None or isinstance(checkpoint, str | os.PathLike):
             return read_checkpoint(resolve_checkpoint(checkpoint or cls.shipped_checkpoint))
-        raise CheckpointError(f"checkpoint: expected its folder, name or contents, got {checkpoint!r:.60}")
+        raise CheckpointError(
+            f"checkpoint: expected its folder, name or contents, got {checkpoint!r:.60}"
+        )
 
     @classmethod
-    def networks_in(cls, files: Mapping[str, bytes], source: str, name: str | None) -> TrainedWeights:
+    def networks_in(
+        cls, files: Mapping[str, bytes], source: str, name: str | None
+    ) -> TrainedWeights:
         """Returns the networks of a robot's bundle.
 
         Args:
@@ -55,7 +60,8 @@ class LearnedMethod(Method):
             name: of the checkpoint; None for the one that is shipped for the method.
 
         Raises:
-            CheckpointError: they are damaged, or there are none and this finlab has not those of that name.
+            CheckpointError: they are damaged, or there are none and this finlab has not those of
+            that name.
         """
         known = name or cls.shipped_checkpoint
         if files:
@@ -64,8 +70,8 @@ class LearnedMethod(Method):
 
     @classmethod
     def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
-        """Returns the SHA-256 of the networks' weights, and by name the files of those that do not come with
-        finlab."""
+        """Returns the SHA-256 of the networks' weights, and by name the files of those that do not
+        come with finlab."""
         if networks is None:  # a method that was made without its own
             return None, {}
         assert isinstance(networks, TrainedWeights)
@@ -77,7 +83,8 @@ class LearnedMethod(Method):
 
     @property
     def unknown_fins(self) -> tuple[str, ...]:
-        """Names of the fins whose model the networks have not learned; answers for them are wrong."""
+        """Names of the fins whose model the networks have not learned; answers for them are
+        wrong."""
         if self.fin_model is None:
             return ()
         known = self.fin_model.type, self.fin_model.values()
@@ -90,9 +97,12 @@ class LearnedMethod(Method):
         model = self.fin_model
         if model is None or not self.unknown_fins:
             return ()
-        values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
+        values = [
+            f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()
+        ]
         return (
             f"the method does not know these fins: {', '.join(self.unknown_fins)}; checkpoint "
-            f"{self.weights.name!r} takes them for fins of model {model.type!r} ({', '.join(values)}): trust "
+            f"{self.weights.name!r} takes them for fins of model {model.type!r} "
+            f"({', '.join(values)}): trust "
             "the plant's error or train a surrogate for them",
         )

@@ -1,4 +1,5 @@
-"""The contents of a checkpoint: weights, sizes and history of networks, and what normalizes their numbers."""
+"""The contents of a checkpoint: weights, sizes and history of networks, and what normalizes their
+numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ Shapes = dict[str, tuple[int, ...]]
 
 LARGEST_SIZE = 4096
 LARGEST_WEIGHT = 1e6
-"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
+"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be
+NaN."""
 
 
 class Normalization(NamedTuple):
@@ -37,14 +39,18 @@ class Normalization(NamedTuple):
             mean, std = (np.asarray(values[name], dtype=np.float64) for name in cls._fields)
         except (KeyError, TypeError, ValueError):
             mean = std = np.empty(0)
-        if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
+        if (
+            mean.shape != (6,)
+            or std.shape != (6,)
+            or not (np.isfinite(mean).all() and (std > 0.0).all())
+        ):
             raise ValueError("normalization must be six means and six standard deviations above 0")
         return cls(mean, std)
 
 
 def to_normalized(command: Values, lower: Values, upper: Values) -> Values:
-    """Normalized coordinates (..., 3) in [-1, 1] of commands (..., 3) [rad, Hz, rad] between limits (..., 3);
-    a range of no width maps to 0."""
+    """Normalized coordinates (..., 3) in [-1, 1] of commands (..., 3) [rad, Hz, rad] between limits
+    (..., 3); a range of no width maps to 0."""
     half = 0.5 * (upper - lower)
     return (command - lower - half) / half.clip(1e-9)
 
@@ -57,7 +63,8 @@ def to_command(x: Values, lower: Values, upper: Values) -> Values:
 
 
 class Sizes(Protocol):
-    """The sizes of a network: a frozen dataclass of whole numbers, with the shapes that follow from them."""
+    """The sizes of a network: a frozen dataclass of whole numbers, with the shapes that follow from
+    them."""
 
     features: ClassVar[str]
     joint: ClassVar[bool]
@@ -75,12 +82,14 @@ Kind = TypeVar("Kind", bound=Sizes)
 
 @dataclass(frozen=True)
 class TrainedWeights:
-    """The contents of a checkpoint: networks, their sizes, how they were made, and what they normalize by."""
+    """The contents of a checkpoint: networks, their sizes, how they were made, and what they
+    normalize by."""
 
     name: str
     normalization: Normalization
     network_sizes: Mapping[str, Any] | None = None
-    """Sizes of the network and what it is fed, as in the file; None where only a surrogate was trained."""
+    """Sizes of the network and what it is fed, as in the file; None where only a surrogate was
+    trained."""
     network: State = field(default_factory=dict)
     surrogate_sizes: Mapping[str, Any] | None = None
     """Sizes of the paper's surrogate, as in the file; None where there is none."""
@@ -98,24 +107,30 @@ class TrainedWeights:
 
     @cached_property
     def single_precision(self) -> dict[str, Any]:
-        """The network in single precision, ready to be asked; every method that is made of it shares this."""
+        """The network in single precision, ready to be asked; every method that is made of it
+        shares this."""
         return single_precision(self.network)
 
     def network_of(self, kind: type[Kind]) -> Kind:
-        """The sizes of the network. Raises CheckpointError: there is none, one of another kind, or a damaged
-        one."""
+        """The sizes of the network. Raises CheckpointError: there is none, one of another kind, or
+        a damaged one."""
         known = self.network_sizes or {}
         if (known.get("features"), known.get("joint")) != (kind.features, kind.joint):
             has = f"a network that is fed {known.get('features')!r:.40}" if known else "no network"
             raise CheckpointError(
-                f"checkpoint {self.name!r} holds {has}, expected one that is fed {kind.features!r}, as that "
+                f"checkpoint {self.name!r} holds {has}, expected one that is fed "
+                f"{kind.features!r}, as that "
                 f"of the shipped `{kind.shipped}`"
             )
         try:
-            sizes = kind(**{key: value for key, value in known.items() if key not in ("features", "joint")})
+            sizes = kind(
+                **{key: value for key, value in known.items() if key not in ("features", "joint")}
+            )
             check_state(self.network, sizes.shapes())
         except (TypeError, ValueError) as error:
-            raise CheckpointError(f"checkpoint {self.name!r}: its network is damaged ({error})") from error
+            raise CheckpointError(
+                f"checkpoint {self.name!r}: its network is damaged ({error})"
+            ) from error
         return sizes
 
 
@@ -125,8 +140,8 @@ def sizes_for_file(sizes: Sizes) -> dict[str, Any]:
 
 
 def check_state(state: State, shapes: Shapes) -> None:
-    """Refuse a network without exactly these arrays. Raises ValueError: one is missing, unknown or of another
-    shape."""
+    """Refuse a network without exactly these arrays. Raises ValueError: one is missing, unknown or
+    of another shape."""
     if wrong := sorted(set(shapes) ^ set(state)):
         raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
     for name, shape in shapes.items():
@@ -135,8 +150,8 @@ def check_state(state: State, shapes: Shapes) -> None:
 
 
 def check_arrays(state: State) -> None:
-    """Refuse arrays that no training leaves. Raises ValueError: one is not of float32, or a weight is NaN or
-    beyond `LARGEST_WEIGHT`."""
+    """Refuse arrays that no training leaves. Raises ValueError: one is not of float32, or a weight
+    is NaN or beyond `LARGEST_WEIGHT`."""
     for name, array in state.items():
         if array.dtype != np.float32:
             raise ValueError(f"{name:.80}: expected float32, got {array.dtype}")
@@ -145,11 +160,14 @@ def check_arrays(state: State) -> None:
 
 
 def check_sizes(*sizes: object, heads: tuple[int, int] = (1, 1)) -> None:
-    """Refuse sizes that no network has. Raises ValueError: one is no whole number from 1 to `LARGEST_SIZE`,
-    or of `heads`, a width and a number of heads, the second does not divide the first."""
+    """Refuse sizes that no network has. Raises ValueError: one is no whole number from 1 to
+    `LARGEST_SIZE`, or of `heads`, a width and a number of heads, the second does not divide the
+    first."""
     for size in sizes:
         if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= LARGEST_SIZE:
-            raise ValueError(f"expected whole numbers from 1 to {LARGEST_SIZE} as sizes, got {size!r:.40}")
+            raise ValueError(
+                f"expected whole numbers from 1 to {LARGEST_SIZE} as sizes, got {size!r:.40}"
+            )
     if heads[0] % heads[1]:
         raise ValueError(f"width {heads[0]} is no multiple of heads {heads[1]}")
 

@@ -1,8 +1,10 @@
-"""The paper's network: node features and a target wrench in, a mixture over each fin's commands out.
+"""The paper's network: node features and a target wrench in, a mixture over each fin's commands
+out.
 
-GATv2 layers (Brody, Alon, Yahav, ICLR 2022) on complete graphs of fins, then Transformer layers, then a
-mixture of diagonal Gaussians per fin. Graphs are small and complete, so that a dense form with a mask serves
-in place of lists of edges. Commands are in coordinates in which every range of limits is [-1, 1].
+GATv2 layers (Brody, Alon, Yahav, ICLR 2022) on complete graphs of fins, then Transformer layers,
+then a mixture of diagonal Gaussians per fin. Graphs are small and complete, so that a dense form
+with a mask serves in place of lists of edges. Commands are in coordinates in which every range of
+limits is [-1, 1].
 """
 
 import math
@@ -20,7 +22,8 @@ RAW_SIZE = 10
 
 
 def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
-    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3), scaled."""
+    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3),
+    scaled."""
     xp = library_of(position)
     limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
     angle = mounting_angle[..., None] / math.pi
@@ -33,7 +36,8 @@ LOG_STD_BOUND = 3.0
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """The paper's network: its sizes, the arrays that follow from them, and what it gives with these."""
+    """The paper's network: its sizes, the arrays that follow from them, and what it gives with
+    these."""
 
     features: ClassVar[str] = "raw"
     joint: ClassVar[bool] = False
@@ -56,12 +60,18 @@ class NetworkConfig:
         shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)
         shapes |= linear_shapes("join", 2 * width, width)
         for name in self._named("graph", self.graph_layers):
-            shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
+            shapes |= {
+                f"{name}.attention": (self.heads, width // self.heads),
+                f"{name}.bias": (width,),
+            }
             shapes |= linear_shapes(f"{name}.source", width, width)
             shapes |= linear_shapes(f"{name}.target", width, width)
         for name in self._named("transformer.layers", self.transformer_layers):
             look = f"{name}.self_attn"
-            shapes |= {f"{look}.in_proj_weight": (3 * width, width), f"{look}.in_proj_bias": (3 * width,)}
+            shapes |= {
+                f"{look}.in_proj_weight": (3 * width, width),
+                f"{look}.in_proj_bias": (3 * width,),
+            }
             shapes |= linear_shapes(f"{look}.out_proj", width, width)
             shapes |= linear_shapes(f"{name}.linear1", width, self.feedforward)
             shapes |= linear_shapes(f"{name}.linear2", self.feedforward, width)
@@ -73,10 +83,13 @@ class NetworkConfig:
             | linear_shapes("weight", width, m)
         )
 
-    def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
-        """The mixtures that a network with these weights gives for node features (B, n, 10) and normalized,
-        centred targets (B, 6). Where robots have fewer than n fins, `mask` (B, n) is the padding mask, True
-        where there is one: GATv2's edges keep to these, and so do the keys of self-attention."""
+    def __call__(
+        self, w: Weights, x: Values, target: Values, mask: Values | None = None
+    ) -> "Mixture":
+        """The mixtures that a network with these weights gives for node features (B, n, 10) and
+        normalized, centred targets (B, 6). Where robots have fewer than n fins, `mask` (B, n) is
+        the padding mask, True where there is one: GATv2's edges keep to these, and so do the keys
+        of self-attention."""
         return self.mixture(w, self.encoded(w, x, target, mask))
 
     def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:
@@ -99,7 +112,9 @@ class NetworkConfig:
         """The mixtures of fins with features (B, n, width)."""
         raw, logits = (layers.linear(w, end, hidden) for end in ("head", "weight"))
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
-        return Mixture(logits, raw[..., :3], LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:]))
+        return Mixture(
+            logits, raw[..., :3], LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:])
+        )
 
     @staticmethod
     def _named(kind: str, count: int) -> list[str]:
@@ -107,7 +122,8 @@ class NetworkConfig:
 
 
 class Mixture(NamedTuple):
-    """Mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets: Eq. 2."""
+    """Mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets:
+    Eq. 2."""
 
     logits: Values
     """Unnormalized log weights (B, n, M)."""
@@ -121,8 +137,8 @@ class Mixture(NamedTuple):
         return (layers.softmax(self.logits)[..., None] * self.mean).sum(2)
 
     def log_prob(self, x: Values) -> Values:
-        """Log likelihoods (B, K, n) of commands (B, K, n, 3); zero directions are numbers as in the paper,
-        no angles."""
+        """Log likelihoods (B, K, n) of commands (B, K, n, 3); zero directions are numbers as in the
+        paper, no angles."""
         xp = library_of(x)
         deviation = (x[:, :, :, None] - self.mean[:, None]) * xp.exp(-self.log_std)[:, None]
         log_normal = -(0.5 * deviation * deviation + self.log_std[:, None]).sum(-1)
@@ -130,10 +146,11 @@ class Mixture(NamedTuple):
         return layers.log_sum_exp(log_weight + log_normal)
 
     def sample(self, uniform: Values, normal: Values, temperature: float = 1.0) -> Values:
-        """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the power 1/T, the
-        Gaussians keep their deviations (Eq. 3).
+        """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the
+        power 1/T, the Gaussians keep their deviations (Eq. 3).
 
-        Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the rest.
+        Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the
+        rest.
         """
         weight = layers.softmax(layers.log_softmax(self.logits) * (1.0 / max(temperature, 1e-6)))
         cumulative = weight.cumsum(-1)[..., None, :-1]

@@ -1,4 +1,5 @@
-"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
+"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy
+only."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -26,20 +27,28 @@ STEPS = 160
 class PaperSettings(Settings):
     """The stages of the paper's pipeline.
 
-    What the paper does not print is a choice made here: gamma and the weights of J_en, Adam's rate, the
-    number of refined candidates and steps, that the best step is kept, and that zero directions turn on
-    beyond the seam.
+    What the paper does not print is a choice made here: gamma and the weights of J_en, Adam's rate,
+    the number of refined candidates and steps, that the best step is kept, and that zero directions
+    turn on beyond the seam.
     """
 
     n_candidates: int = number(64, 1, MOST_CANDIDATES, "candidates K drawn from the mixture")
     temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
     gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
     n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")
-    refinement: str = choice("adam", ("none", "adam"), "how candidates are refined; none is an ablation")
+    refinement: str = choice(
+        "adam", ("none", "adam"), "how candidates are refined; none is an ablation"
+    )
     n_steps: int = number(STEPS, 0, 10_000, "steps of the refinement")
-    warm_start: str = choice("mdn", ("mdn", "random"), "where candidates come from; random is an ablation")
-    ranking: str = choice("physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation")
-    mean_only: bool = switch(False, "take the mixture's mean and nothing else, which is an ablation")
+    warm_start: str = choice(
+        "mdn", ("mdn", "random"), "where candidates come from; random is an ablation"
+    )
+    ranking: str = choice(
+        "physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation"
+    )
+    mean_only: bool = switch(
+        False, "take the mixture's mean and nothing else, which is an ablation"
+    )
 
 
 CHUNK = 250
@@ -51,7 +60,8 @@ ADAM_DECAY = (0.9, 0.999)
 
 
 class Paper(LearnedMethod, LeastErrorMethod):
-    """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
+    """Mixture density network, physics-guided ranking and gradient refinement, by the printed
+    equations."""
 
     name = "paper"
     takes: ClassVar[Takes] = "horizontal fins"
@@ -59,7 +69,9 @@ class Paper(LearnedMethod, LeastErrorMethod):
     settings: PaperSettings
     shipped_checkpoint = "paper"
 
-    def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights
+    ) -> None:
         super().__init__(layout, settings, scale, weights)
         self.config = weights.network_of(NetworkConfig)
         self.surrogate = LayoutSurrogate(layout, weights)
@@ -67,7 +79,9 @@ class Paper(LearnedMethod, LeastErrorMethod):
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
-        self._effectiveness = (self.surrogate.effectiveness / weights.normalization.std).reshape(-1, 6)
+        self._effectiveness = (self.surrogate.effectiveness / weights.normalization.std).reshape(
+            -1, 6
+        )
         """Normalized wrench (3n, 6) per newton of each fin's force along the axes of the body."""
         self.limits = layout.lower.astype(np.float32), layout.upper.astype(np.float32)
         """Lower and upper limits (n, 3), in single precision as all else here."""
@@ -84,7 +98,9 @@ class Paper(LearnedMethod, LeastErrorMethod):
         starts = range(0, len(targets), CHUNK)
         parts = [self._solve_chunk(targets[k : k + CHUNK], seed + k) for k in starts]
         wrench = [part.wrench for part in parts if part.wrench is not None]
-        return Solution(np.concatenate([part.command for part in parts]), wrench=np.concatenate(wrench))
+        return Solution(
+            np.concatenate([part.command for part in parts]), wrench=np.concatenate(wrench)
+        )
 
     def _solve_chunk(self, targets: AnyArray, seed: int) -> Solution:
         settings = self.settings
@@ -92,7 +108,9 @@ class Paper(LearnedMethod, LeastErrorMethod):
         chosen = sampled[:, : settings.n_refined]
         if not settings.mean_only:
             chosen = self._refine(chosen, wanted)
-        if not self._by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
+        if (
+            not self._by_likelihood
+        ):  # without physics in the ranking the likeliest candidate stays the answer
             chosen = _take(chosen, np.argsort(self._score(chosen, wanted), axis=1, kind="stable"))
         return Solution(
             self._inside(chosen[:, 0]),
@@ -106,7 +124,8 @@ class Paper(LearnedMethod, LeastErrorMethod):
         return self.settings.ranking == "nll" and not self.settings.mean_only
 
     def _sampled(self, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
-        """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N, 6)."""
+        """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N,
+        6)."""
         std = self.normalization.std
         wanted = ((targets - self.surrogate.bias) / std).astype(np.float32)
         mixture = self._predict((targets - self.normalization.mean) / std)
@@ -137,7 +156,8 @@ class Paper(LearnedMethod, LeastErrorMethod):
         return np.asarray(mixture.sample(uniform, normal, self.settings.temperature))
 
     def _score(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
-        """J = J_norm (Eq. 8) + gamma J_en (Eq. 9) (N, K) of commands (N, K, n, 3), by the surrogate."""
+        """J = J_norm (Eq. 8) + gamma J_en (Eq. 9) (N, K) of commands (N, K, n, 3), by the
+        surrogate."""
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
         force = self.surrogate.force(flat).reshape(rows, k, -1)
@@ -209,7 +229,9 @@ class Paper(LearnedMethod, LeastErrorMethod):
         wrench = self.surrogate.wrench(command).astype(np.float64)
         error = np.linalg.norm((wrench - target) / self.scale, axis=-1)
         inside = self._inside(command)
-        return Candidates(inside, wrench, error, *costs(self.layout, inside), (source,) * len(command))
+        return Candidates(
+            inside, wrench, error, *costs(self.layout, inside), (source,) * len(command)
+        )
 
 
 def _take(command: AnyArray, index: AnyArray) -> AnyArray:

@@ -1,8 +1,8 @@
 """The paper's surrogate: learned fin physics, commands and node features in, a wrench out.
 
 A perceptron gives each fin's force in the body frame, F_i = f([x_i, u_i]); the wrench is the sum of
-(F_i, r_i x F_i), then stretched and shifted by what a descriptor of the whole layout says. Here it answers
-for one layout with its gradient, in numpy; `training/modules.py` trains it.
+(F_i, r_i x F_i), then stretched and shifted by what a descriptor of the whole layout says. Here it
+answers for one layout with its gradient, in numpy; `training/modules.py` trains it.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,8 @@ FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
 DESCRIPTOR = 64
 BLOCK = 64
-"""Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a megabyte."""
+"""Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a
+megabyte."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ class SurrogateConfig:
         """Shape of each array by name. Raises ValueError: there is no surrogate of these sizes."""
         trained.check_sizes(*self.hidden)
         shapes: trained.Shapes = {}
-        for name, (n_in, n_out) in zip(self.layers(), pairwise([RAW_SIZE + 3, *self.hidden, 3]), strict=True):
+        for name, (n_in, n_out) in zip(
+            self.layers(), pairwise([RAW_SIZE + 3, *self.hidden, 3]), strict=True
+        ):
             shapes |= trained.linear_shapes(name, n_in, n_out)
         shapes |= trained.linear_shapes("descriptor.0", RAW_SIZE, DESCRIPTOR)
         return shapes | trained.linear_shapes("affine", DESCRIPTOR, 12)
@@ -47,8 +50,8 @@ class SurrogateConfig:
 
     @classmethod
     def of(cls, weights: trained.TrainedWeights) -> "SurrogateConfig":
-        """The sizes of the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a damaged
-        one."""
+        """The sizes of the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a
+        damaged one."""
         sizes = weights.surrogate_sizes
         if sizes is None:
             raise CheckpointError(f"checkpoint {weights.name!r} holds no surrogate; `paper` does")
@@ -58,22 +61,27 @@ class SurrogateConfig:
             config = cls(tuple(sizes["hidden"]))
             trained.check_state(weights.surrogate, config.shapes())
         except (TypeError, ValueError) as error:
-            raise CheckpointError(f"checkpoint {weights.name!r}: damaged surrogate ({error})") from error
+            raise CheckpointError(
+                f"checkpoint {weights.name!r}: damaged surrogate ({error})"
+            ) from error
         return config
 
 
 class LayoutSurrogate:
-    """A surrogate (Eq. 4) on one layout of n fins, with the gradient of its forces; in single precision."""
+    """A surrogate (Eq. 4) on one layout of n fins, with the gradient of its forces; in single
+    precision."""
 
     def __init__(self, layout: Layout, weights: trained.TrainedWeights) -> None:
-        """Take over the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a damaged
-        one."""
+        """Take over the surrogate of a checkpoint. Raises CheckpointError: it holds none, or a
+        damaged one."""
         self.config = SurrogateConfig.of(weights)
         self._w = layers.single_precision(weights.surrogate)
         place = layout.position, layout.mounting_angle, layout.lower, layout.upper
         features = raw_features(*place).astype(np.float32)
         self._fins = features @ self._w["net.0.weight"][:, :RAW_SIZE].T + self._w["net.0.bias"]
-        self._lower, self._upper = (limit.astype(np.float32) for limit in (layout.lower, layout.upper))
+        self._lower, self._upper = (
+            limit.astype(np.float32) for limit in (layout.lower, layout.upper)
+        )
         self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
         described = np.tanh(layers.linear(self._w, "descriptor.0", features)).mean(0)
         scale, self.bias = np.split(layers.linear(self._w, "affine", described), 2)
@@ -86,15 +94,19 @@ class LayoutSurrogate:
         """Forces (R, n, 3) [N] of commands (R, n, 3)."""
         return np.concatenate([self._forward(command[rows]) for rows in blocks_of(len(command))])
 
-    def force_and_pullback(self, command: AnyArray) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
-        """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the commands,
-        (R, n, 3) each."""
+    def force_and_pullback(
+        self, command: AnyArray
+    ) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
+        """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the
+        commands, (R, n, 3) each."""
         jacobian: list[AnyArray] = []
         force = self._forward(command, jacobian)
 
         def pull(by_force: AnyArray) -> AnyArray:
             by_layer = FORCE_UNIT * by_force.reshape(-1, 3)
-            for name, slope in zip(reversed(self.config.layers()[1:]), reversed(jacobian), strict=True):
+            for name, slope in zip(
+                reversed(self.config.layers()[1:]), reversed(jacobian), strict=True
+            ):
                 by_layer = by_layer @ self._w[f"{name}.weight"]
                 by_layer *= slope.reshape(by_layer.shape)
             by_command = by_layer @ self._w["net.0.weight"][:, RAW_SIZE:]

@@ -45,8 +45,8 @@ class Workplace:
             distributed.barrier()
 
     def autocast(self) -> torch.autocast:
-        """Matrix products in bfloat16 where the device multiplies it faster than float32. The CPU is asked,
-        not timed: a resumed run would go on in another precision."""
+        """Matrix products in bfloat16 where the device multiplies it faster than float32. The CPU
+        is asked, not timed: a resumed run would go on in another precision."""
         kind = self.device.type
         fast = kind == "cuda" or (kind == "cpu" and torch.cpu._is_avx512_bf16_supported())
         return torch.autocast(kind, torch.bfloat16, enabled=fast)
@@ -54,12 +54,16 @@ class Workplace:
 
 @contextmanager
 def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
-    """The workplace of this process, on a device of torch such as cpu or cuda:1, by default a graphics card
-    where there is one. Raises CommandError: there is no such device, or the processes cannot share the batch,
-    the samples of a step, equally."""
-    world, rank = (int(os.environ.get(key, default)) for key, default in (("WORLD_SIZE", 1), ("RANK", 0)))
+    """The workplace of this process, on a device of torch such as cpu or cuda:1, by default a
+    graphics card where there is one. Raises CommandError: there is no such device, or the processes
+    cannot share the batch, the samples of a step, equally."""
+    world, rank = (
+        int(os.environ.get(key, default)) for key, default in (("WORLD_SIZE", 1), ("RANK", 0))
+    )
     if batch_size % world:
-        raise CommandError(f"batches of {batch_size} samples cannot be shared by {world} processes equally")
+        raise CommandError(
+            f"batches of {batch_size} samples cannot be shared by {world} processes equally"
+        )
     device = _device(name)
     if world == 1:
         yield Workplace(device)
@@ -80,7 +84,9 @@ def _device(name: str | None) -> torch.device:
         torch.empty(1, device=device)
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         reason = str(error).splitlines()[0][:120]
-        raise CommandError(f"device: {name!r:.40} cannot be used here ({reason}); take cpu") from None
+        raise CommandError(
+            f"device: {name!r:.40} cannot be used here ({reason}); take cpu"
+        ) from None
     if device.type == "cuda":
         torch.cuda.set_device(device)
     return device

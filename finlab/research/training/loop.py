@@ -1,7 +1,8 @@
-"""The loop of every training: Adam, a rate that may fall, a log, and a state from which a run goes on.
+"""The loop of every training: Adam, a rate that may fall, a log, and a state from which a run goes
+on.
 
-All that a step depends on is a function of its number: the batch, the noise, the rate. So a run that was
-killed and goes on from its last state ends with the weights of one that was not.
+All that a step depends on is a function of its number: the batch, the noise, the rate. So a run
+that was killed and goes on from its last state ends with the weights of one that was not.
 """
 
 import csv
@@ -24,7 +25,9 @@ from finlab.research.networks.trained import Shapes, State
 from finlab.research.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
-LOG_FILE = "log.csv"  # one row per logged step: step, samples, seconds, learning rate and every loss term
+LOG_FILE = (
+    "log.csv"  # one row per logged step: step, samples, seconds, learning rate and every loss term
+)
 STATE_FILE = "resume.pt"  # what a run goes on from
 CURVES_FILE = "curves.png"
 APART = ("step", "samples", "seconds")  # columns of the log that are no curves
@@ -49,12 +52,13 @@ class LoopSettings:
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None
-    """Time after which the run ends whatever step it has come to, and by which the rate falls if that is
-    sooner."""
+    """Time after which the run ends whatever step it has come to, and by which the rate falls if
+    that is sooner."""
 
 
 def learning_rate(settings: LoopSettings, step: int, share: float = 0.0) -> float:
-    """Learning rate of a step, after a share of the time that the run may take: it rises, then falls."""
+    """Learning rate of a step, after a share of the time that the run may take: it rises, then
+    falls."""
     rise = min(1.0, (step + 1) / max(min(settings.warmup, settings.steps), 1))
     done = min(1.0, max(step / settings.steps, share)) if settings.cosine else 0.0
     return settings.learning_rate * rise * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * done)))
@@ -71,9 +75,9 @@ ZERO = ("in_proj_bias", "out_proj.bias")
 
 
 def first_weights(shapes: Shapes, seed: int, device: torch.device | None = None) -> Weights:
-    """Weights by name, by default on the processor, drawn as PyTorch draws those of its own layers (Glorot
-    and Bengio, 2010, for attention, uniform over one over the root of the inputs for linear layers); they
-    depend on the seed alone."""
+    """Weights by name, by default on the processor, drawn as PyTorch draws those of its own layers
+    (Glorot and Bengio, 2010, for attention, uniform over one over the root of the inputs for linear
+    layers); they depend on the seed alone."""
     generator = torch.Generator().manual_seed(seed)
     drawn = {name: _drawn(name, shape, shapes, generator) for name, shape in shapes.items()}
     return {name: values.to(device).requires_grad_() for name, values in drawn.items()}
@@ -104,15 +108,17 @@ class Training:
         identity: dict[str, Any],
         place: Workplace,
     ) -> None:
-        """Takes weights by name, which are changed in place; a folder, made if need be, for log, curves and
-        state; and the settings that a resumed run must share, as plain values."""
+        """Takes weights by name, which are changed in place; a folder, made if need be, for log,
+        curves and state; and the settings that a resumed run must share, as plain values."""
         self.weights = weights
         self.settings = settings
         self.place = place
         self.folder = make_folder(folder)
         self.identity = identity
         self.optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate)
-        self.average = {name: w.detach().clone() for name, w in weights.items()} if settings.ema else {}
+        self.average = (
+            {name: w.detach().clone() for name, w in weights.items()} if settings.ema else {}
+        )
         self.done, self.seconds = 0, 0.0
         """Steps, and the time that they took, with all that went before them."""
         self.rows = list[dict[str, float]]()
@@ -122,38 +128,50 @@ class Training:
     @property
     def shipped(self) -> State:
         """The weights to ship, as arrays."""
-        return {name: w.detach().cpu().numpy() for name, w in (self.average or self.weights).items()}
+        return {
+            name: w.detach().cpu().numpy() for name, w in (self.average or self.weights).items()
+        }
 
     def resume(self) -> None:
-        """Go on from the state in the folder, if there is one. Raises DataError: it belongs to a run with
-        other settings, or cannot be read."""
+        """Go on from the state in the folder, if there is one. Raises DataError: it belongs to a
+        run with other settings, or cannot be read."""
         path = self.folder / STATE_FILE
         if not path.exists():
             return
         try:  # plain values and tensors only: reading never runs code
             state = torch.load(path, map_location="cpu", weights_only=True)
-            changed = [key for key, value in self.identity.items() if state["identity"].get(key) != value]
+            changed = [
+                key for key, value in self.identity.items() if state["identity"].get(key) != value
+            ]
             if not changed:
                 self._take(state)
         except Exception as error:  # whatever torch's reader meets in a damaged file
             reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
-            raise DataError(f"{path}: no state to go on from ({reason}); train without --resume") from error
+            raise DataError(
+                f"{path}: no state to go on from ({reason}); train without --resume"
+            ) from error
         if changed:
             raise DataError(
-                f"{self.folder}: holds a run with other settings ({', '.join(changed)}); resume with the same"
+                f"{self.folder}: holds a run with other settings ({', '.join(changed)}); resume "
+                "with the same"
                 " ones, or train without --resume"
             )
 
-    def run(self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0) -> None:
-        """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how far it is,
-        now and then and at the end; `spent` are seconds that this call took so far, on other work."""
+    def run(
+        self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0
+    ) -> None:
+        """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how
+        far it is, now and then and at the end; `spent` are seconds that this call took so far, on
+        other work."""
         settings = self.settings
         first = self.done
         limit = math.inf if settings.seconds is None else settings.seconds
         started = time.monotonic() - self.seconds - spent
         saved = time.monotonic()
         silent = self.place.rank > 0 or not sys.stderr.isatty()
-        with tqdm(total=settings.steps, initial=first, unit="step", smoothing=0.05, disable=silent) as bar:
+        with tqdm(
+            total=settings.steps, initial=first, unit="step", smoothing=0.05, disable=silent
+        ) as bar:
             terms: dict[str, Tensor] = {}
             while self.done < settings.steps and (self.done == first == 0 or self.seconds < limit):
                 step = self.done
@@ -196,14 +214,17 @@ class Training:
         return values["loss"]
 
     def _write(self, save: Callable[[State, dict[str, Any]], None]) -> float:
-        """Write all that the run leaves, the state last, as it may be killed in between; the time of it."""
+        """Write all that the run leaves, the state last, as it may be killed in between; the time
+        of it."""
         if self.place.rank == 0:
             samples = self.done * self.settings.batch_size
             made = {"steps_done": self.done, "samples": samples, "processes": self.place.world}
             save(self.shipped, made)
             if self.rows:
                 write_whole(self.folder / LOG_FILE, _table(self.rows), DataError)
-            state = {name: getattr(self, name) for name in _KEPT} | {"optimizer": self.optimizer.state_dict()}
+            state = {name: getattr(self, name) for name in _KEPT} | {
+                "optimizer": self.optimizer.state_dict()
+            }
             content = io.BytesIO()
             torch.save(state, content)
             write_whole(self.folder / STATE_FILE, content.getvalue(), DataError)
@@ -243,7 +264,9 @@ def curves(rows: list[dict[str, float]]) -> bytes | None:
         return None
     figure = Figure(figsize=(8.0, 2.0 * len(names)), layout="constrained")
     steps = [row["step"] for row in rows]
-    for axes, name in zip(figure.subplots(len(names), sharex=True, squeeze=False)[:, 0], names, strict=True):
+    for axes, name in zip(
+        figure.subplots(len(names), sharex=True, squeeze=False)[:, 0], names, strict=True
+    ):
         values = [row[name] for row in rows]
         axes.plot(steps, values, linewidth=1.0)
         axes.set_yscale("log" if min(values) > 0.0 else "symlog")

@@ -1,9 +1,9 @@
 """The paper's two body-frame controllers: waypoints, and speed with depth by PID.
 
-Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated marine
-robots", section 3, whose formulas stand in its text without numbers; each docstring names its subsection.
-The paper prints no gains. Ours follow from the robot's model and from how late its actuators are, by one rule
-for all robots.
+Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated
+marine robots", section 3, whose formulas stand in its text without numbers; each docstring names
+its subsection. The paper prints no gains. Ours follow from the robot's model and from how late its
+actuators are, by one rule for all robots.
 """
 
 import math
@@ -27,14 +27,16 @@ DAMPING = 0.7
 CRUISE = 0.15
 """Speed at which the water's drag counts [m/s]; the middle one of the paper's."""
 NEAR_M = 0.15
-"""Within this distance of a waypoint the heading counts in proportion to it: above it there is none."""
+"""Within this distance of a waypoint the heading counts in proportion to it: above it there is
+none."""
 FILTER_S = 0.3
 """Time constant of the filters of the measured speed and of derivatives [s]."""
 
 
 def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]:
-    """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the inertia (4,),
-    the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
+    """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the
+    inertia (4,), the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked
+    for."""
     observer = MotionObserver(layout, period_s)
     drag = observer.inertia * observer.slowed_by(np.full(4, CRUISE)) / CRUISE
     return pace_of(layout), observer.inertia, drag, most_of(layout)
@@ -43,13 +45,13 @@ def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]
 class WaypointController:
     """Heads for a waypoint (section 3, "Trajectory tracking controller").
 
-    Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint,
-    Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e, here with damping of speed, climb and yaw
-    rate (`damping`; zeros are the printed law). The waypoint runs `lead_s` ahead on the path; odometry is
-    `MotionObserver`'s.
+    Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint, Fx = k_d hypot(dx,
+    dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e, here with damping of speed, climb and yaw rate
+    (`damping`; zeros are the printed law). The waypoint runs `lead_s` ahead on the path; odometry
+    is `MotionObserver`'s.
 
-    Gains: surge and heave are damped oscillators of `SLOW`, or quicker where the drag alone damps more, and
-    the heading one of `TURN`. The lead makes up for damping and drag: no steady lag.
+    Gains: surge and heave are damped oscillators of `SLOW`, or quicker where the drag alone damps
+    more, and the heading one of `TURN`. The lead makes up for damping and drag: no steady lag.
     """
 
     name = "waypoint"
@@ -78,7 +80,8 @@ class WaypointController:
         self._observer = MotionObserver(self.layout, self.period_s)
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
-        """Returns the wrench (6,) towards the waypoint [N, N m]; `delivered` is that of the fins so far."""
+        """Returns the wrench (6,) towards the waypoint [N, N m]; `delivered` is that of the fins so
+        far."""
         now = self._observer.step(measurement, delivered)
         ahead = setpoint.velocity * self.lead_s + setpoint.acceleration * (0.5 * self.lead_s**2)
         dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
@@ -93,8 +96,8 @@ class WaypointController:
 
 @dataclass
 class Pid:
-    """A PID loop in discrete time that does not wind up: its integral rests while the force is bounded and
-    the error would push further."""
+    """A PID loop in discrete time that does not wind up: its integral rests while the force is
+    bounded and the error would push further."""
 
     proportional: float
     """Force [N] per error."""
@@ -136,12 +139,12 @@ def filter_share(period_s: float) -> float:
 class VelocityController:
     """Keeps a speed and a depth (section 3, "Velocity controller").
 
-    Fx by PID of the speed, DVL's after a low-pass filter; Fz by PID of the depth, from the pressure;
-    Tz = -k_r r against the IMU's yaw rate; all within bounds. It takes speed and depth of the path, not its
-    course: the robot goes where its nose points.
+    Fx by PID of the speed, DVL's after a low-pass filter; Fz by PID of the depth, from the
+    pressure; Tz = -k_r r against the IMU's yaw rate; all within bounds. It takes speed and depth of
+    the path, not its course: the robot goes where its nose points.
 
-    Gains by poles: the speed is a damped oscillator of `SPEED`, whose derivative gain adds a tenth of the
-    mass; the depth one of `SLOW` with a third pole, of its integral, at half of that.
+    Gains by poles: the speed is a damped oscillator of `SPEED`, whose derivative gain adds a tenth
+    of the mass; the depth one of `SLOW` with a third pole, of its integral, at half of that.
     """
 
     name = "velocity"
@@ -156,7 +159,9 @@ class VelocityController:
         mass = 1.1 * float(inertia[0])
         heavy = float(inertia[2])
         damped = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0)
-        self.surge = Pid(damped, fast**2 * mass, 0.1 * float(inertia[0]), float(most[0]), self.period_s)
+        self.surge = Pid(
+            damped, fast**2 * mass, 0.1 * float(inertia[0]), float(most[0]), self.period_s
+        )
         a = 2.0 * DAMPING * slow
         b = 0.5 * slow
         damped = max(heavy * (a + b) - float(drag[2]), 0.0)
@@ -180,12 +185,15 @@ class VelocityController:
         wrench = np.zeros(6)
         wrench[0] = self.surge.step(setpoint.surge - self._speed)
         wrench[2] = self.depth.step(float(setpoint.position[2]) + measurement.depth)
-        wrench[5] = min(max(-self.yaw_damping * float(measurement.rates[2]), -self.max_yaw), self.max_yaw)
+        wrench[5] = min(
+            max(-self.yaw_damping * float(measurement.rates[2]), -self.max_yaw), self.max_yaw
+        )
         return wrench
 
 
 def _axes(layout: Layout, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Axes that are commanded, of surge, heave and yaw what the robot can give, and those that are free.
+    """Axes that are commanded, of surge, heave and yaw what the robot can give, and those that are
+    free.
 
     Raises:
         FinlabError: it cannot surge and turn, or dives by its pitch alone.

@@ -1,9 +1,10 @@
-"""Contract of controllers: measurements, setpoints, protocols, and the axes that are commanded or left open.
+"""Contract of controllers: measurements, setpoints, protocols, and the axes that are commanded or
+left open.
 
-A controller commands some axes of the wrench, holds others at zero, and may leave some free. Few fins, or few
-that are left, may not be able to hold zeros: two fins have four forces to choose for six axes. A target that
-asks for the impossible spoils what the controller wants, so the open axes are set to what the fins give with
-it; and free axes to what they give with the least force.
+A controller commands some axes of the wrench, holds others at zero, and may leave some free. Few
+fins, or few that are left, may not be able to hold zeros: two fins have four forces to choose for
+six axes. A target that asks for the impossible spoils what the controller wants, so the open axes
+are set to what the fins give with it; and free axes to what they give with the least force.
 """
 
 import math
@@ -45,7 +46,8 @@ class Measurement(NamedTuple):
     """How old the samples of markers, pressure, DVL and IMU are by their time stamps [s]."""
 
     def as_array(self) -> Array:
-        """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps them."""
+        """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps
+        them."""
         pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
         return np.array([*pose, *self.velocity, *self.rates])
 
@@ -62,7 +64,8 @@ class Setpoint(NamedTuple):
     acceleration: Array = np.zeros(3)
     """Its acceleration (3,) [m/s^2]."""
     onward: float = math.nan
-    """Heading [rad] in which the path goes on from here, where it rests, too; NaN where it goes nowhere."""
+    """Heading [rad] in which the path goes on from here, where it rests, too; NaN where it goes
+    nowhere."""
 
 
 class Controller(Protocol):
@@ -70,8 +73,8 @@ class Controller(Protocol):
 
     name: str
     axes: tuple[str, ...]
-    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them, but
-    for the free ones."""
+    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold
+    them, but for the free ones."""
     free: tuple[str, ...]
     """Axes that may be whatever the fins give along with the others at the least force."""
     period_s: float
@@ -86,7 +89,8 @@ class Controller(Protocol):
         Args:
             measurement: the newest samples.
             setpoint: what to do.
-            delivered: wrench (6,) that the fins have given since the last call, as far as known [N, N m].
+            delivered: wrench (6,) that the fins have given since the last call, as far as known [N,
+            N m].
         """
         ...
 
@@ -96,8 +100,8 @@ class Foresighted(Protocol):
     """A controller that knows what its path will take."""
 
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
-        """Wrenches (K, 6) [N, N m] that will be asked for at K setpoints after the first, a period apart; the
-        first is that of the last call of `wrench`."""
+        """Wrenches (K, 6) [N, N m] that will be asked for at K setpoints after the first, a period
+        apart; the first is that of the last call of `wrench`."""
         ...
 
 
@@ -105,8 +109,8 @@ class Learner(Protocol):
     """Finds out on the way what a robot is; called at every tick."""
 
     factor: Array
-    """By what commands to the robot as it was learned are multiplied for its drives (n, 3): a thruster's
-    command is the force that it gives, and a weak one is asked for more."""
+    """By what commands to the robot as it was learned are multiplied for its drives (n, 3): a
+    thruster's command is the force that it gives, and a weak one is asked for more."""
 
     def step(self, measured: Array, command: Array) -> Layout | None:
         """Returns the robot as it is now believed to be, where that has changed.
@@ -119,19 +123,21 @@ class Learner(Protocol):
 
 
 LEVER_M = 0.25
-"""Torques count as forces at this lever when open axes are traded against each other [m]; about U-CAT's."""
+"""Torques count as forces at this lever when open axes are traded against each other [m]; about
+U-CAT's."""
 RANK_TOLERANCE = 1e-6
 """Singular values below this share of the largest count as zero."""
 
 
 class Completion:
-    """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted axes."""
+    """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted
+    axes."""
 
     def __init__(
         self, layout: Layout, lost: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
     ) -> None:
-        """Prepares for the actuators that work, at least one, the wanted and the free axes, by their names.
-        Raises LayoutError: an unknown name, or no actuator is left."""
+        """Prepares for the actuators that work, at least one, the wanted and the free axes, by
+        their names. Raises LayoutError: an unknown name, or no actuator is left."""
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
         chosen = mask_of(axes)
@@ -155,9 +161,9 @@ class Completion:
 
 
 def axes_of(layout: Layout) -> tuple[str, ...]:
-    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins that push
-    sideways hardly push ahead: with them sway is headed against. A robot that lifts by rudders alone dives by
-    its pitch, and one that does not lift at all is steered in the plane."""
+    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins
+    that push sideways hardly push ahead: with them sway is headed against. A robot that lifts by
+    rudders alone dives by its pitch, and one that does not lift at all is steered in the plane."""
     lifts = ("Fx", "Fz", "Tz")
     rudders = layout.by_flow
     driven = layout.without(rudders) if len(rudders) < layout.n else layout
@@ -170,12 +176,14 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
 
 
 def steers(layout: Layout, lost: Sequence[str] = ()) -> bool:
-    """Whether what works of a robot can give the axes that are commanded independently, in small."""
+    """Whether what works of a robot can give the axes that are commanded independently, in
+    small."""
     return Completion(layout, lost, axes_of(layout)).controllable
 
 
 def steerable_loss(layout: Layout, count: int, lost: Sequence[str] = ()) -> tuple[str, ...] | None:
-    """The first actuators, so many besides the lost ones, without which a robot can still be steered."""
+    """The first actuators, so many besides the lost ones, without which a robot can still be
+    steered."""
     working = [name for name in layout.names if name not in lost]
     ways = combinations(working, count) if count < len(working) else ()
     return next((way for way in ways if not count or steers(layout, (*lost, *way))), None)

@@ -1,4 +1,5 @@
-"""Notices fins that are torn, lost or stuck, from how the robot moves, and takes repaired ones back."""
+"""Notices fins that are torn, lost or stuck, from how the robot moves, and takes repaired ones
+back."""
 
 import math
 from typing import NamedTuple
@@ -19,25 +20,30 @@ from finlab.swim.control.probe import Probe
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
 OPPOSED_BELOW, OPPOSED_SURE = -0.3, 3.0
-"""A strength below which an actuator pushes the other way than the layout says, and standard deviations
-by which it lies below 0."""
+"""A strength below which an actuator pushes the other way than the layout says, and standard
+deviations by which it lies below 0."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
-"""A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
+"""A belief is acted on once it has been certain for so long [s]: a single odd sample decides
+nothing."""
 HOLD_EARLY_S = 0.5
-"""The same before current and trim are learned, when only what pushes the other way is acted on [s]."""
+"""The same before current and trim are learned, when only what pushes the other way is acted on
+[s]."""
 ASTRAY = 1e4
-"""A misfit of the motion, a variance over that of the settings, from which on nothing can be told of it."""
+"""A misfit of the motion, a variance over that of the settings, from which on nothing can be told
+of it."""
 COARSE = 0.05
-"""The allocator is given strengths in steps of this size, so that its problem is the same for many ticks."""
+"""The allocator is given strengths in steps of this size, so that its problem is the same for many
+ticks."""
 
 
 class Diagnosis(NamedTuple):
     """What a monitor believes of n fins."""
 
     damage: Damage
-    """The actuators that are lost, torn or stuck, for an allocator: `allocate(..., damage=damage)`."""
+    """The actuators that are lost, torn or stuck, for an allocator: `allocate(...,
+    damage=damage)`."""
     probability: Array
     """Of each fin not being whole (n,), 0 to 1."""
     strength: Array
@@ -55,7 +61,8 @@ class FaultMonitor:
             answer = allocator.allocate(wrench, damage=verdict.damage)
             command = monitor.probed(answer.command)
 
-    A fin that rests cannot be distinguished from one that is lost: its probability stays where it was.
+    A fin that rests cannot be distinguished from one that is lost: its probability stays where it
+    was.
     """
 
     period_s = 0.1
@@ -69,7 +76,9 @@ class FaultMonitor:
         self._beliefs = Hypotheses(layout.n, self._model.inertia, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
         n = layout.n
-        self._torn, self._lost, self._told, self._back, self._coming_back = np.zeros((5, n), dtype=bool)
+        self._torn, self._lost, self._told, self._back, self._coming_back = np.zeros(
+            (5, n), dtype=bool
+        )
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
         self._suspect = 0
@@ -82,22 +91,24 @@ class FaultMonitor:
 
     @property
     def opposed(self) -> tuple[str, ...]:
-        """Names of those that push the other way than the layout says; the allocator does without them until
-        the layout is put right."""
+        """Names of those that push the other way than the layout says; the allocator does without
+        them until the layout is put right."""
         return tuple(self.layout.names[k] for k in np.flatnonzero(self._back))
 
     @property
     def tells(self) -> bool:
-        """Whether losses would show: not where the robot moves far otherwise than its model says."""
+        """Whether losses would show: not where the robot moves far otherwise than its model
+        says."""
         return self._beliefs.misfit < ASTRAY
 
     def step(self, measurement: Measurement, command: Array | None) -> Diagnosis:
         """Takes what has been measured and says what is believed.
 
         Args:
-            measurement: of now. A velocity counts as new where its array is another one than last time.
-            command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None before the
-                first.
+            measurement: of now. A velocity counts as new where its array is another one than last
+            time.
+            command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None
+                before the first.
         """
         beliefs = self._beliefs
         m = measurement
@@ -117,8 +128,8 @@ class FaultMonitor:
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of a fin is known: its strength, and where it is stuck [rad] if it is.
 
-        A fin that is said to be lost is left alone until another state is said: no probe moves it. Raises
-        LayoutError: there is no fin of that name."""
+        A fin that is said to be lost is left alone until another state is said: no probe moves it.
+        Raises LayoutError: there is no fin of that name."""
         fin = self.layout.index(name)
         self._beliefs.believe(fin, strength)
         self._mark(fin, strength, stuck)
@@ -126,7 +137,8 @@ class FaultMonitor:
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
-        """Takes the robot for another one with the same body: what is not lost is as that layout says."""
+        """Takes the robot for another one with the same body: what is not lost is as that layout
+        says."""
         self.layout = layout
         self._model.adopt(layout)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
@@ -139,10 +151,11 @@ class FaultMonitor:
     def probed(self, command: Array) -> Array:
         """The command (n, 3) with what keeps the fins known.
 
-        Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
-        it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
-        rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the
-        drives allow from what was returned last, as does the way back to what is commanded.
+        Now and then a fin that the monitor has called lost beats for two seconds: if it gives
+        nothing by it, it is lost, and of one that has been repaired the robot feels it, and takes
+        it back. Fins that all but rest push a little, see `MonitorSettings.least_push`. Both change
+        no faster than the rates of the drives allow from what was returned last, as does the way
+        back to what is commanded.
         """
         lost = self._lost & ~self._told
         direction = self._model.motion.direction
@@ -165,7 +178,8 @@ class FaultMonitor:
         damage = Damage()
         broken = self._lost | self._torn | stuck
         if True in broken.tolist():
-            # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
+            # The last but one belief is a whole fin, the last one of a stuck fin that it turns
+            # again.
             works = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
             probability = np.where(broken, 1.0 - works, probability)
             damage = self._damage(strength)
@@ -188,7 +202,8 @@ class FaultMonitor:
         )
 
     def _other_direction(self, fresh: Array) -> Array:
-        """Where actuators (n,) are by the beliefs that they stick: where they were when it may have begun."""
+        """Where actuators (n,) are by the beliefs that they stick: where they were when it may have
+        begun."""
         turn = self._model.motion.direction - self._since
         turn -= TURN * np.round(turn / TURN) * self._model.motion.angles
         self._since += fresh[:, -1] * turn
@@ -198,7 +213,11 @@ class FaultMonitor:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
         strength = beliefs.strength
-        back = (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * beliefs.strength_std) & ~self._back
+        back = (
+            (strength < OPPOSED_BELOW)
+            & (strength < -OPPOSED_SURE * beliefs.strength_std)
+            & ~self._back
+        )
         if back.any() and (self._lost | back).sum() < self.layout.n:
             for each in np.flatnonzero(back):
                 self._mark(int(each), -1.0, math.nan)

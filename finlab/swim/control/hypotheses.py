@@ -1,8 +1,9 @@
-"""Many beliefs about one robot side by side: what is now, and each thing that may have happened to a fin.
+"""Many beliefs about one robot side by side: what is now, and each thing that may have happened to
+a fin.
 
-An interacting-multiple-model filter (Blom and Bar-Shalom, IEEE Transactions on Automatic Control 33, 1988),
-made simple: every belief has a state of its own, all share one covariance, and only what is believed now
-feeds the others.
+An interacting-multiple-model filter (Blom and Bar-Shalom, IEEE Transactions on Automatic Control
+33, 1988), made simple: every belief has a state of its own, all share one covariance, and only what
+is believed now feeds the others.
 """
 
 import math
@@ -12,7 +13,16 @@ from itertools import combinations
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.swim.control.motion_model import CURRENT, FIRST_FIN, MOTION, RISING, STRENGTH, TILT, TORQUE, Step
+from finlab.swim.control.motion_model import (
+    CURRENT,
+    FIRST_FIN,
+    MOTION,
+    RISING,
+    STRENGTH,
+    TILT,
+    TORQUE,
+    Step,
+)
 
 LEVELS = (0.0, -1.0, 0.35, 0.7, 1.0)
 """Strengths that a fin may suddenly have; a motor that is wired wrongly has -1."""
@@ -21,11 +31,13 @@ OPPOSED = 1
 LOSSES = 0.6
 """Share of all events that are losses."""
 TOGETHER = 0.1
-"""How often two given fins are lost at one moment (a cable, a collision), as a share of how often one is."""
+"""How often two given fins are lost at one moment (a cable, a collision), as a share of how often
+one is."""
 APART = 0.2
 """A level this near to a fin's strength is no event."""
 EXPECTED_SURPRISE, MOST_SURPRISE = 1.0, 4.0
-"""Squared distance per measured number, in variances, from which the model is trusted less; and the most."""
+"""Squared distance per measured number, in variances, from which the model is trusted less; and the
+most."""
 ADAPTING = 0.1
 """How fast, per tick."""
 MOST_FREEDOM = 16.0
@@ -33,8 +45,8 @@ MOST_FREEDOM = 16.0
 MOST_MISFIT = 1e5
 """Most that the disturbance of the motion grows to (a variance)."""
 ASTRAY, MOST_VARIANCE = 1e6, 100.0
-"""Squared distance of a measurement, in variances, and variance of a velocity [m^2/s^2, rad^2/s^2], beyond
-which the model says nothing of the motion, as of a robot that tumbles."""
+"""Squared distance of a measurement, in variances, and variance of a velocity [m^2/s^2, rad^2/s^2],
+beyond which the model says nothing of the motion, as of a robot that tumbles."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +70,13 @@ class MonitorSettings:
     rising_current: float = 0.01
     """The same of a current that rises or sinks [m/s]; its drift is as much smaller."""
     torque: float = 0.1
-    """Of a torque that stays [N m]; what a tilt sensor that sits askew makes of the hull's weight is one."""
+    """Of a torque that stays [N m]; what a tilt sensor that sits askew makes of the hull's weight
+    is one."""
     torque_drift: float = 0.003
     """Of its change [N m], per root of a second."""
     strength: float = 0.05
-    """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that rests."""
+    """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that
+    rests."""
     new_strength: float = 0.25
     """The same of a fin that has just been torn."""
     strength_drift: float = 0.005
@@ -76,18 +90,19 @@ class MonitorSettings:
     probe_every_s: float = 20.0
     """Time after which a fin that is taken for lost is tried again [s]; 0 for never."""
     least_push: float = 0.5
-    """Force [N] that every fin gives at least, up or down where it would rest, so that its loss shows; 0 for
-    none. Costs power, where fins would rest."""
+    """Force [N] that every fin gives at least, up or down where it would rest, so that its loss
+    shows; 0 for none. Costs power, where fins would rest."""
     threshold: float = 0.97
-    """Probability of a fin's failure from which it is acted on, if it holds for two tenths of a second."""
+    """Probability of a fin's failure from which it is acted on, if it holds for two tenths of a
+    second."""
 
 
 class Hypotheses:
-    """What is taken for true of n fins, and beside it m beliefs about each fin, that it has just changed, and
-    one about each pair of fins, that both were lost at one moment.
+    """What is taken for true of n fins, and beside it m beliefs about each fin, that it has just
+    changed, and one about each pair of fins, that both were lost at one moment.
 
-    Those about a fin are that it has come to one of `LEVELS` of strength, and, the last one, to its other
-    direction: a fin that turned sticks, a stuck one turns again.
+    Those about a fin are that it has come to one of `LEVELS` of strength, and, the last one, to its
+    other direction: a fin that turned sticks, a stuck one turns again.
     """
 
     def __init__(self, n_fins: int, inertia: Array, settings: MonitorSettings) -> None:
@@ -125,7 +140,9 @@ class Hypotheses:
         motion = np.array([s.force_noise**2] * 3 + [s.torque_noise**2] * 3) / inertia**2
         self._noise = noise
         self._motion_noise = motion
-        self._sensors = np.diag([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
+        self._sensors = np.diag(
+            [s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2
+        )
         self._slow_sensors = self._sensors[3:, 3:].copy()
         self._most = np.full(n_fins, s.strength**2)
         self._probability: Array = np.zeros(len(self._off))
@@ -133,7 +150,8 @@ class Hypotheses:
         """Their sum: how likely it is that what is taken for true is not."""
         self._age_s = 0.0
         self.misfit = 1.0
-        """How many times as much (a variance) the motion is disturbed as the settings say, at least 1."""
+        """How many times as much (a variance) the motion is disturbed as the settings say, at least
+        1."""
         self.distance = 0.0
         """Squared distance of the last measurement from what was expected, in variances."""
         self._settle()
@@ -150,7 +168,9 @@ class Hypotheses:
         often = np.full(m, (1.0 - LOSSES) / (m - 1))
         often[0] = LOSSES
         single = np.where(possible, self.settings.failures * often, 0.0)
-        both = np.where(possible[pairs, 0].all(axis=1), self.settings.failures * LOSSES * TOGETHER, 0.0)
+        both = np.where(
+            possible[pairs, 0].all(axis=1), self.settings.failures * LOSSES * TOGETHER, 0.0
+        )
         self._rate = np.append(single.ravel(), both)
         self._jump: Array = np.zeros((len(self._off), self.n_fins))
         """How the strengths (n,) of the beliefs begin to differ."""
@@ -163,7 +183,8 @@ class Hypotheses:
         self.doubt = float(self._probability.sum())
 
     def _begin_anew(self, seen: Array) -> None:
-        """Of the motion only what is measured (8,) is known; what has been learned of strengths stays."""
+        """Of the motion only what is measured (8,) is known; what has been learned of strengths
+        stays."""
         self.state[:8] = seen
         self.state[CURRENT] = 0.0
         self.state[TORQUE] = 0.0
@@ -174,7 +195,8 @@ class Hypotheses:
         self._settle()
 
     def _of_fins(self, values: Array) -> Array:
-        """The part (n, m, ...) that is about single fins of what there is for each belief (n m + p, ...)."""
+        """The part (n, m, ...) that is about single fins of what there is for each belief (n m + p,
+        ...)."""
         return values[: len(values) - len(self.pairs)].reshape(self.n_fins, -1, *values.shape[1:])
 
     def _of_pairs(self, values: Array) -> Array:
@@ -199,7 +221,8 @@ class Hypotheses:
         return total
 
     def feed(self, dt: float) -> Array:
-        """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
+        """What is taken for true may have ended just now; returns how much (n, m) of each belief is
+        new."""
         self._age_s += dt
         if not self.settled:
             opposed = self.off[:, OPPOSED].copy()
@@ -242,15 +265,17 @@ class Hypotheses:
     def update(self, seen: Array, slow: bool) -> None:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
-        Where the model says nothing of the motion any more, or what it says is no number, all hypotheses are
-        initialized again.
+        Where the model says nothing of the motion any more, or what it says is no number, all
+        hypotheses are initialized again.
         """
         if not max(self.covariance.diagonal()[MOTION].tolist()) < MOST_VARIANCE:
             return self._begin_anew(seen)
         rows, sensors = (slice(3, 8), self._slow_sensors) if slow else (slice(0, 8), self._sensors)
         seen_by = self.covariance[rows]
         inverse = np.linalg.inv(seen_by[:, rows] + sensors)
-        missed = (seen - self.state[:8])[rows] - self._rows[:, rows]  # the first is of what is taken for true
+        missed = (seen - self.state[:8])[rows] - self._rows[
+            :, rows
+        ]  # the first is of what is taken for true
         weighted = missed @ inverse
         distance = np.einsum("ij,ij->i", weighted, missed)
         # The built-in functions are quicker than numpy's for so few numbers.
@@ -294,7 +319,10 @@ class Hypotheses:
     def adopt(self, fin: int, kind: int) -> None:
         """One hypothesis is now taken for true, and all are initialized again."""
         self.state = self.state + self.off[fin, kind]
-        self._doubt(fin, self.settings.new_strength if 0 < kind < len(LEVELS) - 1 else self.settings.strength)
+        self._doubt(
+            fin,
+            self.settings.new_strength if 0 < kind < len(LEVELS) - 1 else self.settings.strength,
+        )
 
     def adopt_both(self, pair: int) -> None:
         """Two fins are now taken for lost, and all hypotheses are initialized again."""

@@ -1,10 +1,10 @@
 """The model behind `FaultMonitor`: a robot's next velocities, from what its actuators do.
 
-Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current, torques
-that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds
+Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current,
+torques that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds
 
-    velocity (3) and rates (3) in the body frame, roll and pitch (2), current (3) in the world, torque (3),
-    strength (n).
+    velocity (3) and rates (3) in the body frame, roll and pitch (2), current (3) in the world,
+    torque (3), strength (n).
 """
 
 from typing import NamedTuple
@@ -28,7 +28,8 @@ FIRST_FIN = 14
 STRENGTH = slice(FIRST_FIN, None)
 """Where what is in the state."""
 ABOUT_FACE = -0.9
-"""Cosine of the angle to a direction below which a fin that is to turn there may go either way round."""
+"""Cosine of the angle to a direction below which a fin that is to turn there may go either way
+round."""
 UNSURE_S = 1.2
 """How long its direction is unknown then [s]."""
 
@@ -39,12 +40,13 @@ class Step(NamedTuple):
     state: Array
     """The state (14 + n) at the end of the period."""
     transition: Array
-    """Its derivatives (14 + n, 14 + n) by the state at the beginning, but for what two rates do together and
-    for heeling out of the level."""
+    """Its derivatives (14 + n, 14 + n) by the state at the beginning, but for what two rates do
+    together and for heeling out of the level."""
     turned: Array
     """What the velocities (n, 6) gain besides if one fin points the other way, at strength 1."""
     noise: Array | None = None
-    """Covariance (6, 6) of what the velocities gain besides while a fin may turn either way round."""
+    """Covariance (6, 6) of what the velocities gain besides while a fin may turn either way
+    round."""
 
 
 class MotionModel:
@@ -64,8 +66,9 @@ class MotionModel:
         self._constant[range(3, 6), range(11, 14)] = period_s / self.inertia[3:]
         self._gain = period_s / self.inertia
         height = self._vehicle.dynamics.center[2]
-        # Roll swings within a second: an oscillation over a period is a turn, and a step along it would grow.
-        # (Of a robot that is heavy at the top the frequency is imaginary, and the cosine a hyperbolic one.)
+        # Roll swings within a second: an oscillation over a period is a turn, and a step along it
+        # would grow. (Of a robot that is heavy at the top the frequency is imaginary, and the
+        # cosine a hyperbolic one.)
         swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
         sine = np.sin(swing * period_s)
         cosine = np.cos(swing * period_s)
@@ -92,8 +95,8 @@ class MotionModel:
             state: z (14 + n) at the beginning.
             yaw: heading at its end [rad], as measured.
             command: (n, 3) in force over the period; NaN rows rest.
-            held: where actuators (n,) are believed to stick, as `ActuatorMotion.direction`; NaN where they
-                turn as commanded.
+            held: where actuators (n,) are believed to stick, as `ActuatorMotion.direction`; NaN
+                where they turn as commanded.
             other: where they might be instead; NaN likewise.
         """
         motion = state[MOTION].tolist()
@@ -107,7 +110,9 @@ class MotionModel:
         self._vehicle.current = tuple(current)
         thrust = state[STRENGTH] @ wrench
         thrust[3:] += state[TORQUE]
-        moved = self._vehicle.coarse_step([0.0, 0.0, 0.0, *quaternion, *motion], thrust.tolist(), self._dt)
+        moved = self._vehicle.coarse_step(
+            [0.0, 0.0, 0.0, *quaternion, *motion], thrust.tolist(), self._dt
+        )
         after = state.copy()
         after[:8] = (*moved[7:], *tilt_of(rotation_of_quaternion(*moved[3:7])))
         gained = wrench * self._gain
@@ -119,8 +124,10 @@ class MotionModel:
         return Step(after, transition, self._gain * turned, self._either_way())
 
     def _by_flow(self, flow: list[float]) -> Array:
-        """What velocities and rates gain over a period (6, 6) per unit of velocity in the water and of rate
-        (6,): damping, Coriolis' forces and Munk's moments: unknown water that streams past turns the robot.
+        """What velocities and rates gain over a period (6, 6) per unit of velocity in the water and
+        of rate
+        (6,): damping, Coriolis' forces and Munk's moments: unknown water that streams past turns
+        the robot.
         """
         by_flow = self._dt * np.array(jacobian(self._vehicle.dynamics, flow))
         own = by_flow.diagonal()
@@ -130,10 +137,15 @@ class MotionModel:
         by_flow[range(6), range(6)] = decay
         return by_flow
 
-    def _wrenches(self, command: Array, held: Array, other: Array, flow: Array) -> tuple[Array, Array]:
-        """Wrench (n, 6) of each actuator at full strength, mean over the period, and what it gains turned."""
+    def _wrenches(
+        self, command: Array, held: Array, other: Array, flow: Array
+    ) -> tuple[Array, Array]:
+        """Wrench (n, 6) of each actuator at full strength, mean over the period, and what it gains
+        turned."""
         moves = self.motion
-        facing = (np.cos(moves.held_part(command) - moves.direction) < ABOUT_FACE) & moves.turns_fully
+        facing = (
+            np.cos(moves.held_part(command) - moves.direction) < ABOUT_FACE
+        ) & moves.turns_fully
         moves.step(command, self._dt)
         if self._any_unsure or True in facing.tolist():
             self._unsure_s -= self._dt
@@ -153,7 +165,8 @@ class MotionModel:
         return mean[0], mean[1] - mean[0]
 
     def _either_way(self) -> Array | None:
-        """What the velocities may gain besides (6, 6), a covariance, by fins that had to turn around."""
+        """What the velocities may gain besides (6, 6), a covariance, by fins that had to turn
+        around."""
         if not self._any_unsure:
             return None
         most = 2.0 * np.linalg.norm(self._thrust[self.unsure], axis=-1)

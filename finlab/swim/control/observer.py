@@ -1,10 +1,10 @@
 """Place, motion and disturbances of a robot, from sensors and from its own model.
 
-An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge, heave and
-yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the current, which shows in
-how the water carries the robot sideways. It is carried on by what the actuators give, not by what was asked
-of them, so nothing winds up where a wrench is out of reach. Pose comes from these velocities, corrected
-slowly by markers, pressure and the IMU's tilt.
+An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge,
+heave and yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the
+current, which shows in how the water carries the robot sideways. It is carried on by what the
+actuators give, not by what was asked of them, so nothing winds up where a wrench is out of reach.
+Pose comes from these velocities, corrected slowly by markers, pressure and the IMU's tilt.
 """
 
 import math
@@ -31,19 +31,21 @@ CURRENT = slice(7, 9)
 DRIVEN = [0, 2, 3]
 """Where what is in the state, and which of the motions the unknown accelerations (3,) change."""
 UNKNOWN_FORCE = 0.006
-"""Unknown force that comes and goes, per root of a second, as a share of what all fins can give together."""
+"""Unknown force that comes and goes, per root of a second, as a share of what all fins can give
+together."""
 UNKNOWN_BY_RUDDERS = 0.15
-"""The same of a robot that rudders steer: their force goes with the square of a speed, and moments of the
-water on the hull outweigh it."""
+"""The same of a robot that rudders steer: their force goes with the square of a speed, and moments
+of the water on the hull outweigh it."""
 LASTING_FORCE = 0.003
 """The same of the change of what stays."""
 CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
 """Expected current [m/s], and its change per root of a second."""
 VELOCITY_NOISE, RATE_NOISE = 0.02, 0.04
-"""Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat adds."""
+"""Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat
+adds."""
 ASTRAY = 1.0
-"""A motion [m/s, rad/s] this far from the one that is seen tells nothing of unknown forces: the model cannot
-follow, as of a robot that water stops within a period."""
+"""A motion [m/s, rad/s] this far from the one that is seen tells nothing of unknown forces: the
+model cannot follow, as of a robot that water stops within a period."""
 CRUISE = 1.0
 """Speed [m/s] at which the strength of rudders counts."""
 OLDEST_S = 0.5
@@ -78,8 +80,8 @@ class Estimate(NamedTuple):
     pitch_inertia: float
     """Moment of inertia about y with that of the water that goes along [kg m^2]."""
     drift: Array
-    """Acceleration (4,) along surge, sway, heave and yaw that there would be without any thrust [m/s^2,
-    rad/s^2]."""
+    """Acceleration (4,) along surge, sway, heave and yaw that there would be without any thrust
+    [m/s^2, rad/s^2]."""
 
 
 class MotionObserver:
@@ -110,14 +112,16 @@ class MotionObserver:
         self._poses: deque[Array] = deque(maxlen=max(1, math.ceil(OLDEST_S / period_s)))
         self._motions: deque[Array] = deque(maxlen=self._poses.maxlen)
         self._state = np.zeros(9)
-        self._first = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
+        self._first = np.diag(
+            [*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2]
+        )
         self._covariance = self._first
         self._last_velocity: Array | None = None
         self._estimate: Estimate | None = None
 
     def step(self, measurement: Measurement, wrench: Array) -> Estimate:
-        """Takes a measurement and the wrench (6,) that the fins have given since the last one, as far as
-        known [N, N m]; returns what is believed."""
+        """Takes a measurement and the wrench (6,) that the fins have given since the last one, as
+        far as known [N, N m]; returns what is believed."""
         m = measurement
         before = self._estimate
         pose = np.array([m.position[0], m.position[1], -m.depth, m.roll, m.pitch, m.yaw])
@@ -134,7 +138,9 @@ class MotionObserver:
             counted = np.array([x, y, z, roll, pitch, yaw])
             counted[:3] += dt * in_world(self._state, roll, pitch, yaw)
             marker, pressure, _, imu = m.ages
-            missed = pose - self._then(self._poses, counted, [marker, marker, pressure, imu, imu, marker])
+            missed = pose - self._then(
+                self._poses, counted, [marker, marker, pressure, imu, imu, marker]
+            )
             missed[5] = float(wrapped(missed[5]))
             pose = counted + self._shares * missed
         self._poses.appendleft(pose)
@@ -145,8 +151,8 @@ class MotionObserver:
         return self._estimate
 
     def _then(self, past: deque[Array], now: Array, ages: Sequence[float]) -> Array:
-        """What each of some values was when a sample of it was taken, `ages` [s] ago, between what was
-        believed period by period; a sample is held against that, which moves it on to now."""
+        """What each of some values was when a sample of it was taken, `ages` [s] ago, between what
+        was believed period by period; a sample is held against that, which moves it on to now."""
         if not any(ages):
             return now
         known = np.array([now, *past])
@@ -158,21 +164,22 @@ class MotionObserver:
         return np.asarray(after + (back - row) * (before - after))
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
-        """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
-        the water [m/s]."""
+        """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a
+        speed through the water [m/s]."""
         damping = damping_rates(self._dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
         pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
         return math.exp(-self._dt * damping) * sway - self._dt * pushed
 
     def slowed_by(self, motion: Array) -> Array:
-        """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge, sway, heave
-        and yaw [m/s^2, rad/s^2]."""
+        """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge,
+        sway, heave and yaw [m/s^2, rad/s^2]."""
         surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
         rates = damping_rates(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         return np.stack([rates[k] for k in AXES], axis=-1) * motion
 
     def wrenches_along(self, setpoints: Sequence[Setpoint], current: Array, slow: float) -> Array:
-        """Wrenches (K, 6) [N, N m] of a robot that moves as K setpoints say, at least two, nose ahead.
+        """Wrenches (K, 6) [N, N m] of a robot that moves as K setpoints say, at least two, nose
+        ahead.
 
         Args:
             setpoints: a period apart.
@@ -188,7 +195,9 @@ class MotionObserver:
         faster = (x * ax + y * ay) / np.maximum(speed, 1e-3)
         rest = np.zeros(len(speed))
         motion = np.stack([speed, rest, velocity[:, 2], turning], axis=-1)
-        changes = np.stack([faster, rest, acceleration[:, 2], np.gradient(turning, self._dt)], axis=-1)
+        changes = np.stack(
+            [faster, rest, acceleration[:, 2], np.gradient(turning, self._dt)], axis=-1
+        )
         result = np.zeros((len(speed), 6))
         result[:, AXES] = self.inertia * (changes + self.slowed_by(motion))
         return result
@@ -234,14 +243,18 @@ class MotionObserver:
         self._state += gain @ missed[rows]
         self._covariance = covariance - gain @ covariance[rows]
 
-    def _believed(self, m: Measurement, position: Array, roll: float, pitch: float, yaw: float) -> Estimate:
+    def _believed(
+        self, m: Measurement, position: Array, roll: float, pitch: float, yaw: float
+    ) -> Estimate:
         u, v, w, r, by_surge, by_heave, by_yaw, c, d = self._state.tolist()
         attitude = quaternion_of(roll, pitch, yaw)
         self._vehicle.current = (c, d, 0.0)
         jacobian = self._vehicle.derivative(
             [0.0, 0.0, 0.0, *attitude, u, v, w, *m.rates[:2].tolist(), r], (0.0,) * 6
         )
-        drift = np.array([jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw])
+        drift = np.array(
+            [jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw]
+        )
         velocity = self._state[:3].copy()
         current = self._state[CURRENT].copy()
         world = in_world(velocity, roll, pitch, yaw)
@@ -250,8 +263,8 @@ class MotionObserver:
 
 
 def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
-    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for it, at
-    a speed [m/s] that counts for rudders."""
+    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for
+    it, at a speed [m/s] that counts for rudders."""
     effectiveness = plant_of(layout).effectiveness
     reach = np.zeros(6)
     for part, own in zip(layout.actuators, effectiveness, strict=True):

@@ -26,11 +26,12 @@ SIZES = 24
 
 
 class Probe:
-    """Pushes for the fins of one layout, up or down: that heels the hull, which its gyros feel at once and
-    its weight rights again, and hardly moves it from its course."""
+    """Pushes for the fins of one layout, up or down: that heels the hull, which its gyros feel at
+    once and its weight rights again, and hardly moves it from its course."""
 
     def __init__(self, layout: Layout, settings: MonitorSettings, period_s: float) -> None:
-        """Takes the layout, how often and how strongly it may push, and the time between calls [s]."""
+        """Takes the layout, how often and how strongly it may push, and the time between calls
+        [s]."""
         self._plant = plant_of(layout)
         self._amplitude = layout.lower[:, 0] + 0.75 * (layout.upper[:, 0] - layout.lower[:, 0])
         share = np.linspace(0.0, 1.0, SIZES)[:, None]
@@ -85,8 +86,9 @@ class Probe:
         return row[0], row[1], row[2]
 
     def _pushing(self, command: Array) -> Array:
-        """Fins that are commanded to push less than is needed to be known push more, each the other way than
-        those before it, so that together they lift little; a side is kept until a fin is busy again."""
+        """Fins that are commanded to push less than is needed to be known push more, each the other
+        way than those before it, so that together they lift little; a side is kept until a fin is
+        busy again."""
         known = np.isfinite(command[:, 0])
         force = self._plant.force(np.where(known[:, None], command, 0.0))
         ahead = force[:, 1]
@@ -104,7 +106,8 @@ class Probe:
         return result
 
     def _command(self, fin: int, ahead: float, up: float) -> tuple[float, float, float]:
-        """What a fin has to do for a force [N] in its plane, about: by the thrust at zero direction 0."""
+        """What a fin has to do for a force [N] in its plane, about: by the thrust at zero direction
+        0."""
         size = math.hypot(ahead, up)
         frequency = float(np.interp(size, self._thrust[:, fin], self._frequency[:, fin]))
         direction = math.atan2(up, ahead)

@@ -1,8 +1,9 @@
-"""First estimates of a robot's dynamics from its hull: mass, inertia, added mass, damping, buoyancy.
+"""First estimates of a robot's dynamics from its hull: mass, inertia, added mass, damping,
+buoyancy.
 
-Every figure is that of a simple body: a solid of one density, or the ellipsoid that stands for the hull. They
-are where a design starts; a swim (`finlab fit robot`) tells the truth. Order of six: surge, sway, heave,
-roll, pitch, yaw.
+Every figure is that of a simple body: a solid of one density, or the ellipsoid that stands for the
+hull. They are where a design starts; a swim (`finlab fit robot`) tells the truth. Order of six:
+surge, sway, heave, roll, pitch, yaw.
 """
 
 import math
@@ -54,7 +55,9 @@ class HullSolid:
         volume = float(solid.volume)
         inertia = np.diag(np.asarray(solid.inertia))
         if not volume > 1e-9:
-            raise FinlabError(f"the hull encloses {volume:.3g} m^3; expected a closed surface, outside out")
+            raise FinlabError(
+                f"the hull encloses {volume:.3g} m^3; expected a closed surface, outside out"
+            )
         sizes = area(points)
         local = points - solid.center_mass
         spread = ((local**2).sum(axis=1) + local.sum(axis=1) ** 2) / 12.0
@@ -63,13 +66,13 @@ class HullSolid:
         return HullSolid(volume, solid.center_mass, moments, wetted, sizes @ spread / wetted)
 
     def inertia(self, mass: float) -> Array:
-        """Moments of inertia (3,) [kg m^2] about the centre of the volume of a solid of this mass [kg] and of
-        one density: m (y^2 + z^2) and so on, in the mean over the volume."""
+        """Moments of inertia (3,) [kg m^2] about the centre of the volume of a solid of this mass
+        [kg] and of one density: m (y^2 + z^2) and so on, in the mean over the volume."""
         return np.asarray(mass * (self.moments.sum() - self.moments))
 
     def ellipsoid(self) -> Array:
-        """Half axes (3,) [m] of the ellipsoid that stands for the hull: of its volume, its axes to each other
-        as the hull spreads along x, y and z. For an ellipsoid it is the hull itself."""
+        """Half axes (3,) [m] of the ellipsoid that stands for the hull: of its volume, its axes to
+        each other as the hull spreads along x, y and z. For an ellipsoid it is the hull itself."""
         spread = np.sqrt(self.moments)
         size = (self.volume / (4.0 / 3.0 * math.pi * spread.prod())) ** (1.0 / 3.0)
         return np.asarray(size * spread)
@@ -78,8 +81,8 @@ class HullSolid:
 def ellipsoid_added_mass(half: ArrayLike, density: float = WATER) -> Array:
     """Added mass [kg] and added inertia [kg m^2] (6,) of an ellipsoid in unbounded ideal fluid.
 
-    H. Lamb, Hydrodynamics, 6th ed. (1932), art. 114 and 115; the integrals alpha_0, beta_0, gamma_0 are
-    Carlson's R_D. A sphere has half of its displaced mass, and none that turns with it.
+    H. Lamb, Hydrodynamics, 6th ed. (1932), art. 114 and 115; the integrals alpha_0, beta_0, gamma_0
+    are Carlson's R_D. A sphere has half of its displaced mass, and none that turns with it.
 
     Args:
         half: half axes (3,) along x, y and z [m].
@@ -104,15 +107,15 @@ def ellipsoid_added_mass(half: ArrayLike, density: float = WATER) -> Array:
 
 
 def pressure_damping(half: Array, density: float = WATER) -> Array:
-    """Quadratic damping (6,) [N s^2/m^2], then [N m s^2], of an ellipsoid of half axes (3,) [m]: the pressure
-    that is lost where the flow leaves a blunt stern.
+    """Quadratic damping (6,) [N s^2/m^2], then [N m s^2], of an ellipsoid of half axes (3,) [m]:
+    the pressure that is lost where the flow leaves a blunt stern.
 
-    Along an axis 1/2 rho C A with C = 0.44 d / l, S. F. Hoerner, Fluid-Dynamic Drag (1965), chapter 3 (bodies
-    below the critical Reynolds number; 0.44 is the sphere), at most that of a disc across the flow, 1.17. l
-    is the length along the flow, d = 2 sqrt(b c) across it. About an axis by strips, each in its own cross-
-    flow (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 6.4): 1/2
-    rho C int |x|^3 2 h(x) dx. The round core, which turns without pushing water aside, is left out, so that a
-    sphere has none."""
+    Along an axis 1/2 rho C A with C = 0.44 d / l, S. F. Hoerner, Fluid-Dynamic Drag (1965), chapter
+    3 (bodies below the critical Reynolds number; 0.44 is the sphere), at most that of a disc across
+    the flow, 1.17. l is the length along the flow, d = 2 sqrt(b c) across it. About an axis by
+    strips, each in its own cross- flow (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
+    Motion Control, 2nd ed., section 6.4): 1/2 rho C int |x|^3 2 h(x) dx. The round core, which
+    turns without pushing water aside, is left out, so that a sphere has none."""
     areas = np.array([np.delete(half, axis).prod() for axis in range(3)])
     along = np.minimum(DISC, BLUNT * np.sqrt(areas) / half)
     about = []
@@ -124,12 +127,15 @@ def pressure_damping(half: Array, density: float = WATER) -> Array:
     return 0.5 * density * np.append(math.pi * along * areas, about)
 
 
-def friction_damping(solid: HullSolid, speed: float = DESIGN_SPEED, density: float = WATER) -> Array:
-    """Linear damping (6,) [N s/m], then [N m s], by the water's friction on the hull at a speed [m/s].
+def friction_damping(
+    solid: HullSolid, speed: float = DESIGN_SPEED, density: float = WATER
+) -> Array:
+    """Linear damping (6,) [N s/m], then [N m s], by the water's friction on the hull at a speed
+    [m/s].
 
-    1/2 rho C_f S U per speed with C_f = 1.328 / sqrt(Re) of a flat plate in laminar flow (H. Blasius, 1908),
-    Re by the length of the ellipsoid; about an axis each bit of the surface counts with the square of its
-    distance."""
+    1/2 rho C_f S U per speed with C_f = 1.328 / sqrt(Re) of a flat plate in laminar flow (H.
+    Blasius, 1908), Re by the length of the ellipsoid; about an axis each bit of the surface counts
+    with the square of its distance."""
     length = 2.0 * max(solid.ellipsoid())
     coefficient = 1.328 / math.sqrt(speed * length / VISCOSITY)
     per_speed = 0.5 * density * coefficient * solid.area * speed
@@ -161,21 +167,22 @@ def displaced(layout: Layout) -> float:
 
 
 def lift_of(body: Body) -> float:
-    """Returns the buoyant force [N]: the weight where none is given, 0 where no mass is known either."""
+    """Returns the buoyant force [N]: the weight where none is given, 0 where no mass is known
+    either."""
     return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
 
 
 def contradicts(layout: Layout) -> bool:
-    """Says whether the body's mass is known, and its buoyancy differs by more than a tenth from that of the
-    hull. Raises FinlabError: the hull encloses nothing."""
+    """Says whether the body's mass is known, and its buoyancy differs by more than a tenth from
+    that of the hull. Raises FinlabError: the hull encloses nothing."""
     body = layout.body or Body()
     water = displaced(layout)
     return body.mass_kg is not None and abs(lift_of(body) / GRAVITY - water) > DOUBTFUL * water
 
 
 def estimated(layout: Layout) -> Layout:
-    """Returns the layout with what its hull says of the body, to four digits; a mass that is known stays.
-    Raises FinlabError: the hull encloses nothing."""
+    """Returns the layout with what its hull says of the body, to four digits; a mass that is known
+    stays. Raises FinlabError: the hull encloses nothing."""
     solid = solid_of(hull_of(layout))
     density = water_density(layout)
     body = layout.body or Body()

@@ -1,4 +1,5 @@
-"""Mesh files (STL, OBJ, GLB, PLY) as hulls: what is read of one, what is mended, what is refused, and why."""
+"""Mesh files (STL, OBJ, GLB, PLY) as hulls: what is read of one, what is mended, what is refused,
+and why."""
 
 import json
 import re
@@ -34,8 +35,8 @@ class Mesh(NamedTuple):
 
 
 def check_glb(name: str, content: bytes) -> None:
-    """Refuse a GLB whose accessors or instances ask for far more than it holds; what is no GLB passes. Raises
-    FinlabError: the sentence says how much, and calls the file `name`."""
+    """Refuse a GLB whose accessors or instances ask for far more than it holds; what is no GLB
+    passes. Raises FinlabError: the sentence says how much, and calls the file `name`."""
     try:
         length, kind = struct.unpack("<I4s", content[12:20])
         document = json.loads(content[20 : 20 + length]) if kind == b"JSON" else {}
@@ -52,7 +53,8 @@ def check_glb(name: str, content: bytes) -> None:
         )
     if triangles > (most := max(FREE_TRIANGLES, len(content) // BYTES_PER_TRIANGLE)):
         raise FinlabError(
-            f"{name}: has {triangles:,} triangles with its instances, expected at most {most:,}; simplify it"
+            f"{name}: has {triangles:,} triangles with its instances, expected at most {most:,}; "
+            "simplify it"
         )
 
 
@@ -64,7 +66,8 @@ def _triangles(mesh: Any, counts: list[int]) -> int:
 
 MAX_BYTES = 20_000_000
 MAX_FACES = 60_000
-"""Most triangles of a hull; more would make the page slow and show nothing new, so they are simplified."""
+"""Most triangles of a hull; more would make the page slow and show nothing new, so they are
+simplified."""
 SMALLEST, LARGEST = 0.02, 10.0
 """Lengths [m] that a hull may have; anything else is a mistaken unit."""
 OPEN = 0.02
@@ -86,8 +89,9 @@ class MeshReport:
 
 
 def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport]:
-    """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin. Raises
-    FinlabError: too large, no closed mesh, or of a size that no hull has; the message names the file.
+    """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin.
+    Raises FinlabError: too large, no closed mesh, or of a size that no hull has; the message names
+    the file.
 
     Args:
         name: the file's name; its suffix gives the format.
@@ -101,7 +105,8 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     loose = int((edges == 1).sum())
     if len(mesh.faces) == 0 or loose > OPEN * len(edges):
         raise FinlabError(
-            f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle only; "
+            f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle "
+            "only; "
             "give it a thickness, or close it"
         )
     low = vertices.min(axis=0)
@@ -127,8 +132,8 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
         check_glb(name, content)
     try:
         content = _PARTS.sub(b"", content) if kind == ".obj" else content
-        # Without a resolver nothing beside this file is read: no textures, no materials. Without processing,
-        # corners that are no numbers are not quietly left out.
+        # Without a resolver nothing beside this file is read: no textures, no materials. Without
+        # processing, corners that are no numbers are not quietly left out.
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh()
@@ -136,16 +141,24 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
         corners = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # trimesh's readers raise whatever went wrong inside them
         reason = str(error).split("\n")[0][:120]
-        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({reason})") from None
+        raise FinlabError(
+            f"{name}: is not a {kind[1:].upper()} mesh that can be read ({reason})"
+        ) from None
     if len(faces) == 0:
         raise FinlabError(f"{name}: holds no triangles")
-    if faces.shape[1:] != (3,) or corners.shape[1:] != (3,) or faces.min() < 0 or faces.max() >= len(corners):
+    if (
+        faces.shape[1:] != (3,)
+        or corners.shape[1:] != (3,)
+        or faces.min() < 0
+        or faces.max() >= len(corners)
+    ):
         raise FinlabError(f"{name}: holds triangles whose corners are not there; export it again")
     # Beyond any unit's size, what trimesh makes of corners overflows.
     wrong = int((~(np.abs(corners) < 1e9).all(axis=1)).sum())
     if wrong:
         raise FinlabError(
-            f"{name}: {wrong} of its {len(corners)} corners are not finite, or too far; export it again"
+            f"{name}: {wrong} of its {len(corners)} corners are not finite, or too far; export it "
+            "again"
         )
     return mesh
 
@@ -161,8 +174,13 @@ def _mended(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     filled = len(mesh.faces) - kept
     normals = np.array(mesh.face_normals)
     trimesh.repair.fix_normals(mesh)
-    turned = int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
-    counts = {"without an area or twice there left out": before - kept, "added to close holes": filled}
+    turned = (
+        int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
+    )
+    counts = {
+        "without an area or twice there left out": before - kept,
+        "added to close holes": filled,
+    }
     counts["turned outwards"] = turned
     return tuple(f"{n} triangle{'s' * (n != 1)} {what}" for what, n in counts.items() if n)
 

@@ -1,4 +1,5 @@
-"""The closed surface of a hull, which can be asked where it is: from a shape, a mesh file, or made up."""
+"""The closed surface of a hull, which can be asked where it is: from a shape, a mesh file, or made
+up."""
 
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -28,7 +29,9 @@ def triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
     return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int32)
 
 
-def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48) -> Mesh:
+def revolved(
+    x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48
+) -> Mesh:
     """A closed body along the x axis whose cross-section at `x` is a superellipse.
 
     Args:
@@ -43,12 +46,15 @@ def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sid
     sin = np.sin(turn)
     unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
     unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
-    x, y, z = np.broadcast_arrays(x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z)
+    x, y, z = np.broadcast_arrays(
+        x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z
+    )
     return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), grid_faces(len(x), sides))
 
 
 STATIONS: Array = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
-"""Positions along a hull of half length 1, closer together towards the ends where it curves most."""
+"""Positions along a hull of half length 1, closer together towards the ends where it curves
+most."""
 ACROSS = {"box": 5.0, "ellipsoid": 2.0, "torpedo": 2.0, "ucat": 3.2}
 ALONG = {"box": 6.0, "ellipsoid": 2.0, "ucat": 3.0}
 """Powers of the superellipses across and along each shape; a torpedo has a profile of its own."""
@@ -115,16 +121,19 @@ class Surface:
     @staticmethod
     @lru_cache(maxsize=8)
     def of_file(path: str, scale: float, center: Three) -> "Surface":
-        """The surface in a mesh file, the middle of its box at `center` [m]. Raises FinlabError: the file
-        cannot be read or is no sensible hull."""
+        """The surface in a mesh file, the middle of its box at `center` [m]. Raises FinlabError:
+        the file cannot be read or is no sensible hull."""
         file = Path(path)
-        mesh, report = read_mesh(file.name, read_file(file, MAX_BYTES, "a mesh file", FinlabError), scale)
+        mesh, report = read_mesh(
+            file.name, read_file(file, MAX_BYTES, "a mesh file", FinlabError), scale
+        )
         x, y, z = (float(v) for v in np.ptp(mesh.vertices, axis=0) / 2)
         moved = Mesh(mesh.vertices + np.array(center), mesh.faces)
         return Surface("mesh", (x, y, z), center, moved, (path, scale), report)
 
     def coarse(self) -> "Surface":
-        """Returns about the same one with at most 400 triangles, for questions asked thousands of times."""
+        """Returns about the same one with at most 400 triangles, for questions asked thousands of
+        times."""
         return replace(self, mesh=simplified(self.mesh, COARSE_FACES))
 
     @cached_property
@@ -135,10 +144,13 @@ class Surface:
         return corners[good], normal
 
     def nearest(self, point: Array) -> tuple[Array, Array]:
-        """Returns the point (3,) [m] of the surface nearest to `point` (3,) [m], and the outward unit normal
+        """Returns the point (3,) [m] of the surface nearest to `point` (3,) [m], and the outward
+        unit normal
         (3,) there; on an edge the mean of those around it."""
         corners, outward = self._triangles
-        nearest = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+        nearest = closest_point(
+            corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3))
+        )
         gap = np.linalg.norm(nearest - point, axis=1)
         best = int(np.argmin(gap))
         normal = outward[gap < gap[best] + 1e-6].sum(axis=0)
@@ -148,8 +160,8 @@ class Surface:
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Returns which of the points (..., 3) [m], body frame, lie inside (...,).
 
-        Of a shape, which is convex, those behind all triangles; of a mesh those around which the triangles
-        fill the whole sphere, by solid angles after Van Oosterom and Strackee (1983).
+        Of a shape, which is convex, those behind all triangles; of a mesh those around which the
+        triangles fill the whole sphere, by solid angles after Van Oosterom and Strackee (1983).
         """
         points = np.asarray(points, dtype=float)
         if self.shape != "mesh":
@@ -163,11 +175,14 @@ class Surface:
         a, b, c = np.swapaxes(self._triangles[0] - point, 0, 1)
         u, v, w = (np.linalg.norm(side, axis=1) for side in (a, b, c))
         volume = (a * np.cross(b, c)).sum(axis=1)
-        scale = u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
+        scale = (
+            u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
+        )
         return abs(2.0 * float(np.arctan2(volume, scale).sum()))
 
     def anchor(self, point: Array) -> Array:
-        """Returns where a strut from a point (3,) meets the surface (3,) [m]; the point itself if inside."""
+        """Returns where a strut from a point (3,) meets the surface (3,) [m]; the point itself if
+        inside."""
         return _anchor(self, tuple(np.asarray(point).tolist())).copy()
 
 
@@ -179,12 +194,14 @@ def _anchor(surface: Surface, place: tuple[float, ...]) -> Array:
 
 
 def hull_of(layout: Layout) -> Surface:
-    """Returns the hull that the layout describes, body frame [m], or one that fits between its actuators
-    where it describes none, or names a mesh file that cannot be read."""
+    """Returns the hull that the layout describes, body frame [m], or one that fits between its
+    actuators where it describes none, or names a mesh file that cannot be read."""
     described = layout.body.hull if layout.body is not None else None
     if described is not None and described.mesh is not None:
         x, y, z = described.center_m
-        with suppress(FinlabError):  # the file may be on another computer; a made-up hull is better than none
+        with suppress(
+            FinlabError
+        ):  # the file may be on another computer; a made-up hull is better than none
             return Surface.of_file(described.mesh, described.scale, (x, y, z))
     elif described is not None and described.shape is not None and described.size_m is not None:
         length, width, height = described.size_m

@@ -1,10 +1,12 @@
-"""Output error over short windows: unknowns with which simulated swims come nearest to the measured ones.
+"""Output error over short windows: unknowns with which simulated swims come nearest to the measured
+ones.
 
-A swim is cut into windows of some seconds, and each begins in a state of its own, which is looked for, too:
-noise of sensors then biases nothing, and no error grows for longer than a window (multiple shooting, see
-L. Ljung, System Identification, 2nd ed., and H. G. Bock 1983). Gauss-Newton steps with Levenberg's damping;
-derivatives by differences, all swims integrated side by side; the windows' states are eliminated from the
-normal equations. Each unknown is believed to lie within its scale of what the layout says.
+A swim is cut into windows of some seconds, and each begins in a state of its own, which is looked
+for, too: noise of sensors then biases nothing, and no error grows for longer than a window
+(multiple shooting, see L. Ljung, System Identification, 2nd ed., and H. G. Bock 1983). Gauss-Newton
+steps with Levenberg's damping; derivatives by differences, all swims integrated side by side; the
+windows' states are eliminated from the normal equations. Each unknown is believed to lie within its
+scale of what the layout says.
 """
 
 from dataclasses import dataclass
@@ -40,8 +42,8 @@ CLIP = 4.0
 
 
 class Windows(NamedTuple):
-    """W windows of L steps: which of all swims each step is (W, L), measurements (L, 12, W), NaN where a swim
-    does not fill them, and the smoothed state at the beginning (12, W)."""
+    """W windows of L steps: which of all swims each step is (W, L), measurements (L, 12, W), NaN
+    where a swim does not fill them, and the smoothed state at the beginning (12, W)."""
 
     step: NDArray[np.intp]
     measured: Array
@@ -50,26 +52,29 @@ class Windows(NamedTuple):
 
 @dataclass(frozen=True)
 class Fitted:
-    """Unknowns, a vector (size,) in scales, and the problem near them, the windows' beginnings eliminated."""
+    """Unknowns, a vector (size,) in scales, and the problem near them, the windows' beginnings
+    eliminated."""
 
     unknowns: Unknowns
     vector: Array
     start: Array
     """States in which the windows begin (12, W)."""
     cost: Array
-    """Half the sum of squares (1,), whose gradient (size,), downwards, and second derivatives by the unknowns
-    (size, size), with what was believed before, are next."""
+    """Half the sum of squares (1,), whose gradient (size,), downwards, and second derivatives by
+    the unknowns (size, size), with what was believed before, are next."""
     gradient: Array
     information: Array
     own_information: Array
-    """What each window brings to the second derivatives (W, size, size), and to the gradient (W, size)."""
+    """What each window brings to the second derivatives (W, size, size), and to the gradient (W,
+    size)."""
     scores: Array
     residual: Array
-    """Measured less simulated, in deviations (L, 12, W), NaN where nothing was measured; simulated states."""
+    """Measured less simulated, in deviations (L, 12, W), NaN where nothing was measured; simulated
+    states."""
     state: Array
     inner: Array
-    """Inverse second derivatives by the beginnings (W, 12, 12), those by beginnings and unknowns (W, 12,
-    size), and the gradient by the beginnings (W, 12), downwards."""
+    """Inverse second derivatives by the beginnings (W, 12, 12), those by beginnings and unknowns
+    (W, 12, size), and the gradient by the beginnings (W, 12), downwards."""
     mixed: Array
     pull: Array
 
@@ -97,10 +102,15 @@ def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
 
 
 def fit_windows(
-    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array, start: Array
+    model: RobotModel,
+    unknowns: Unknowns,
+    windows: Windows,
+    deviation: Array,
+    vector: Array,
+    start: Array,
 ) -> Fitted:
-    """Unknowns from windows, by the standard deviation of each channel (12,), from a vector (size,) on and
-    from the beginnings of the windows `start` (12, W)."""
+    """Unknowns from windows, by the standard deviation of each channel (12,), from a vector (size,)
+    on and from the beginnings of the windows `start` (12, W)."""
     problem = _Problem(model, unknowns, windows, deviation)
 
     def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
@@ -111,11 +121,15 @@ def fit_windows(
     return levenberg_marquardt(problem.at(vector, start), moved, MOST_STEPS, DAMPING, SETTLED)
 
 
-def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str) -> Array:
-    """By how much a block beside `BASE` would lessen half the squared residuals of windows not seen (W,).
+def unseen_gain(
+    model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str
+) -> Array:
+    """By how much a block beside `BASE` would lessen half the squared residuals of windows not seen
+    (W,).
 
-    Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
-    equations of all windows but those of a fold tell the change of the unknowns, with the block and without.
+    Cross-validation to second order about the fit: the windows are dealt to some folds, and the
+    normal equations of all windows but those of a fold tell the change of the unknowns, with the
+    block and without.
     """
     more = Unknowns(model.blocks, (*BASE, name))
     vector = np.pad(fitted.vector, (0, more.size - len(fitted.vector)))
@@ -166,7 +180,9 @@ class _Problem:
         for k in range(12):
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
         bodies = Dynamics(*(part[..., None] for part in self.model.bodies(unknowns, vectors)))
-        state = integrate(begin, wrench, bodies, unknowns.of("current", vectors).T[..., None], STEP_S)
+        state = integrate(
+            begin, wrench, bodies, unknowns.of("current", vectors).T[..., None], STEP_S
+        )
         sensed = self.model.sensed(unknowns, vectors, state)
         away = windows.measured - sensed[:, :, 0]
         away[:, ANGLES] = wrapped(away[:, ANGLES])
@@ -174,7 +190,9 @@ class _Problem:
         left, weight = _huber(residual)
         slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
         slopes *= (weight / self.deviation[:, None])[:, :, None]
-        by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
+        by = (
+            np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)
+        )  # (W, n + 12, L 12)
         r = np.moveaxis(left, 2, 0).reshape(w, -1)
         scaled = by[:, n:]
         begun = (start - windows.start).T / START_DEVIATION
@@ -183,17 +201,22 @@ class _Problem:
         mixed = scaled @ by[:, :n].swapaxes(1, 2)
         own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
         own -= mixed.swapaxes(1, 2) @ inner @ mixed
-        scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
+        scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum(
+            "wkn,wkl,wl->wn", mixed, inner, pull
+        )
         believed = unknowns.believed
         cost = 0.5 * float((left**2).sum() + (begun**2).sum() + vector @ believed @ vector)
         cost_of_all = np.array([cost if np.isfinite(sensed).all() else np.inf])
         slopes_of_all = scores.sum(axis=0) - believed @ vector
         information = own.sum(axis=0) + believed
         solved = (cost_of_all, slopes_of_all, information, own, scores)
-        return Fitted(unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull)
+        return Fitted(
+            unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull
+        )
 
     def _wrenches(self, vectors: Array) -> Array:
-        """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
+        """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry
+        each."""
         first = self.model.wrench(self.unknowns, vectors[0])[self.windows.step]
         wrench = np.empty((*first.shape, len(vectors)))
         wrench[:] = first[..., None]
@@ -204,8 +227,8 @@ class _Problem:
 
 
 def _huber(residual: Array) -> tuple[Array, Array]:
-    """Signed roots of Huber's loss, whose squares grow linearly beyond `CLIP`, and their slopes; 0 where
-    nothing was measured."""
+    """Signed roots of Huber's loss, whose squares grow linearly beyond `CLIP`, and their slopes; 0
+    where nothing was measured."""
     size = np.abs(np.nan_to_num(residual))
     root = np.sqrt(np.where(size > CLIP, 2.0 * CLIP * size - CLIP**2, size**2))
     slope = np.where(size > CLIP, CLIP / np.maximum(root, CLIP), np.isfinite(residual))

@@ -1,7 +1,8 @@
-"""A fitted robot: its actuators and how sure they are, its layout with tables of fins, and words on it.
+"""A fitted robot: its actuators and how sure they are, its layout with tables of fins, and words on
+it.
 
-A robot can learn its actuators while it swims: every minute the last four are fitted, and what their
-strengths and directions turn out to be is what allocation works with from then on.
+A robot can learn its actuators while it swims: every minute the last four are fitted, and what
+their strengths and directions turn out to be is what allocation works with from then on.
 """
 
 import os
@@ -31,12 +32,13 @@ OTHER_LAW = "thrust that grows otherwise with amplitude and frequency"
 GRID = (17, 17, 16)
 """Amplitudes, frequencies and zero directions of a fin that becomes a table."""
 DEFLECTIONS = (3.0, 0.03)
-"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
-smaller one."""
+"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew
+looks like a smaller one."""
 
 
 def summary(fit: RobotFit) -> tuple[str, ...]:
-    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if
+    so."""
     doubts = fit.doubts()
     unknown = fit.untold()
     seconds = 0.1 * len(fit.model.motion)
@@ -49,11 +51,15 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
         **{f"{name} {turned}": True for name in fit.opposed},
         f"used, since it helps on parts not seen: {OTHER_LAW}": fit.other_law,
         f"tried, and no help: {OTHER_LAW}": fit.other_law is False,
-        "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
+        "a common scale of all forces, damping and inertia does not follow from motion; it rests "
+        "on the mass "
         "and added mass that the layout gave": True,
-        "a force in the layout is what a thruster gives: divide it by the strength that was found for "
+        "a force in the layout is what a thruster gives: divide it by the strength that was found "
+        "for "
         "what the thruster is to be sent": thrusters,
-        f"the data cannot tell {', '.join(unknown)}: there the layout's own values stand": bool(unknown),
+        f"the data cannot tell {', '.join(unknown)}: there the layout's own values stand": bool(
+            unknown
+        ),
     }
     return tuple(line for line, holds in lines.items() if holds)
 
@@ -69,14 +75,15 @@ def table(fit: RobotFit) -> str:
     for label, unit, value, own, scale in rows:
         said = "  not determined by the data" if own > UNTOLD else ""
         lines.append(
-            f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} {unit}{said}"
+            f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} "
+            f"{unit}{said}"
         )
     return "\n".join(lines)
 
 
 def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
-    """Returns the actuators of a fit that lean by angles (n,) [rad], see `turned_frames`, by the laws that
-    they had before."""
+    """Returns the actuators of a fit that lean by angles (n,) [rad], see `turned_frames`, by the
+    laws that they had before."""
     parts = []
     center = fit.found("center")
     unsure = uncertainties(fit)
@@ -97,31 +104,39 @@ def leaned(layout: Layout, lean: Array) -> Layout:
 
 
 def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
-    """Returns how far each actuator's force may be from what was found: the mean over strength and lean, with
-    the share of it that all strengths have together."""
+    """Returns how far each actuator's force may be from what was found: the mean over strength and
+    lean, with the share of it that all strengths have together."""
     place = fit.fitted.unknowns.place("strength")
     covariance = fit.covariance[place, place]
     own = np.sqrt(np.diag(covariance))
     n = len(own)
     alike = (covariance / np.outer(own, own)).sum() / n if n > 1 else 1.0
     together = float(np.clip((alike - 1.0) / max(n - 1, 1), 0.0, 1.0))
-    shares = np.sqrt(0.5 * (fit.found_error("strength") ** 2 + fit.found_error("lean") ** 2)).tolist()
+    shares = np.sqrt(
+        0.5 * (fit.found_error("strength") ** 2 + fit.found_error("lean") ** 2)
+    ).tolist()
     return tuple(
-        Uncertainty(share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together)
+        Uncertainty(
+            share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together
+        )
         for share in shares
     )
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
-    """Writes the layout that a fit gives, and tables beside it where its fins follow another law. Raises
-    DataError or LayoutError: a table or the layout cannot be written."""
+    """Writes the layout that a fit gives, and tables beside it where its fins follow another law.
+    Raises DataError or LayoutError: a table or the layout cannot be written."""
     layout = fit.model.layout
     place = Path(path)
     lean = fit.found("lean")
     certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
     parts = list(learned(fit, np.where(certain, lean, 0.0)))
     for i, (drawn, part) in enumerate(zip(layout.actuators, parts, strict=True)):
-        if isinstance(drawn, Fin) and isinstance(part, Fin) and (fit.other_law or part.model.type == "table"):
+        if (
+            isinstance(drawn, Fin)
+            and isinstance(part, Fin)
+            and (fit.other_law or part.model.type == "table")
+        ):
             table = place.with_name(f"{place.stem}-fin{i + 1}.csv")
             write_whole(table, _table(fit, i, drawn), DataError)
             parts[i] = replace(part, model=FinModelSpec("table", (("path", table.name),)))
@@ -145,7 +160,9 @@ def _table(fit: RobotFit, i: int, fin: Fin) -> str:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
     power = np.asarray(law.power(command))
     notes = [f"fin {fin.name}, fitted to a swim of the whole robot"]
-    return table_text(notes, [*COLUMNS, POWER_COLUMN], np.hstack([command, force, power[:, None]]), 8)
+    return table_text(
+        notes, [*COLUMNS, POWER_COLUMN], np.hstack([command, force, power[:, None]]), 8
+    )
 
 
 def _body(fit: RobotFit) -> Body:
@@ -172,16 +189,16 @@ def _body(fit: RobotFit) -> Body:
 EVERY_S, LAST_S = 60.0, 240.0
 """Time between fits [s], and how much of the swim each takes."""
 DOUBTS = {"inertia": 0.3, "linear": 0.3, "quadratic": 0.3, "mounting": 0.5, "center": 0.5}
-"""How doubtful body and places of the actuators are, as a share of that before a swim that shakes a robot:
-a path tells less of them, and what they take up is missing in the strengths."""
+"""How doubtful body and places of the actuators are, as a share of that before a swim that shakes a
+robot: a path tells less of them, and what they take up is missing in the strengths."""
 
 
 class OnlineFit:
     """What a robot's actuators are, by its own swim; to be called every `STEP_S` seconds."""
 
     def __init__(self, layout: Layout) -> None:
-        """Takes the robot as it is believed to be. Raises FinlabError: a fin is a table, whose strength is no
-        number of the layout."""
+        """Takes the robot as it is believed to be. Raises FinlabError: a fin is a table, whose
+        strength is no number of the layout."""
         for fin in layout.fins:
             if fin.model.type == "table":
                 why = "expected a law: the strength of a table is fixed"
@@ -197,9 +214,9 @@ class OnlineFit:
         self._steps = 0
 
     def step(self, measured: Array, command: Array) -> Layout | None:
-        """Returns the robot as the last minutes show it, whenever they have been fitted, by what the sensors
-        said last (12,), in the order of `CHANNELS`, and the drives' command for this step (n, 3), NaN for
-        those at rest."""
+        """Returns the robot as the last minutes show it, whenever they have been fitted, by what
+        the sensors said last (12,), in the order of `CHANNELS`, and the drives' command for this
+        step (n, 3), NaN for those at rest."""
         self._last.append((followed(self._moving, command), measured))
         self._steps += 1
         if self._steps % round(EVERY_S / STEP_S):

@@ -1,7 +1,8 @@
-"""From swims to a robot: what is fitted in which order, what helps on parts not seen, what is known.
+"""From swims to a robot: what is fitted in which order, what helps on parts not seen, what is
+known.
 
-First all that every robot has; then, of fins, another law of thrust, which is kept only where it lessens the
-error on windows that its fit has not seen.
+First all that every robot has; then, of fins, another law of thrust, which is kept only where it
+lessens the error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,14 @@ from threadpoolctl import threadpool_limits
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.swim.identification.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
+from finlab.swim.identification.estimate import (
+    DEVIATION,
+    Fitted,
+    Windows,
+    cut,
+    fit_windows,
+    unseen_gain,
+)
 from finlab.swim.identification.robot_model import RobotModel, opposed_in, pushing_back
 from finlab.swim.identification.swim import STEP_S, Swim, smoothed
 from finlab.swim.identification.unknowns import BASE, SHAPE, Unknowns
@@ -28,12 +36,13 @@ SOUND = 0.5
 MOVES = 1.5
 """Times the believed noise of a sensor by which its channel varies where the robot moves at all."""
 WEAKLY_KNOWN = 0.1
-"""Standard error of an actuator's strength beside those of the others, as a share, that is worth a doubt."""
+"""Standard error of an actuator's strength beside those of the others, as a share, that is worth a
+doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
 FAINT, CLEAR = 0.2, 20.0
-"""Strength below which an actuator is tried as one that pushes the other way, and by how much the logarithm
-of the likelihood must grow by that."""
+"""Strength below which an actuator is tried as one that pushes the other way, and by how much the
+logarithm of the likelihood must grow by that."""
 NO_DOUBTS: Mapping[str, float] = {}
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""
@@ -47,17 +56,18 @@ class RobotFit:
     fitted: Fitted
     explained: float
     other_law: bool | None
-    """Whether another law of thrust lessens the error on windows not seen, and is used; None where none was
-    tried."""
+    """Whether another law of thrust lessens the error on windows not seen, and is used; None where
+    none was tried."""
     unlikely: float = 0.0
     """Negative logarithm of the likelihood of what was measured, but for a constant."""
     opposed: tuple[str, ...] = ()
-    """Actuators that push the other way than drawn; the layout of the model has them turned about."""
+    """Actuators that push the other way than drawn; the layout of the model has them turned
+    about."""
 
     @property
     def covariance(self) -> Array:
-        """Of the unknowns (size, size), in scales: by the curvature of the cost, or by how much the windows
-        differ where that is more."""
+        """Of the unknowns (size, size), in scales: by the curvature of the cost, or by how much the
+        windows differ where that is more."""
         inverse = np.linalg.inv(self.fitted.information)
         scores = self.fitted.scores
         spread = inverse @ (scores.T @ scores) @ inverse
@@ -86,7 +96,9 @@ class RobotFit:
         unknowns = self.fitted.unknowns
         error = self.error
         error[unknowns.place("delay")] = 0.0  # of the sensors, and no part of a layout
-        return tuple(label for label, own in zip(unknowns.labels, error, strict=True) if own > UNTOLD)
+        return tuple(
+            label for label, own in zip(unknowns.labels, error, strict=True) if own > UNTOLD
+        )
 
     def doubts(self) -> tuple[str, ...]:
         """Why the fit should not be trusted; empty where it may."""
@@ -101,7 +113,9 @@ class RobotFit:
         covariance = centered @ self.covariance[place, place] @ centered.T
         for name, error in zip(names, np.sqrt(np.diag(covariance)), strict=True):
             if error > WEAKLY_KNOWN:
-                clauses.append(f"the strength of {name} is known to {error:.0%} only; swim with it at work")
+                clauses.append(
+                    f"the strength of {name} is known to {error:.0%} only; swim with it at work"
+                )
         return tuple(clauses)
 
 
@@ -114,10 +128,10 @@ def fit_robot(
 ) -> RobotFit:
     """Learns a robot from swims. The linear algebra runs on one thread.
 
-    The layout is what the robot is believed to be; what its body does not say is U-CAT's. With `other_law`
-    robots of fins are tried with another law of thrust, too. `progress` is called before each step; `doubts`
-    are factors of how far some blocks of unknowns may be off, by name. Raises DataError: there is no swim, or
-    the fit goes astray."""
+    The layout is what the robot is believed to be; what its body does not say is U-CAT's. With
+    `other_law` robots of fins are tried with another law of thrust, too. `progress` is called
+    before each step; `doubts` are factors of how far some blocks of unknowns may be off, by name.
+    Raises DataError: there is no swim, or the fit goes astray."""
     if not swims:
         raise DataError("expected at least one swim, got none")
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
@@ -131,7 +145,9 @@ def fit_robot(
         best = fitted(pushing_back(RobotModel(layout, swims, doubts), swims, smooth))
         while (strength := best.found("strength")).min() < np.log(FAINT):
             weak = int(strength.argmin())
-            turned = (name for k, name in enumerate(layout.names) if (name in best.opposed) != (k == weak))
+            turned = (
+                name for k, name in enumerate(layout.names) if (name in best.opposed) != (k == weak)
+            )
             try:
                 fit = fitted(tuple(turned))
             except DataError:  # it goes astray
@@ -143,9 +159,14 @@ def fit_robot(
 
 
 def _fit(
-    model: RobotModel, swims: Sequence[Swim], smooth: Array, other_law: bool, tell: Callable[[str], None]
+    model: RobotModel,
+    swims: Sequence[Swim],
+    smooth: Array,
+    other_law: bool,
+    tell: Callable[[str], None],
 ) -> RobotFit:
-    """Fits actuators and body to swims, of which smoothed measurements (M, 12) tell where to begin."""
+    """Fits actuators and body to swims, of which smoothed measurements (M, 12) tell where to
+    begin."""
     measured = np.concatenate([swim.measured for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
     model.meet(smooth[:, 6:])
@@ -178,7 +199,9 @@ def _fit(
     tell("fitting all together")
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
-        raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
+        raise DataError(
+            f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?"
+        )
     said = np.isfinite(fitted.residual).sum(axis=(0, 2))
     unlikely = float(fitted.cost[0] + said @ np.log(deviation))
     return RobotFit(model, fitted, _explained(fitted, windows), helps, unlikely)
@@ -193,18 +216,25 @@ def _deviation(fitted: Fitted, deviation: Array) -> Array:
         if len(said):
             usual = said[said <= 5.0 * 1.4826 * max(float(np.median(said)), 1e-6)]
             scale[k] = deviation[k] * float(np.sqrt(np.mean(usual**2)))
-    return np.asarray(np.clip(scale, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
+    return np.asarray(
+        np.clip(scale, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION)
+    )
 
 
 def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
-    model.late = [round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)]
+    model.late = [
+        round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)
+    ]
 
 
 def _explained(fitted: Fitted, windows: Windows) -> float:
-    """Share of the motion's variance within windows that the simulated swims explain, mean over channels of
-    velocity and rates, or of pose where those are not measured, that change by more than noise."""
+    """Share of the motion's variance within windows that the simulated swims explain, mean over
+    channels of velocity and rates, or of pose where those are not measured, that change by more
+    than noise."""
     known = np.asarray(np.isfinite(windows.measured).any(axis=(0, 2)))
-    channels = np.flatnonzero(known & (np.arange(12) >= 6)) if known[6:].any() else np.flatnonzero(known)
+    channels = (
+        np.flatnonzero(known & (np.arange(12) >= 6)) if known[6:].any() else np.flatnonzero(known)
+    )
     shares = []
     for k in channels:
         said = windows.measured[:, k]

@@ -1,9 +1,11 @@
-"""From unknowns to what a robot does: wrenches of its actuators over a swim, and the body that they move.
+"""From unknowns to what a robot does: wrenches of its actuators over a swim, and the body that they
+move.
 
-Which actuators push the other way than drawn is found before a fit, whose strengths are logarithms: what the
-measured accelerations need besides what the body does by itself is linear in the shares that actuators give
-of their laws' forces, and in errors of the damping. That is one weighted least-squares problem of both sides
-after the same low-pass filter (equation error; V. Klein and E. Morelli, Aircraft System Identification).
+Which actuators push the other way than drawn is found before a fit, whose strengths are logarithms:
+what the measured accelerations need besides what the body does by itself is linear in the shares
+that actuators give of their laws' forces, and in errors of the damping. That is one weighted
+least-squares problem of both sides after the same low-pass filter (equation error; V. Klein and E.
+Morelli, Aircraft System Identification).
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +41,8 @@ class RobotModel:
     """One layout, and the swims from which it is learned, M steps in all."""
 
     def __init__(self, layout: Layout, swims: Sequence[Swim], doubts: Mapping[str, float]) -> None:
-        """Takes the robot as it is believed to be, and by what factors some blocks may be farther off."""
+        """Takes the robot as it is believed to be, and by what factors some blocks may be farther
+        off."""
         self.layout = layout
         self.body = complete_body(layout)
         self.dynamics = Dynamics(*map(np.array, dynamics_of(self.body)))
@@ -55,7 +58,8 @@ class RobotModel:
         self._plant = plant_of(layout)
         self.motion = np.concatenate([swim.motion for swim in swims])
         self.alone = self._plant.forces(self.motion)
-        """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
+        """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own
+        frame."""
         self.steers = np.array([part.BY_FLOW for part in layout.actuators])
         """Which actuators (n,) the flow drives: one that leans meets the water at another angle."""
         self._by_lean = np.zeros_like(self.alone)
@@ -63,10 +67,13 @@ class RobotModel:
         """Whole steps by which each sensor is late, as far as is known."""
 
     def meet(self, flow: Array) -> None:
-        """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which some actuators feel."""
+        """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which some actuators
+        feel."""
         if self._plant.feels_flow:
             self.alone = self._plant.forces(self.motion, flow=flow[:, None])
-            _, slopes = self._plant.force_and_jacobian(np.nan_to_num(self.motion), flow=flow[:, None])
+            _, slopes = self._plant.force_and_jacobian(
+                np.nan_to_num(self.motion), flow=flow[:, None]
+            )
             works = self.steers[:, None] & np.isfinite(self.motion[..., :1])
             self._by_lean = np.where(works, slopes[..., 0, :], 0.0)
 
@@ -77,7 +84,8 @@ class RobotModel:
 
     @cached_property
     def seen(self) -> list[tuple[float, float]]:
-        """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
+        """Amplitudes and frequencies between which nearly all were; the law is fitted no
+        further."""
         ends = [np.nanquantile(self.motion[..., k], (0.005, 0.995)) for k in range(2)]
         return [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
 
@@ -86,8 +94,8 @@ class RobotModel:
         return self.shape_terms(np.nan_to_num(self.motion))
 
     def shape_terms(self, command: Array) -> Array:
-        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): a
-        polynomial, so that it ends somewhere where fins hardly beat."""
+        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (...,
+        3): a polynomial, so that it ends somewhere where fins hardly beat."""
         (low_a, high_a), (low_f, high_f) = self.seen
         a = np.clip(command[..., 0], low_a, high_a) / self.middle[0]
         f = np.clip(command[..., 1], low_f, high_f) / self.middle[1]
@@ -126,8 +134,8 @@ class RobotModel:
         )
 
     def sensed(self, unknowns: Unknowns, vectors: Array, state: Array) -> Array:
-        """What late sensors say of states (L, 12, B, W) of L steps under B vectors (B, size): where the robot
-        was `late` steps before, and from there on along its slope."""
+        """What late sensors say of states (L, 12, B, W) of L steps under B vectors (B, size): where
+        the robot was `late` steps before, and from there on along its slope."""
         slope = np.gradient(state, STEP_S, axis=0)
         said = np.empty_like(state)
         step = np.arange(len(state))
@@ -141,11 +149,14 @@ class RobotModel:
 
 
 def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
-    """Returns own axes (n, 3, 3), rows in the body frame, of actuators not as drawn: turned by angles
-    (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft about z, and then by
-    those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
+    """Returns own axes (n, 3, 3), rows in the body frame, of actuators not as drawn: turned by
+    angles (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft
+    about z, and then by those of their lean about the first, a shaft; of thrusters, which push
+    along it, about the second."""
     thrusts = np.array([len(part.AXES) == 1 for part in layout.actuators])
-    angles = np.stack([mounting, np.where(thrusts, 0.0, lean), np.where(thrusts, lean, 0.0)], axis=-1)
+    angles = np.stack(
+        [mounting, np.where(thrusts, 0.0, lean), np.where(thrusts, lean, 0.0)], axis=-1
+    )
     return np.asarray(Rotation.from_euler("ZXY", angles).as_matrix().swapaxes(1, 2) @ layout.frames)
 
 
@@ -155,26 +166,29 @@ def shape_factor(terms: Array, shape: Array) -> Array:
 
 
 def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
-    """Returns a robot of which some actuators push the other way at every command: of fins and azimuths zero
-    is turned about, of thrusters and rudders the first axis."""
+    """Returns a robot of which some actuators push the other way at every command: of fins and
+    azimuths zero is turned about, of thrusters and rudders the first axis."""
     parts = list(layout.actuators)
     for k in layout.indices(names):
         part = parts[k]
         first = len(part.PUSHES) == 1
-        parts[k] = part.turned(np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]]))
+        parts[k] = part.turned(
+            np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]])
+        )
     return replace(layout, actuators=tuple(parts))
 
 
 def pushing_back(model: RobotModel, swims: Sequence[Swim], smooth: Array) -> tuple[str, ...]:
-    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12). One that
-    the swims do not tell apart from others counts as drawn."""
+    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12).
+    One that the swims do not tell apart from others counts as drawn."""
     share, error = _shares(model, [len(swim) for swim in swims], smooth)
     backwards = (share < BACKWARDS) & (share < -SURE * error)
     return tuple(np.array(model.layout.names)[backwards].tolist())
 
 
 def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[Array, Array]:
-    """Shares (n,) of their laws' forces that actuators give, and standard errors; believed to be 1 +- 1."""
+    """Shares (n,) of their laws' forces that actuators give, and standard errors; believed to be 1
+    +- 1."""
     from scipy.signal import savgol_filter
 
     def filtered(values: Array, order: int = 0) -> Array:
@@ -186,13 +200,21 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
     flow = smooth[:, 6:]
     body = model.dynamics
     model.meet(flow)
-    drawn = filtered(np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout)))
+    drawn = filtered(
+        np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout))
+    )
     up = rotation_of_angles(smooth[:, 3:6].T)[2::3]
     alone = np.stack(accelerations(body, flow.T, up, np.zeros(6)), axis=-1)
     missing = (filtered(flow, 1) - alone) * body.inertia - drawn.sum(axis=-1)
     damped = -np.stack([flow, flow * np.abs(flow), np.ones_like(flow)], axis=-1)  # (M, 6, 3)
-    by = np.concatenate([drawn, (np.eye(6)[:, :, None] * damped[:, :, None]).reshape(-1, 6, 18)], axis=-1)
-    wide = [model.blocks["linear"].scale, model.blocks["quadratic"].scale, missing.std(axis=0) + 1e-9]
+    by = np.concatenate(
+        [drawn, (np.eye(6)[:, :, None] * damped[:, :, None]).reshape(-1, 6, 18)], axis=-1
+    )
+    wide = [
+        model.blocks["linear"].scale,
+        model.blocks["quadratic"].scale,
+        missing.std(axis=0) + 1e-9,
+    ]
     believed = np.diag(np.concatenate([np.ones(n), np.stack(wide, axis=-1).ravel()]) ** -2.0)
     left = missing
     for _ in range(ROUNDS):

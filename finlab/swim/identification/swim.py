@@ -1,10 +1,12 @@
-"""Swims on an even grid of time, from a log of `finlab simulate`, or a CSV file of measurements and commands.
+"""Swims on an even grid of time, from a log of `finlab simulate`, or a CSV file of measurements and
+commands.
 
-A CSV file has a header and columns in any order: t [s]; of x, y, z [m], roll, pitch, yaw [rad], u, v, w
-[m/s], p, q, r [rad/s] what was measured; and NAME.PART for each actuator, as commanded, with the parts of
-`PARTS`. World: z up; body: x forward, y left, z up; pitch is positive nose down. Degrees stand in the header,
-`yaw [deg]`. A sensor's cell may be empty or repeat the last one where there is nothing new; an actuator's
-cells are empty where it was lost. Other columns are passed over.
+A CSV file has a header and columns in any order: t [s]; of x, y, z [m], roll, pitch, yaw [rad], u,
+v, w [m/s], p, q, r [rad/s] what was measured; and NAME.PART for each actuator, as commanded, with
+the parts of `PARTS`. World: z up; body: x forward, y left, z up; pitch is positive nose down.
+Degrees stand in the header, `yaw [deg]`. A sensor's cell may be empty or repeat the last one where
+there is nothing new; an actuator's cells are empty where it was lost. Other columns are passed
+over.
 """
 
 import os
@@ -32,8 +34,8 @@ STEP_S = 0.1
 SUBSTEPS = 2
 """Moments within a step at which the actuators' forces are taken."""
 CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
-"""What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates [rad/s]
-in the body frame."""
+"""What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates
+[rad/s] in the body frame."""
 ANGLES = slice(3, 6)
 SMOOTHED = (11, 2)
 """Samples and order of the filter by Savitzky and Golay."""
@@ -54,25 +56,26 @@ class Swim:
 
     name: str
     motion: Array
-    """What the actuators did, (N, SUBSTEPS, n, 3), as their commands, of fins amplitude [rad], frequency
-    [Hz], direction [rad]; NaN for one that gave nothing."""
+    """What the actuators did, (N, SUBSTEPS, n, 3), as their commands, of fins amplitude [rad],
+    frequency [Hz], direction [rad]; NaN for one that gave nothing."""
     measured: Array
-    """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN where
-    there is nothing new."""
+    """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN
+    where there is nothing new."""
 
     def __len__(self) -> int:
         return len(self.motion)
 
 
 def replay(layout: Layout, command: Array) -> Array:
-    """What actuators that follow as they should do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per
-    step, NaN for a lost one."""
+    """What actuators that follow as they should do (N, SUBSTEPS, n, 3) under commands (N, n, 3),
+    one per step, NaN for a lost one."""
     moving = ActuatorMotion(layout, FinMotion(layout))
     return np.array([followed(moving, row) for row in command])
 
 
 def followed(moving: ActuatorMotion, command: Array) -> Array:
-    """Moves actuators on by one step under a command (n, 3), and returns what they do (SUBSTEPS, n, 3)."""
+    """Moves actuators on by one step under a command (n, 3), and returns what they do (SUBSTEPS, n,
+    3)."""
     motion = np.empty((SUBSTEPS, *command.shape))
     for s in range(SUBSTEPS):
         moving.step(command, STEP_S / SUBSTEPS / 2)
@@ -89,8 +92,8 @@ def only_new(measured: Array) -> Array:
 
 
 def smoothed(measured: Array) -> Array:
-    """Samples (N, 12) without holes and with less noise: a first guess of what the robot did. Channels that
-    say nothing are made of the others, or zero."""
+    """Samples (N, 12) without holes and with less noise: a first guess of what the robot did.
+    Channels that say nothing are made of the others, or zero."""
     from scipy.signal import savgol_filter
 
     grid = np.arange(len(measured))
@@ -101,23 +104,30 @@ def smoothed(measured: Array) -> Array:
     full[:, said] = savgol_filter(full[:, said], *SMOOTHED, axis=0)
     pace = np.gradient(full, STEP_S, axis=0)
     angles = full[:, ANGLES]
-    made = np.concatenate([body_velocity(angles, pace[:, :3]), body_rates(angles, pace[:, ANGLES])], axis=1)
+    made = np.concatenate(
+        [body_velocity(angles, pace[:, :3]), body_rates(angles, pace[:, ANGLES])], axis=1
+    )
     full[:, 6:] = np.where(said[6:], full[:, 6:], made)
     return full
 
 
 def _channels(measured: Array) -> Iterator[tuple[int, NDArray[np.bool_], Array]]:
-    """Channels of samples (N, 12) that say something, with the rows (N,) where they do and the values there,
-    angles without jumps."""
+    """Channels of samples (N, 12) that say something, with the rows (N,) where they do and the
+    values there, angles without jumps."""
     for k, column in enumerate(measured.T):
         fresh = np.isfinite(column)
         if fresh.any():
-            yield k, fresh, np.unwrap(column[fresh]) if ANGLES.start <= k < ANGLES.stop else column[fresh]
+            yield (
+                k,
+                fresh,
+                np.unwrap(column[fresh]) if ANGLES.start <= k < ANGLES.stop else column[fresh],
+            )
 
 
 def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
-    """Returns the swim in a file. Raises DataError: the file is missing, too large or too short, belongs to
-    another robot, lacks a column, or holds what cannot be; the sentence names the row or the column."""
+    """Returns the swim in a file. Raises DataError: the file is missing, too large or too short,
+    belongs to another robot, lacks a column, or holds what cannot be; the sentence names the row or
+    the column."""
     place = Path(path)
     return _log(place, layout) if place.suffix.lower() == ".npz" else _csv(place, layout)
 
@@ -134,12 +144,16 @@ def _log(path: Path, layout: Layout) -> Swim:
             f"{', '.join(layout.names)}"
         )
     n = arrays["time"].size
-    check_shapes(arrays, {"time": (n,), "measured": (n, 12), "command": (n, len(own), 3)}, str(path))
+    check_shapes(
+        arrays, {"time": (n,), "measured": (n, 12), "command": (n, len(own), 3)}, str(path)
+    )
     time, measured, command = (np.asarray(arrays[name], np.float64) for name in names)
     if not np.isfinite(time).all():
         raise DataError(f"{path}: expected finite numbers in time")
     if len(time) > 1 and not np.allclose(np.diff(time), STEP_S):
-        raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
+        raise DataError(
+            f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them"
+        )
     _check_duration(len(time) * STEP_S, path)
     command = command[:, [own.index(name) for name in layout.names]]
     _check_commands(command, [f"{path}: row {k}" for k in range(1, n + 1)], layout)
@@ -167,7 +181,9 @@ def _csv(path: Path, layout: Layout) -> Swim:
         said = read.values[name][np.isfinite(read.values[name])]
         if len(said) < 2 or np.ptp(said) == 0.0:
             what = f"{said[0]:g} throughout" if len(said) else "empty"
-            raise DataError(f"{path}: column {name} is {what}; is the sensor connected? leave the column out")
+            raise DataError(
+                f"{path}: column {name} is {what}; is the sensor connected? leave the column out"
+            )
     measured = np.stack([read.values.get(name, np.full(n, np.nan)) for name in CHANNELS], axis=-1)
     command = commands_in(read.values, layout)
     _check_commands(command, places, layout)
@@ -182,7 +198,8 @@ def _check_time(time: Array, places: Sequence[str]) -> None:
     steps = np.diff(time)
     for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))).tolist():
         raise DataError(
-            f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times that rise by "
+            f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times "
+            "that rise by "
             f"{LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and name both parts"
         )
 
@@ -192,7 +209,8 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
     for k, i in np.argwhere(known.any(axis=2) & ~known.all(axis=2)):
         columns = ", ".join(command_columns(layout)[i])
         raise DataError(
-            f"{places[k]}: of {columns} some are empty; fill all, or none for an actuator that was lost"
+            f"{places[k]}: of {columns} some are empty; fill all, or none for an actuator that "
+            "was lost"
         )
     for i, one in enumerate(layout.actuators):
         for part, name in enumerate(dict(one.NUMBERS)):
@@ -207,13 +225,15 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
             if wrong.any():
                 k = int(np.argmax(wrong))
                 raise DataError(
-                    f"{places[k]}, column {one.name}.{name}, holds {command[k, i, part]:g}, expected "
+                    f"{places[k]}, column {one.name}.{name}, holds {command[k, i, part]:g}, "
+                    "expected "
                     f"{UNIT_OF[name]} from {low:.4g} to {high:.4g}"
                 )
 
 
 def _on_grid(time: Array, measured: Array, grid: Array) -> Array:
-    """New samples (N, 12) at times (N,) as means within half a step of the grid's times (M,), (M, 12)."""
+    """New samples (N, 12) at times (N,) as means within half a step of the grid's times (M,), (M,
+    12)."""
     edges = np.append(grid, grid[-1] + STEP_S) - 0.5 * STEP_S
     means = np.full((len(grid), measured.shape[1]), np.nan)
     for k, fresh, values in _channels(measured):

@@ -29,8 +29,8 @@ SAME_SCALE = 0.003
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns of one kind: how far each may be off, one standard deviation of what is believed before a
-    swim, and whether the wrench of the actuators depends on them."""
+    """Unknowns of one kind: how far each may be off, one standard deviation of what is believed
+    before a swim, and whether the wrench of the actuators depends on them."""
 
     name: str
     labels: tuple[str, ...]
@@ -40,10 +40,15 @@ class Block:
 
 
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
-    """All unknowns of actuators of these names and their robot, whose damping may be off by (2, 6)."""
+    """All unknowns of actuators of these names and their robot, whose damping may be off by (2,
+    6)."""
 
-    def block(name: str, labels: Sequence[str], scale: ArrayLike, unit: str, force: bool = True) -> Block:
-        return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
+    def block(
+        name: str, labels: Sequence[str], scale: ArrayLike, unit: str, force: bool = True
+    ) -> Block:
+        return Block(
+            name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force
+        )
 
     shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
     blocks = (
@@ -53,11 +58,23 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("center", [f"centre of gravity, {axis}" for axis in "xyz"], 0.02, "m"),
         block("buoyancy", [f"centre of buoyancy, {axis}" for axis in "xyz"], 0.01, "m", False),
         block("lift", ["buoyancy less weight"], 2.0, "N", False),
-        block("bias", [f"constant {axis}" for axis in ("Fx", "Fy", "Tz")], (1.0, 1.0, 0.1), "N, N m"),
+        block(
+            "bias", [f"constant {axis}" for axis in ("Fx", "Fy", "Tz")], (1.0, 1.0, 0.1), "N, N m"
+        ),
         block("current", ["current along x", "current along y"], 0.05, "m/s", False),
-        block("inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False),
-        block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
-        block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
+        block(
+            "inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False
+        ),
+        block(
+            "linear",
+            [f"linear damping in {axis}" for axis in AXES],
+            damping[0],
+            "N s/m, N m s",
+            False,
+        ),
+        block(
+            "quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False
+        ),
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
         block(SHAPE, [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
     )
@@ -65,7 +82,8 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
 
 
 class Unknowns:
-    """A vector of some blocks, each entry in units of its scale, so that all are believed to be 0 +- 1."""
+    """A vector of some blocks, each entry in units of its scale, so that all are believed to be 0
+    +- 1."""
 
     def __init__(self, blocks: dict[str, Block], chosen: Sequence[str]) -> None:
         self.blocks = [blocks[name] for name in chosen]
@@ -82,16 +100,17 @@ class Unknowns:
 
     @cached_property
     def believed(self) -> Array:
-        """Inverse covariance (size, size) of what is believed before a swim: each is 0 +- 1, and the common
-        scale of all inertia is as the layout says. Motion cannot tell it, so nothing else must move it."""
+        """Inverse covariance (size, size) of what is believed before a swim: each is 0 +- 1, and
+        the common scale of all inertia is as the layout says. Motion cannot tell it, so nothing
+        else must move it."""
         place = self._where["inertia"]
         gauge = np.zeros(self.size)
         gauge[place] = self.scale[place] / (place.stop - place.start) / SAME_SCALE
         return np.eye(self.size) + np.outer(gauge, gauge)
 
     def part(self, name: str, vector: Array) -> Array | None:
-        """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where it is not
-        looked for."""
+        """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where
+        it is not looked for."""
         return self.of(name, vector) if name in self._where else None
 
     def of(self, name: str, vector: Array) -> Array:

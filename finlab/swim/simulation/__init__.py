@@ -1,7 +1,7 @@
 """Simulation of a robot that swims: body, fins, sensors, and the closed loop around an allocator.
 
-    loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("circle"), failures=[("bow", 30.0)])
-    log = loop.run()
+    loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("circle"), failures=[("bow",
+    30.0)]) log = loop.run()
 
 World: z up. Body: x forward, y left, z up. SI and radians.
 """

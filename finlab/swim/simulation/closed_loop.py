@@ -1,4 +1,5 @@
-"""A robot that swims: sensors, controller, allocator, actuators and body, one control period at a time."""
+"""A robot that swims: sensors, controller, allocator, actuators and body, one control period at a
+time."""
 
 import math
 from collections import deque
@@ -42,14 +43,15 @@ AHEAD = 10
 
 
 class ClosedLoop:
-    """One robot under way. Make it, then call `step` until `done`, and `fail` and `mend` in between.
+    """One robot under way. Make it, then call `step` until `done`, and `fail` and `mend` in
+    between.
 
         loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("lissajous"))
         while not loop.done:
             tick = loop.step()
 
-    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a run
-    steps it at the pace of the clock.
+    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever
+    shows a run steps it at the pace of the clock.
 
     Args:
         layout: the robot; what its body does not say is U-CAT's.
@@ -64,13 +66,13 @@ class ClosedLoop:
         announced: whether what happens is announced to the allocator; else a monitor has to notice.
         monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
         learner: finds out what the actuators really are; allocator and monitor then work with that.
-        truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
-            only what allocator, controller and monitor believe of it; it has the same actuators.
+        truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout`
+            is only what allocator, controller and monitor believe of it; it has the same actuators.
         seed: of the sensors' noise and of the allocator.
 
     Raises:
-        FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time that is
-            none, or a truth that has other actuators.
+        FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time
+            that is none, or a truth that has other actuators.
     """
 
     def __init__(
@@ -94,7 +96,8 @@ class ClosedLoop:
         if allocator.layout != layout:
             raise FinlabError(
                 f"allocator: expected one for layout {layout.name!r:.60}, got one for "
-                f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
+                f"{allocator.layout.name!r:.60} or another state of it; make it with "
+                "Allocator(layout)"
             )
         events = [Fault(*failure).checked() for failure in failures]
         layout.indices([event.name for event in events], "failures")
@@ -102,7 +105,9 @@ class ClosedLoop:
         self.allocator = allocator
         self.task = task
         self.seed = seed
-        self.controller = controller = TrackingController(layout) if controller is None else controller
+        self.controller = controller = (
+            TrackingController(layout) if controller is None else controller
+        )
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         # Rudders that the flow leaves weak must not stop the propeller.
         under_way = "closest" if layout.by_flow else allocator.policy_under_way
@@ -115,7 +120,9 @@ class ClosedLoop:
         self._forces = ActuatorForce(truth, self.fin_motion)
         self.motion = self._forces.motion
         """The motion of all actuators."""
-        self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
+        self._sensors = Sensors(
+            SensorSettings() if sensors is None else sensors, np.random.default_rng(seed)
+        )
         self._pending = sorted(events, key=lambda event: event.time_s)
         self.announced = announced
         self.monitor = monitor
@@ -199,14 +206,14 @@ class ClosedLoop:
     def fail(
         self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
     ) -> None:
-        """Something becomes of an actuator, now. Raises LayoutError: there is no actuator of that name, or it
-        is the last that works; FinlabError: the kind or the share is none.
+        """Something becomes of an actuator, now. Raises LayoutError: there is no actuator of that
+        name, or it is the last that works; FinlabError: the kind or the share is none.
 
         Args:
             name: of the actuator.
             kind: lost (it gives nothing; a fin hangs still), torn (it gives a share of its
-                force), stuck (a fin beats but no longer turns, nor does an azimuth; a rudder stays as it is,
-                and so does the force of a thruster) or whole.
+                force), stuck (a fin beats but no longer turns, nor does an azimuth; a rudder stays
+                as it is, and so does the force of a thruster) or whole.
             share: of the force that a torn actuator gives.
             announced: whether the allocator knows at once; by default as the swim was made.
         """
@@ -227,7 +234,8 @@ class ClosedLoop:
             self.verdict = self.monitor.tell(name, strength, self._held[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
-        """An actuator works again as it should; a `LayoutError` where there is none of that name."""
+        """An actuator works again as it should; a `LayoutError` where there is none of that
+        name."""
         self.fail(name, "whole", announced=announced)
 
     def step(self) -> Tick:
@@ -280,7 +288,8 @@ class ClosedLoop:
         return self.log
 
     def _reference(self, time: float, complete: Completion) -> Array | None:
-        """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can tell."""
+        """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can
+        tell."""
         if self._foresighted is None:
             return None
         while len(self._setpoints) <= AHEAD:
@@ -292,8 +301,8 @@ class ClosedLoop:
         return complete(expected)
 
     def _given(self) -> Array:
-        """Wrench (6,) over the last period, if the actuators that are not taken for lost do what they were
-        commanded [N, N m]."""
+        """Wrench (6,) over the last period, if the actuators that are not taken for lost do what
+        they were commanded [N, N m]."""
         if self._command is None:
             return NO_WRENCH
         believed = self._believed
@@ -309,7 +318,9 @@ class ClosedLoop:
         lost = tuple(self.damage.lost)
         if lost not in self._completion:
             controller = self.controller
-            self._completion[lost] = Completion(self.allocator.layout, lost, controller.axes, controller.free)
+            self._completion[lost] = Completion(
+                self.allocator.layout, lost, controller.axes, controller.free
+            )
         return self._completion[lost]
 
     def _alive(self) -> NDArray[np.bool_]:
@@ -328,7 +339,8 @@ class ClosedLoop:
         return result
 
     def _moved(self, command: Array) -> Array:
-        """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not turn."""
+        """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
+        turn."""
         result = command.copy()
         result[~self._alive()] = np.nan
         return result if np.isnan(self._held).all() else self.motion.turned_to(result, self._held)

@@ -1,4 +1,5 @@
-"""Devices of a robot that swims: sensors at work, and actuators that push in the water that meets them.
+"""Devices of a robot that swims: sensors at work, and actuators that push in the water that meets
+them.
 
 Samples come at the own rate of each sensor, with noise, bias, delay and losses.
 """
@@ -25,7 +26,8 @@ from finlab.swim.vehicle.fin_motion import FinMotion, fin_power
 
 @dataclass(frozen=True)
 class Sensor:
-    """When a sensor samples and what becomes of its samples. Noise and bias are standard deviations."""
+    """When a sensor samples and what becomes of its samples. Noise and bias are standard
+    deviations."""
 
     rate_hz: float
     """How often it samples [Hz]."""
@@ -34,7 +36,8 @@ class Sensor:
     bias: tuple[float, ...]
     """Of each of its values; drawn once for a run."""
     delay_s: float = 0.0
-    """How old a sample is when it arrives [s]; it counts in steps of the simulation, 0.01 or 0.02 s."""
+    """How old a sample is when it arrives [s]; it counts in steps of the simulation, 0.01 or 0.02
+    s."""
     dropout: float = 0.0
     """Share of samples that are lost; the one before goes on."""
 
@@ -49,9 +52,9 @@ NAMES = ("marker", "pressure", "dvl", "imu")
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """The robot's sensors. No figures are published for U-CAT's: these are our choice, of the order of data
-    sheets of such instruments. Raises FinlabError: a rate of none, a negative number, or a share of lost
-    samples of 1 or more."""
+    """The robot's sensors. No figures are published for U-CAT's: these are our choice, of the order
+    of data sheets of such instruments. Raises FinlabError: a rate of none, a negative number, or a
+    share of lost samples of 1 or more."""
 
     marker: Sensor = Sensor(10.0, (0.02,) * 4, (0.01,) * 4, 0.08, 0.02)
     """Camera that sees markers: x, y, z, which controllers do not use [m], heading [rad]."""
@@ -69,7 +72,8 @@ class SensorSettings:
             from_0 = all(math.isfinite(value) and value >= 0.0 for value in values)
             if not from_0 or sensor.rate_hz == 0.0 or sensor.dropout >= 1.0:
                 raise FinlabError(
-                    f"sensors: {name}: expected numbers from 0, a rate above it and a dropout below 1, "
+                    f"sensors: {name}: expected numbers from 0, a rate above it and a dropout "
+                    "below 1, "
                     f"got {sensor}"
                 )
 
@@ -95,14 +99,17 @@ class Channel:
         """Takes the sensor, and where its noise comes from."""
         self._sensor = sensor
         self._period = 1.0 / sensor.rate_hz
-        # Another stream than the noise's, so that a run has the same noise with and without the rest.
+        # Another stream than the noise's, so that a run has the same noise with and without the
+        # rest.
         self._rng = rng
         self._fate = rng.spawn(1)[0]
         self._noise = np.array(sensor.noise)
         self.bias: Array = np.array(sensor.bias) * self._fate.standard_normal(len(sensor.bias))
         """What each value is off for the whole run."""
         self._due = 0.0
-        self._waiting: deque[tuple[float, float, Array]] = deque()  # when it arrives, when it was taken
+        self._waiting: deque[tuple[float, float, Array]] = (
+            deque()
+        )  # when it arrives, when it was taken
         self._first = True
         self._newest = self.bias
         self.taken = 0.0
@@ -119,11 +126,14 @@ class Channel:
         lost = self._sensor.dropout > 0.0 and self._fate.random() < self._sensor.dropout
         # The robot has waited at rest for its first samples.
         if self._first or not lost:
-            self._waiting.append((time if self._first else time + self._sensor.delay_s, time, sample))
+            self._waiting.append(
+                (time if self._first else time + self._sensor.delay_s, time, sample)
+            )
         self._first = False
 
     def value(self, time: float) -> Array:
-        """The newest sample that has arrived; the same array as before where there is no new one."""
+        """The newest sample that has arrived; the same array as before where there is no new
+        one."""
         while self._waiting and self._waiting[0][0] <= time + 1e-9:
             _, self.taken, self._newest = self._waiting.popleft()
         return self._newest
@@ -144,7 +154,15 @@ class Sensors:
         roll, pitch = turning[:2].tolist()
         ages = marker, pressure, dvl, imu
         return Measurement(
-            time, pose[:3], float(pose[3]), velocity, float(depth[0]), turning[2:], roll, pitch, ages
+            time,
+            pose[:3],
+            float(pose[3]),
+            velocity,
+            float(depth[0]),
+            turning[2:],
+            roll,
+            pitch,
+            ages,
         )
 
     def sample(self, time: float, state: Array) -> None:
@@ -222,14 +240,14 @@ class ActuatorForce:
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
 
     def wrenches(self, force: Array, water: Array) -> Array:
-        """Returns the wrench (n, 6) [N, N m] of each actuator's force (n, 3) [N], with an equal share of what
-        they do to each other; `water` as in `step`."""
+        """Returns the wrench (n, 6) [N, N m] of each actuator's force (n, 3) [N], with an equal
+        share of what they do to each other; `water` as in `step`."""
         offset = self._plant.offset(force, flow=water) / len(force)
         return np.asarray(np.einsum("nk,nkw->nw", force, self.effectiveness) + offset)
 
     def of_fins(self, dt: float) -> Array:
-        """Force (n, 3) of each fin in its own frame [N], the mean over the step `dt` [s] that has just been
-        taken."""
+        """Force (n, 3) of each fin in its own frame [N], the mean over the step `dt` [s] that has
+        just been taken."""
         command = self._beat.mean_command
         command[:, 2] = wrapped(command[:, 2])
         # One that does not beat gives nothing, whatever its law.

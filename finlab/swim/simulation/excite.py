@@ -1,9 +1,10 @@
-"""A swim from which a robot can be learned: every axis and actuator is varied, depth and attitude are kept.
+"""A swim from which a robot can be learned: every axis and actuator is varied, depth and attitude
+are kept.
 
-The controller holds the place softly and adds a sum of sines on each axis, each axis with periods of its own.
-The allocator gives that wrench with forces that also push against each other, and draws each fin's amplitude
-anew every few seconds, so that the law of each fin shows. No axis is shaken farther than it may go. Where the
-robot leaves its bounds, the excitation fades until it is back.
+The controller holds the place softly and adds a sum of sines on each axis, each axis with periods
+of its own. The allocator gives that wrench with forces that also push against each other, and draws
+each fin's amplitude anew every few seconds, so that the law of each fin shows. No axis is shaken
+farther than it may go. Where the robot leaves its bounds, the excitation fades until it is back.
 """
 
 import math
@@ -35,7 +36,8 @@ LONGEST_S = 300.0
 SHORTEST_S = 30.0
 """Shortest one [s]: once through the slowest sine."""
 SHARE = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
-"""Amplitude of the excitation on each axis, as a share of what all actuators together could give at most."""
+"""Amplitude of the excitation on each axis, as a share of what all actuators together could give at
+most."""
 PERIODS_S = (
     (31.0, 13.0, 7.0),
     (23.0, 11.0, 6.1),
@@ -50,9 +52,11 @@ INNER_SHARE = 0.3
 REDRAW_S = 3.1
 """Time after which each fin has another amplitude [s]."""
 TURN_RAD_S = 0.8
-"""Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat gives."""
+"""Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat
+gives."""
 BOUNDS = (1.5, 0.5, 0.35)
-"""Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
+"""Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has
+faded."""
 MOST_USED = 3.0
 """Times these bounds at which the swim is given up."""
 REACHED = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
@@ -60,8 +64,12 @@ REACHED = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
 SHAKEN_TO = 0.5
 """Share of them to which the sines of an axis take the robot at most."""
 HOLDS = 0.3
-"""Share of what all actuators could give that holds the robot at a bound, where a loop may be so fast."""
-SLOWEST, FASTEST = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4]), np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0])
+"""Share of what all actuators could give that holds the robot at a bound, where a loop may be so
+fast."""
+SLOWEST, FASTEST = (
+    np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4]),
+    np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0]),
+)
 """Of the loops that hold place and attitude [rad/s]."""
 DEPTH_M = 1.5
 """Where the robot is held [m]."""
@@ -80,7 +88,10 @@ class ExcitingController:
     def __init__(self, layout: Layout, seed: int = 0) -> None:
         # Each axis as far as all actuators could push it, were they all aimed at it.
         most = np.abs(layout_effectiveness(layout) * largest_forces(layout))
-        most = np.add.reduceat(most**2, np.unique(_owners(layout), return_index=True)[1], axis=1) ** 0.5
+        most = (
+            np.add.reduceat(most**2, np.unique(_owners(layout), return_index=True)[1], axis=1)
+            ** 0.5
+        )
         most = most.sum(axis=1)
         rng = np.random.default_rng(seed)
         self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
@@ -104,11 +115,15 @@ class ExcitingController:
         away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
         c = math.cos(measurement.yaw)
         s = math.sin(measurement.yaw)
-        error = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0])
+        error = np.array(
+            [c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0]
+        )
         error[3:] = wrapped(-np.array([measurement.roll, measurement.pitch, measurement.yaw]))
         speed = np.concatenate([measurement.velocity, measurement.rates])
         tilt = max(abs(measurement.roll), abs(measurement.pitch))
-        used = max(math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
+        used = max(
+            math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2]
+        )
         if used > MOST_USED:
             raise FinlabError(
                 f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
@@ -133,7 +148,8 @@ class ExcitingSettings(Settings):
 
 
 class Exciting(Method):
-    """Gives a wrench with forces that also push against each other, and with amplitudes drawn at random."""
+    """Gives a wrench with forces that also push against each other, and with amplitudes drawn at
+    random."""
 
     name = "excitation"
     settings_class = ExcitingSettings
@@ -196,7 +212,8 @@ class Exciting(Method):
         if self._direction is not None:
             most = TURN_RAD_S * PERIOD_S
             turn = wrapped(direction - self._direction)
-            # What is not yet turned gives only its part along the force; across and against it, nothing.
+            # What is not yet turned gives only its part along the force; across and against it,
+            # nothing.
             direction = self._direction + np.clip(turn, -most, most)
             size = size * np.maximum(np.cos(turn - np.clip(turn, -most, most)), 0.0)
         self._direction = direction
@@ -215,7 +232,8 @@ def _owners(layout: Layout) -> NDArray[np.intp]:
 
 
 def largest_forces(layout: Layout) -> Array:
-    """Returns the largest force [N] along each direction in which an actuator pushes (m,), at rest."""
+    """Returns the largest force [N] along each direction in which an actuator pushes (m,), at
+    rest."""
     plant = plant_of(layout)
     size = np.linalg.norm(plant.forces(np.stack([plant.lower, plant.upper])), axis=-1).max(axis=0)
     return np.asarray(size[_owners(layout)])
@@ -230,8 +248,8 @@ def excitation(
     current: Sequence[float] = (0.0, 0.0, 0.0),
     seed: int = 0,
 ) -> ClosedLoop:
-    """The swim, ready to be run. Raises DataError: the duration is too short to tell anything, or longer than
-    five minutes; FinlabError: it has rudders, which give nothing on the spot.
+    """The swim, ready to be run. Raises DataError: the duration is too short to tell anything, or
+    longer than five minutes; FinlabError: it has rudders, which give nothing on the spot.
 
     Args:
         layout: the robot.
@@ -243,7 +261,8 @@ def excitation(
     """
     if layout.by_flow:
         raise FinlabError(
-            f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a wide path, "
+            f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a "
+            "wide path, "
             "such as --trajectory circle --scale 25, and fit that log"
         )
     if not SHORTEST_S <= duration_s <= LONGEST_S:

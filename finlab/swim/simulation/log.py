@@ -26,7 +26,8 @@ MAX_BYTES = 200_000_000
 
 
 def lies_over(quaternion: AnyArray) -> AnyArray:
-    """Whether a body of attitudes (..., 4) as w, x, y, z lies on its side or stands on its end (...)."""
+    """Whether a body of attitudes (..., 4) as w, x, y, z lies on its side or stands on its end
+    (...)."""
     tilt: AnyArray = (quaternion[..., 1:3] ** 2).sum(axis=-1)
     return tilt > 0.5
 
@@ -45,8 +46,8 @@ class Tick(NamedTuple):
     flow: AnyArray
     """Velocity of the water (3,) where the robot is, in the world [m/s]."""
     measured: AnyArray
-    """What the sensors said last (12,): position [m], roll, pitch, yaw [rad], velocity [m/s] and angular
-    rates [rad/s] in the body frame."""
+    """What the sensors said last (12,): position [m], roll, pitch, yaw [rad], velocity [m/s] and
+    angular rates [rad/s] in the body frame."""
     reference: AnyArray
     """Where the robot should be at `time` (3,) [m]."""
     reference_surge: float
@@ -54,12 +55,13 @@ class Tick(NamedTuple):
     asked: AnyArray
     """Wrench (6,) that the controller asks for [N, N m], body frame."""
     allocated: AnyArray
-    """Wrench (6,) that the commands give once the fins have followed them, by the fin law [N, N m]."""
+    """Wrench (6,) that the commands give once the fins have followed them, by the fin law [N, N
+    m]."""
     delivered: AnyArray
     """Wrench (6,) of the fins, mean over the period [N, N m]."""
     command: AnyArray
-    """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a fin that is taken for
-    lost."""
+    """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a fin that is
+    taken for lost."""
     fin_motion: AnyArray
     """What the fins did at the end of the period (n, 3), in the same units."""
     force: AnyArray
@@ -67,8 +69,8 @@ class Tick(NamedTuple):
     inertial_power: AnyArray
     """|I alpha omega| of each fin (n,), mean over the period [W]."""
     driving_power: AnyArray
-    """max(torque times speed, 0) of each fin with the heat in its motor's windings (n,), mean over the period
-    [W]."""
+    """max(torque times speed, 0) of each fin with the heat in its motor's windings (n,), mean over
+    the period [W]."""
     alive: AnyArray
     """Which fins move as commanded, stuck and torn ones among them (n,)."""
     fault_probability: AnyArray
@@ -84,11 +86,25 @@ class Tick(NamedTuple):
 FINS = (None,)
 COMMANDS = (None, 3)
 SHAPES: dict[str, tuple[int | None, ...]] = {
-    "position": (3,), "quaternion": (4,), "motion": (6,), "flow": (3,), "measured": (12,), "reference": (3,),
-    "asked": (6,), "allocated": (6,), "delivered": (6,), "command": COMMANDS, "fin_motion": COMMANDS,
-    "force": COMMANDS, "inertial_power": FINS, "driving_power": FINS,
-    "alive": FINS, "fault_probability": FINS, "strength": FINS, "strength_std": FINS,
-}  # fmt: skip
+    "position": (3,),
+    "quaternion": (4,),
+    "motion": (6,),
+    "flow": (3,),
+    "measured": (12,),
+    "reference": (3,),
+    "asked": (6,),
+    "allocated": (6,),
+    "delivered": (6,),
+    "command": COMMANDS,
+    "fin_motion": COMMANDS,
+    "force": COMMANDS,
+    "inertial_power": FINS,
+    "driving_power": FINS,
+    "alive": FINS,
+    "fault_probability": FINS,
+    "strength": FINS,
+    "strength_std": FINS,
+}
 """Shape of a column at each tick, None for the number of fins; the others are numbers."""
 
 
@@ -141,9 +157,13 @@ class RunLog:
         ]
         title = f"{self.layout} along {self.task} by {self.method}, controller {self.controller}"
         ends = [", ".join(lost)] if lost else []
-        ends += [] if self.capsized_s is None else [f"the robot capsized at {self.capsized_s:.1f} s"]
+        ends += (
+            [] if self.capsized_s is None else [f"the robot capsized at {self.capsized_s:.1f} s"]
+        )
         shown = title, self.reference, self.position, lost
-        return html([title, Table(("swim", ""), rows, (True, False)), *ends], lambda: path_picture(*shown))
+        return html(
+            [title, Table(("swim", ""), rows, (True, False)), *ends], lambda: path_picture(*shown)
+        )
 
     def npz(self) -> bytes:
         """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""
@@ -172,7 +192,8 @@ def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
 
 
 def load_log(path: str | Path) -> RunLog:
-    """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this version."""
+    """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this
+    version."""
     what = "a swim log written by finlab simulate"
     in_file = [_IN_FILE.get(name, name) for name in Tick._fields]
     arrays = read_arrays(path, ("meta", *in_file), MAX_BYTES, what)
@@ -180,11 +201,14 @@ def load_log(path: str | Path) -> RunLog:
         "meta": arrays["meta"],
         **{name: arrays[own] for name, own in zip(Tick._fields, in_file, strict=True)},
     }
-    about = checked(json_of(columns.pop("meta"), f"{path}: meta"), _About, DataError, f"{path}: meta")
+    about = checked(
+        json_of(columns.pop("meta"), f"{path}: meta"), _About, DataError, f"{path}: meta"
+    )
     n = columns["time"].size
     fins = len(about.names)
     shapes = {
-        name: tuple(fins if size is None else size for size in SHAPES.get(name, ())) for name in columns
+        name: tuple(fins if size is None else size for size in SHAPES.get(name, ()))
+        for name in columns
     }
     check_shapes(columns, {name: (n, *shape) for name, shape in shapes.items()}, str(path))
     return RunLog(columns=columns, **{name: getattr(about, name) for name, _ in _ABOUT})

@@ -18,7 +18,8 @@ RAMP_S = 6.0
 STEP_S = 0.05
 """Spacing of the samples of a shipped trajectory [s]."""
 SLOPE_S = (0.2, 1.0)
-"""Least and most time on both sides from which a trajectory's velocity and acceleration are taken [s]."""
+"""Least and most time on both sides from which a trajectory's velocity and acceleration are taken
+[s]."""
 RESTING = 0.005
 """Horizontal speed [m/s] below which a trajectory counts as resting."""
 SHORTEST_S = 1.0
@@ -34,22 +35,27 @@ class Trajectory:
     """Positions at times, with straight lines between them."""
 
     def __init__(self, name: str, time: Array, position: Array) -> None:
-        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m]. Raises DataError:
-        fewer than two samples, less than a second, times that do not rise from 0, or values that are not
-        finite."""
+        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m]. Raises
+        DataError: fewer than two samples, less than a second, times that do not rise from 0, or
+        values that are not finite."""
         time = np.asarray(time, np.float64)
         position = np.asarray(position, np.float64)
         if len(time) < 2 or position.shape != (len(time), 3):
             raise DataError(
-                f"trajectory {name}: expected at least two samples of t, x, y, z, got {len(time)} times and "
+                f"trajectory {name}: expected at least two samples of t, x, y, z, got {len(time)} "
+                "times and "
                 f"positions of shape {position.shape}"
             )
         if not (np.isfinite(time).all() and np.isfinite(position).all()):
             raise DataError(f"trajectory {name}: expected finite numbers, got NaN or infinity")
         if time[0] != 0.0 or not (np.diff(time) > 0.0).all():
-            raise DataError(f"trajectory {name}: expected times that rise from 0, got {time[0]:g} first")
+            raise DataError(
+                f"trajectory {name}: expected times that rise from 0, got {time[0]:g} first"
+            )
         if time[-1] < SHORTEST_S:
-            raise DataError(f"trajectory {name}: expected at least {SHORTEST_S:g} s, got {time[-1]:g}")
+            raise DataError(
+                f"trajectory {name}: expected at least {SHORTEST_S:g} s, got {time[-1]:g}"
+            )
         self.name = name
         self.time = time
         self.samples = position
@@ -69,7 +75,9 @@ class Trajectory:
         # A path may end under way: what would stop it there within a moment is no part of it.
         dt = self._slope_s
         middle = min(time, self.duration_s - dt)
-        here, behind, between, ahead = self.position(np.array([time, middle - dt, middle, middle + dt]))
+        here, behind, between, ahead = self.position(
+            np.array([time, middle - dt, middle, middle + dt])
+        )
         if time > self.duration_s:
             return Setpoint(here, 0.0, onward=self._onward(time))
         velocity = (ahead - behind) / (2 * dt)
@@ -78,7 +86,8 @@ class Trajectory:
         return Setpoint(here, speed, velocity, acceleration, self._onward(time))
 
     def _onward(self, time: float) -> float:
-        """Heading [rad] of the first piece from `time` [s] on that does not rest; else that of the last."""
+        """Heading [rad] of the first piece from `time` [s] on that does not rest; else that of the
+        last."""
         if not len(self._moves):
             return math.nan
         piece = np.searchsorted(self.time, time, side="right") - 1
@@ -106,7 +115,9 @@ def _eased(name: str, duration_s: float, at: Callable[[Array], Place]) -> Trajec
 def circle(duration_s: float = 60.0) -> Trajectory:
     """One round of 1.2 m radius at 1 m depth, 0.13 m/s."""
     return _eased(
-        "circle", duration_s, lambda at: (1.2 * np.sin(TURN * at), 1.2 * (1.0 - np.cos(TURN * at)), -1.0)
+        "circle",
+        duration_s,
+        lambda at: (1.2 * np.sin(TURN * at), 1.2 * (1.0 - np.cos(TURN * at)), -1.0),
     )
 
 
@@ -115,7 +126,11 @@ def lissajous(duration_s: float = 90.0) -> Trajectory:
 
     def eight(share: Array) -> Place:
         twice = 2.0 * TURN * share
-        return 1.5 * np.sin(TURN * share), 0.75 * np.sin(twice), -1.0 + 0.125 * (np.cos(twice) - 1.0)
+        return (
+            1.5 * np.sin(TURN * share),
+            0.75 * np.sin(twice),
+            -1.0 + 0.125 * (np.cos(twice) - 1.0),
+        )
 
     return _eased("lissajous", duration_s, eight)
 
@@ -139,7 +154,9 @@ def square(duration_s: float = 90.0) -> Trajectory:
 
 def dive(duration_s: float = 60.0) -> Trajectory:
     """Straight ahead for 6 m, down from 1 m to 2 m and up again, at slopes of up to 28 degrees."""
-    return _eased("dive", duration_s, lambda at: (6.0 * at, 0.0, -1.0 - 0.5 * (1.0 - np.cos(TURN * at))))
+    return _eased(
+        "dive", duration_s, lambda at: (6.0 * at, 0.0, -1.0 - 0.5 * (1.0 - np.cos(TURN * at)))
+    )
 
 
 def straight(duration_s: float = 60.0, speed: float = 0.15) -> Trajectory:
@@ -159,19 +176,24 @@ SHIPPED: dict[str, Callable[..., Trajectory]] = {
 """Trajectories by name; each takes its duration [s]."""
 
 
-def make_trajectory(source: str | Path, duration_s: float | None = None, scale: float = 1.0) -> Trajectory:
-    """A shipped trajectory by name, or one from a file. Raises DataError: unknown name, a duration that does
-    not fit, or a file that cannot be read, lacks a column, or holds something that is no number.
+def make_trajectory(
+    source: str | Path, duration_s: float | None = None, scale: float = 1.0
+) -> Trajectory:
+    """A shipped trajectory by name, or one from a file. Raises DataError: unknown name, a duration
+    that does not fit, or a file that cannot be read, lacks a column, or holds something that is no
+    number.
 
     Args:
-        source: circle, lissajous, square, dive, straight, station, or a CSV file with the columns t [s] and
-            x, y, z [m], in any order.
+        source: circle, lissajous, square, dive, straight, station, or a CSV file with the columns t
+            [s] and x, y, z [m], in any order.
         duration_s: time for a shipped one [s]; a file brings its own.
         scale: how many times larger the path is to be, about its start, in the same time.
     """
     if scale != 1.0:
         if not 0.0 < scale <= MAX_SCALE:
-            raise DataError(f"scale: expected a number above 0 and up to {MAX_SCALE:g}, got {scale}")
+            raise DataError(
+                f"scale: expected a number above 0 and up to {MAX_SCALE:g}, got {scale}"
+            )
         path = make_trajectory(source, duration_s)
         larger = path.samples[0] + scale * (path.samples - path.samples[0])
         return Trajectory(path.name, path.time, larger)
@@ -188,6 +210,8 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
         raise DataError(f"duration: {name} brings its own times; leave it out")
     table = read_table(Path(source), MAX_BYTES, "a CSV file of a path")
     if missing := [column for column in COLUMNS if column not in table.header]:
-        raise DataError(f"{source}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
+        raise DataError(
+            f"{source}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}"
+        )
     rows, _ = table.numbers([table.header.index(column) for column in COLUMNS])
     return Trajectory(Path(source).stem, rows[:, 0], rows[:, 1:])

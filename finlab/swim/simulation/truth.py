@@ -2,7 +2,8 @@
 
     ClosedLoop(layout, allocator, task, truth=perturbed(layout, damping=2.0))
 
-Controllers, gains and allocators go on believing the layout; only the simulated body is another one.
+Controllers, gains and allocators go on believing the layout; only the simulated body is another
+one.
 """
 
 import math
@@ -35,8 +36,8 @@ def perturbed(
     askew: float = 0.0,
     center: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Layout:
-    """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
-    Raises LayoutError: a factor is not above 0.
+    """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any
+    swim. Raises LayoutError: a factor is not above 0.
 
     Args:
         layout: what is believed.
@@ -44,11 +45,18 @@ def perturbed(
         added_mass: factor of the added mass.
         inertia: factor of the moments of inertia; the mass stays, and with it the weight.
         buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
-        askew: how far actuators are turned about the vertical [rad], one this way and the next that way.
-        center: the true centre of gravity as the layout's frame sees it (3,) [m]; the robot is ballasted to
-            lie level all the same, so its centre of buoyancy is where the layout says, seen from there.
+        askew: how far actuators are turned about the vertical [rad], one this way and the next that
+        way.
+        center: the true centre of gravity as the layout's frame sees it (3,) [m]; the robot is
+            ballasted to lie level all the same, so its centre of buoyancy is where the layout says,
+            seen from there.
     """
-    factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
+    factors = {
+        "damping": damping,
+        "added_mass": added_mass,
+        "inertia": inertia,
+        "buoyancy": buoyancy,
+    }
     for name, factor in factors.items():
         checked(factor, Factor, key=name)
     body = complete_body(layout)
@@ -71,8 +79,11 @@ def perturbed(
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:
-    """The true robot; a `LayoutError` where it does not have the actuators of the layout that is believed."""
-    if [(part.name, part.type) for part in truth.actuators] != [(p.name, p.type) for p in layout.actuators]:
+    """The true robot; a `LayoutError` where it does not have the actuators of the layout that is
+    believed."""
+    if [(part.name, part.type) for part in truth.actuators] != [
+        (p.name, p.type) for p in layout.actuators
+    ]:
         known = ", ".join(layout.names)
         names = ", ".join(truth.names)
         raise LayoutError(f"truth: expected the actuators of {layout.name}, {known}, got {names}")
@@ -84,8 +95,8 @@ def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] 
 
 
 KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
-"""What can become of an actuator in a swim: it hangs still; it gives a share of its thrust; it beats but
-no longer turns; it works again as it should."""
+"""What can become of an actuator in a swim: it hangs still; it gives a share of its thrust; it
+beats but no longer turns; it works again as it should."""
 
 
 class Fault(NamedTuple):
@@ -96,7 +107,8 @@ class Fault(NamedTuple):
     """When [s]."""
     kind: Kind = "lost"
     share: float = 0.5
-    """Share of the thrust that is left of a torn one, above 0 and below 1; of no meaning for the others."""
+    """Share of the thrust that is left of a torn one, above 0 and below 1; of no meaning for the
+    others."""
 
     @classmethod
     def parse(cls, kind: Kind, text: str) -> "Fault":
@@ -104,7 +116,8 @@ class Fault(NamedTuple):
 
         Args:
             kind: what becomes of the actuator, which is the name of the option.
-            text: `NAME@SECONDS`, or `NAME` for the start; of a torn one `NAME=SHARE@SECONDS` or `NAME=SHARE`.
+            text: `NAME@SECONDS`, or `NAME` for the start; of a torn one `NAME=SHARE@SECONDS` or
+            `NAME=SHARE`.
 
         Raises:
             FinlabError: the text says something else, or the time or the share is out of range.
@@ -129,12 +142,17 @@ class Fault(NamedTuple):
     def checked(self) -> "Fault":
         """Itself; a `FinlabError` where a time, a kind or a share is none."""
         if not (math.isfinite(self.time_s) and self.time_s >= 0.0):
-            raise FinlabError(f"fault of {self.name}: expected a time of 0 s or more, got {self.time_s}")
+            raise FinlabError(
+                f"fault of {self.name}: expected a time of 0 s or more, got {self.time_s}"
+            )
         if self.kind not in KINDS:
-            raise FinlabError(f"fault of {self.name}: expected {', '.join(KINDS)}, got {self.kind!r:.60}")
+            raise FinlabError(
+                f"fault of {self.name}: expected {', '.join(KINDS)}, got {self.kind!r:.60}"
+            )
         if not 0.0 < self.share < 1.0:
             raise FinlabError(
-                f"fault of {self.name}: expected a share of the thrust between 0 and 1, got {self.share}"
+                f"fault of {self.name}: expected a share of the thrust between 0 and 1, got "
+                f"{self.share}"
             )
         return self
 
@@ -142,6 +160,10 @@ class Fault(NamedTuple):
 def damage_of(layout: Layout, faults: Mapping[str, Fault], held: Array) -> Damage:
     """What faults, by name, leave of a robot; `held` (n,) is where actuators are stuck."""
     torn = {name: fault.share for name, fault in faults.items() if fault.kind == "torn"}
-    stuck = {name: float(held[layout.index(name)]) for name, fault in faults.items() if fault.kind == "stuck"}
+    stuck = {
+        name: float(held[layout.index(name)])
+        for name, fault in faults.items()
+        if fault.kind == "stuck"
+    }
     lost = [name for name, fault in faults.items() if fault.kind == "lost"]
     return Damage.known(layout, lost, torn, stuck)

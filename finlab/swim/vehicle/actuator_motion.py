@@ -20,7 +20,9 @@ class FirstOrder:
     def __init__(self, actuators: Sequence[Actuator]) -> None:
         """Starts at rest: no force, angles as near to 0 as their arcs allow."""
         m = len(actuators)
-        self._rate = np.minimum(np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED)
+        self._rate = np.minimum(
+            np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED
+        )
         self._time_constant = np.full((m, 3), AT_ONCE)
         self._circles = np.zeros((m, 3), bool)
         self._angles = np.zeros((m, 3), bool)
@@ -40,7 +42,8 @@ class FirstOrder:
         """The same before the last step."""
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (m, 3) for `dt` [s]; one whose row is NaN stops at once and does not turn."""
+        """Follows a command (m, 3) for `dt` [s]; one whose row is NaN stops at once and does not
+        turn."""
         self.before = value = self.value
         error = command - value
         error = np.where(self._circles, error - TURN * np.rint(error / TURN), error)
@@ -55,7 +58,8 @@ class ActuatorMotion:
     """What the actuators of one layout do if they follow as they should; commands are (n, 3)."""
 
     def __init__(self, layout: Layout, fins: FinLag | None = None) -> None:
-        """Starts at rest; `fins` follows the fins, by default without what happens within the beat."""
+        """Starts at rest; `fins` follows the fins, by default without what happens within the
+        beat."""
         self.of_fins, self.of_others = np.flatnonzero(layout.is_fin), np.flatnonzero(~layout.is_fin)
         """Places of the fins and of the others."""
         self.fins = FinLag(layout) if fins is None else fins
@@ -94,16 +98,16 @@ class ActuatorMotion:
 
     @property
     def pushes(self) -> NDArray[np.bool_]:
-        """Which actuators (n,) may give a force: fins that beat, whatever the law says of others, and all
-        others but those that have stopped."""
+        """Which actuators (n,) may give a force: fins that beat, whatever the law says of others,
+        and all others but those that have stopped."""
         result = self._working.copy()
         result[self.of_fins] = self.fins.value[0] * self.fins.value[1] > 0.0
         return result
 
     @property
     def direction(self) -> Array:
-        """Where each actuator (n,) would stay if it stuck: a fin's zero direction, another one's angle
-        [rad], or a force [N]."""
+        """Where each actuator (n,) would stay if it stuck: a fin's zero direction, another one's
+        angle [rad], or a force [N]."""
         others = self.others.value[np.arange(len(self.of_others)), self._held[self.of_others]]
         return self.joined(self.fins.value[2], others)
 
@@ -113,7 +117,8 @@ class ActuatorMotion:
         return part
 
     def turned_to(self, command: Array, direction: Array) -> Array:
-        """Commands (..., n, 3) whose held parts are those of `direction` (..., n) where it is not NaN."""
+        """Commands (..., n, 3) whose held parts are those of `direction` (..., n) where it is not
+        NaN."""
         result = command.copy()
         kept = np.where(np.isnan(direction), self.held_part(result), direction)
         result[..., self._places, self._held] = kept

@@ -1,7 +1,7 @@
 """Attitudes as quaternions (w, x, y, z), as angles about z, then y, then x, and as rotations.
 
-A rotation is nine numbers, floats or arrays: the axes x, y and z of the body one after the other, as the
-world (z up) sees them.
+A rotation is nine numbers, floats or arrays: the axes x, y and z of the body one after the other,
+as the world (z up) sees them.
 """
 
 import math
@@ -30,7 +30,8 @@ def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, 
 
 
 def euler(quaternion: ArrayLike) -> Array:
-    """Roll, pitch, yaw (..., 3) [rad], turned about z, then y, then x; pitch is positive nose down."""
+    """Roll, pitch, yaw (..., 3) [rad], turned about z, then y, then x; pitch is positive nose
+    down."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))

@@ -1,8 +1,8 @@
 """Fins that follow their commands, from beat to beat and within the beat, and their power.
 
 Amplitude, frequency and zero direction each follow their command through the filters of
-`finlab.layout.Servo`, exactly for a command that stays over the step. A fin that is given another frequency
-goes on from where it is in its beat.
+`finlab.layout.Servo`, exactly for a command that stays over the step. A fin that is given another
+frequency goes on from where it is in its beat.
 """
 
 import math
@@ -34,26 +34,36 @@ class LagStep(NamedTuple):
     def of(cls, pole: Array, dt: float) -> "LagStep":
         """The step over `dt` [s] of filters with double poles [rad/s], of any shape."""
         decay = np.exp(-pole * dt)
-        return cls((1.0 + pole * dt) * decay, dt * decay, -(pole**2) * dt * decay, (1.0 - pole * dt) * decay)
+        return cls(
+            (1.0 + pole * dt) * decay,
+            dt * decay,
+            -(pole**2) * dt * decay,
+            (1.0 - pole * dt) * decay,
+        )
 
     def follow(self, value: Array, rate: Array, aim: Array) -> tuple[Array, Array]:
         """Values and rates after the step."""
         error = value - aim
-        return aim + self.kept * error + self.carried * rate, self.driven * error + self.slowed * rate
+        return (
+            aim + self.kept * error + self.carried * rate,
+            self.driven * error + self.slowed * rate,
+        )
 
 
 class FinLag:
-    """What the n fins of one layout do if they follow as they should: enough for whoever watches ten times a
-    second. `FinMotion` adds what happens within the beat."""
+    """What the n fins of one layout do if they follow as they should: enough for whoever watches
+    ten times a second. `FinMotion` adds what happens within the beat."""
 
     def __init__(self, layout: Layout) -> None:
-        """Starts at rest: no amplitude, no frequency, zero directions at the middle of their arcs."""
+        """Starts at rest: no amplitude, no frequency, zero directions at the middle of their
+        arcs."""
         lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
         self._turns_fully = is_full_turn(upper - lower)
         self._poles = np.ascontiguousarray(layout.servo_poles.reshape(-1, 3).T)
         self._fastest_swing = layout.speed_limit / TURN
         self.value = np.zeros((3, layout.n_fins))
-        """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam (3, n)."""
+        """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
+        (3, n)."""
         self.value[2] = 0.5 * (lower + upper)
         self.rate = np.zeros((3, layout.n_fins))
         """The same per second (3, n)."""
@@ -66,7 +76,8 @@ class FinLag:
         return self.value.T.copy()
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
+        """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs
+        still."""
         self._follow(command, dt)
 
     def _follow(self, command: Array, dt: float) -> NDArray[np.bool_] | None:
@@ -97,13 +108,15 @@ CREEP = 0.1
 """Share of its speed that a servo turns its fin with, however fast that flaps."""
 
 COPPER_LOSS = 0.5
-"""Heat in the windings of a fin's motor [W/(N m)^2]: `copper_loss` of a robot that swims in simulation. Our
-choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings take 730 W/(N m)^2 at its
-own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its fin turns twice a second."""
+"""Heat in the windings of a fin's motor [W/(N m)^2]: `copper_loss` of a robot that swims in
+simulation. Our choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings
+take 730 W/(N m)^2 at its own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its
+fin turns twice a second."""
 
 
 class FinMotion(FinLag):
-    """Angles of the fins of one layout over time, in steps much shorter than a beat; all arrays are (n,)."""
+    """Angles of the fins of one layout over time, in steps much shorter than a beat; all arrays are
+    (n,)."""
 
     def __init__(self, layout: Layout) -> None:
         """Starts at rest, as `FinLag`."""
@@ -145,8 +158,8 @@ class FinMotion(FinLag):
         return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
 
     def speed_and_acceleration(self) -> tuple[Array, Array]:
-        """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim
-        as means over the last step."""
+        """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change
+        their aim as means over the last step."""
         sine = np.sin(self.phase)
         cosine = np.cos(self.phase)
         swing = TURN * self.value[1]
@@ -165,15 +178,20 @@ class FinPower(NamedTuple):
     """Power of each fin (..., n) [W], by two measures."""
 
     inertial: Array
-    """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like driving."""
+    """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like
+    driving."""
     driving: Array
-    """max(tau omega, 0), inertia, carried water and drag together, nothing won back by braking, and the heat
-    in the motor's windings, copper_loss tau^2: what a battery gives, but for the electronics."""
+    """max(tau omega, 0), inertia, carried water and drag together, nothing won back by braking, and
+    the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
+    electronics."""
 
 
-def fin_power(speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
-    """The power of fins with angular speeds (..., n) [rad/s] and accelerations (..., n) [rad/s^2]; the torque
-    is that of a rigid plate in still water, and `copper_loss` the heat in its motor [W/(N m)^2]."""
+def fin_power(
+    speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS
+) -> FinPower:
+    """The power of fins with angular speeds (..., n) [rad/s] and accelerations (..., n) [rad/s^2];
+    the torque is that of a rigid plate in still water, and `copper_loss` the heat in its motor
+    [W/(N m)^2]."""
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
     mechanical = np.maximum(torque * speed, 0.0)
     inertial = np.abs(blade.own_inertia * acceleration * speed)

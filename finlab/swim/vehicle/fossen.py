@@ -1,11 +1,13 @@
-"""Fossen's equations of motion in six degrees of freedom and their Jacobian, for one body or for many.
+"""Fossen's equations of motion in six degrees of freedom and their Jacobian, for one body or for
+many.
 
-With nu_r the velocity relative to the water (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion
-Control, 2nd ed., chapters 6 to 8 and 10):
+With nu_r the velocity relative to the water (T. I. Fossen, Handbook of Marine Craft Hydrodynamics
+and Motion Control, 2nd ed., chapters 6 to 8 and 10):
 
     M nu_r' + C(nu_r) nu_r + D(nu_r) nu_r + g = tau,   M = M_RB + M_A diagonal
 
-The Coriolis terms are written by momenta (Kirchhoff): p = M_lin v_r, h = M_ang omega give -omega x p and
+The Coriolis terms are written by momenta (Kirchhoff): p = M_lin v_r, h = M_ang omega give -omega x
+p and
 -omega x h - v_r x p. Order of six: surge, sway, heave, roll, pitch, yaw; x forward, y left, z up.
 
 Numbers may be plain floats, which for one body are several times faster than arrays, or arrays that
@@ -71,9 +73,12 @@ def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, wrench: Any) -> 
         (wrench[0] - (q * pz - r * py) - (lin[0] + quad[0] * abs(u)) * u + net * up[0]) / mx,
         (wrench[1] - (r * px - p * pz) - (lin[1] + quad[1] * abs(v)) * v + net * up[1]) / my,
         (wrench[2] - (p * py - q * px) - (lin[2] + quad[2] * abs(w)) * w + net * up[2]) / mz,
-        (wrench[3] - (q * hz - r * hy) - (v * pz - w * py) - (lin[3] + quad[3] * abs(p)) * p + rx) / ix,
-        (wrench[4] - (r * hx - p * hz) - (w * px - u * pz) - (lin[4] + quad[4] * abs(q)) * q + ry) / iy,
-        (wrench[5] - (p * hy - q * hx) - (u * py - v * px) - (lin[5] + quad[5] * abs(r)) * r + rz) / iz,
+        (wrench[3] - (q * hz - r * hy) - (v * pz - w * py) - (lin[3] + quad[3] * abs(p)) * p + rx)
+        / ix,
+        (wrench[4] - (r * hx - p * hz) - (w * px - u * pz) - (lin[4] + quad[4] * abs(q)) * q + ry)
+        / iy,
+        (wrench[5] - (p * hy - q * hx) - (u * py - v * px) - (lin[5] + quad[5] * abs(r)) * r + rz)
+        / iz,
     )
 
 
@@ -105,8 +110,8 @@ def damping_rates(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
 
 
 def damping_jacobian(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
-    """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the diagonal of
-    the Jacobian. The quadratic part counts twice, as at twice the speed."""
+    """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the
+    diagonal of the Jacobian. The quadratic part counts twice, as at twice the speed."""
     return damping_rates(body, [2.0 * speed for speed in flow])
 
 
@@ -123,7 +128,8 @@ def ucat_body() -> Body:
 
 
 def complete_body(layout: Layout) -> Body:
-    """The body of a robot; what its layout leaves out is U-CAT's, but for buoyancy, which is then neutral."""
+    """The body of a robot; what its layout leaves out is U-CAT's, but for buoyancy, which is then
+    neutral."""
     if layout.body is None:
         return ucat_body()
     said = {name: value for name, value in vars(layout.body).items() if value is not None}
@@ -131,8 +137,8 @@ def complete_body(layout: Layout) -> Body:
 
 
 def dynamics_of(body: Body) -> Dynamics[tuple[float, ...], float]:
-    """The numbers of a body in the equations of motion; what it does not say is zero, buoyancy the weight.
-    Raises LayoutError: the body has no mass or no inertia."""
+    """The numbers of a body in the equations of motion; what it does not say is zero, buoyancy the
+    weight. Raises LayoutError: the body has no mass or no inertia."""
     if body.mass_kg is None or body.inertia_kgm2 is None:
         raise LayoutError("a vehicle needs a body with mass_kg and inertia_kgm2")
     zeros = (0.0,) * 6

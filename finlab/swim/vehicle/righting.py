@@ -1,8 +1,8 @@
 """Righting moment of a robot, and the speed from which the water overturns it.
 
-Surge, heave and pitch are linearized about straight motion ahead (T. I. Fossen, Handbook of Marine Craft
-Hydrodynamics and Motion Control, chapter 7): the moment of the added mass (Munk's) grows with the squared
-speed, the righting moment, lift times height of its centre, does not.
+Surge, heave and pitch are linearized about straight motion ahead (T. I. Fossen, Handbook of Marine
+Craft Hydrodynamics and Motion Control, chapter 7): the moment of the added mass (Munk's) grows with
+the squared speed, the righting moment, lift times height of its centre, does not.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ SMALL = 1e-3
 
 
 def overturning_speed(layout: Layout) -> float | None:
-    """The least speed ahead [m/s] at which a robot that nothing steers leaves the level in pitch; None where
-    it stays up to `FASTEST`. What its layout leaves out of the body is U-CAT's."""
+    """The least speed ahead [m/s] at which a robot that nothing steers leaves the level in pitch;
+    None where it stays up to `FASTEST`. What its layout leaves out of the body is U-CAT's."""
     body = dynamics_of(complete_body(layout))
     plant = plant_of(layout)
     rest = np.clip(np.zeros((layout.n, 3)), layout.lower, layout.upper)
@@ -51,4 +51,7 @@ def righting_words(layout: Layout) -> str | None:
     speed = overturning_speed(layout)
     if speed is None:
         return "no righting moment: nothing turns it back in roll and pitch"
-    return f"no righting moment: overturns in pitch {f'from {speed:.2g} m/s on' if speed else 'at rest'}"
+    return (
+        "no righting moment: overturns in pitch "
+        f"{f'from {speed:.2g} m/s on' if speed else 'at rest'}"
+    )

@@ -1,13 +1,15 @@
-"""Bodies in water that moves: one vehicle, and many side by side, their states, rates of change and steps.
+"""Bodies in water that moves: one vehicle, and many side by side, their states, rates of change and
+steps.
 
-State (13,): position in the world [m], quaternion (w, x, y, z), velocity over ground [m/s] and angular rates
-[rad/s] in the body frame. The water moves without rotation, so nu' = nu_r' - omega x (current in body) + (its
-acceleration in body). Where it accelerates, it carries the body along by the pressure that it accelerates
-itself with: M nu_r' says so of a body as heavy as the water in its place; the buoyant force leans with it.
-Of one vehicle, plain floats: at this size they are several times faster than arrays.
+State (13,): position in the world [m], quaternion (w, x, y, z), velocity over ground [m/s] and
+angular rates [rad/s] in the body frame. The water moves without rotation, so nu' = nu_r' - omega x
+(current in body) + (its acceleration in body). Where it accelerates, it carries the body along by
+the pressure that it accelerates itself with: M nu_r' says so of a body as heavy as the water in its
+place; the buoyant force leans with it. Of one vehicle, plain floats: at this size they are several
+times faster than arrays.
 
-Many bodies, which a fit integrates thousands of times, have states (12, ...) with attitude angles roll,
-pitch, yaw [rad] (about z, then y, then x) in place of the quaternion.
+Many bodies, which a fit integrates thousands of times, have states (12, ...) with attitude angles
+roll, pitch, yaw [rad] (about z, then y, then x) in place of the quaternion.
 """
 
 import math
@@ -18,25 +20,33 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout import Body
-from finlab.swim.vehicle.attitude import rotation_of_angles, rotation_of_quaternion, to_body, to_world
+from finlab.swim.vehicle.attitude import (
+    rotation_of_angles,
+    rotation_of_quaternion,
+    to_body,
+    to_world,
+)
 from finlab.swim.vehicle.fossen import Dynamics, accelerations, damping_jacobian, dynamics_of
 
 STATE_SIZE = 13
 LONGEST, MOST_STEPS = 1.5, 500
-"""Times what is fastest in a motion that a step may last, well within what Runge-Kutta (2.8) and the midpoint
-rule (2) bear; and into how many steps at most a period is cut for a body that water stops almost at once."""
+"""Times what is fastest in a motion that a step may last, well within what Runge-Kutta (2.8) and
+the midpoint rule (2) bear; and into how many steps at most a period is cut for a body that water
+stops almost at once."""
 
 
 class Vehicle:
     """The dynamics of one vehicle; it holds no state."""
 
     def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Takes a body and the water's velocity (3,) in the world [m/s]; what the body does not say is zero.
-        Raises LayoutError: the body has no mass or no inertia."""
+        """Takes a body and the water's velocity (3,) in the world [m/s]; what the body does not say
+        is zero. Raises LayoutError: the body has no mass or no inertia."""
         self.current = tuple(float(value) for value in current)
         """Velocity of the water (3,) in the world [m/s]."""
         if len(self.current) != 3 or not all(map(math.isfinite, self.current)):
-            raise LayoutError(f"expected a velocity of three finite numbers, got {current!r:.60}", "current")
+            raise LayoutError(
+                f"expected a velocity of three finite numbers, got {current!r:.60}", "current"
+            )
         self.dynamics = dynamics = dynamics_of(body)
         self.inertia = dynamics.inertia
         """Diagonal of M (6,) [kg, kg m^2]."""
@@ -51,12 +61,16 @@ class Vehicle:
     def n_steps(self, motion: Sequence[float], dt: float) -> int:
         """Into how many equal steps `dt` [s] has to be cut so that integrating it stays stable.
 
-        One for a robot as robots are; more where damping, Munk's moments or its own turning change the motion
-        (6,) [m/s, rad/s] within `dt`, as of a light body that water holds fast, or of one that tumbles.
-        Raises LayoutError: even `MOST_STEPS` would not do."""
+        One for a robot as robots are; more where damping, Munk's moments or its own turning change
+        the motion
+        (6,) [m/s, rad/s] within `dt`, as of a light body that water holds fast, or of one that
+        tumbles. Raises LayoutError: even `MOST_STEPS` would not do."""
         cx, cy, cz = self.current
         stream = abs(cx) + abs(cy) + abs(cz)
-        if dt * (self._rate_at_rest + self._rate_by_speed * (max(map(abs, motion)) + stream)) <= LONGEST:
+        if (
+            dt * (self._rate_at_rest + self._rate_by_speed * (max(map(abs, motion)) + stream))
+            <= LONGEST
+        ):
             return 1  # as nearly always: known from a bound, which takes less time
         u, v, w, p, q, r = map(abs, motion)
         speeds = (u + stream, v + stream, w + stream, p, q, r)
@@ -66,7 +80,8 @@ class Vehicle:
         if not often <= most:  # nor where it is no number any more
             got = f"{often:.2g} times a second" if math.isfinite(often) else "beyond all bounds"
             raise LayoutError(
-                f"its motion changes {got}, at most {most:g} can be simulated; check mass, inertia, "
+                f"its motion changes {got}, at most {most:g} can be simulated; check mass, "
+                "inertia, "
                 "added mass, damping and buoyancy",
                 "body",
             )
@@ -95,15 +110,16 @@ class Vehicle:
         ]
 
     def velocity_in_water(self, state: Array) -> Array:
-        """Velocity relative to the water and angular rates (6,) of a state, body frame [m/s, rad/s]."""
+        """Velocity relative to the water and angular rates (6,) of a state, body frame [m/s,
+        rad/s]."""
         velocity = state[7:].copy()
         if any(self.current):
             velocity[:3] -= to_body(rotation_of_quaternion(*state[3:7].tolist()), *self.current)
         return velocity
 
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
-        """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4.
-        Raises LayoutError: the body moves too fast to be simulated."""
+        """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta,
+        order 4. Raises LayoutError: the body moves too fast to be simulated."""
         y: list[float] = state.tolist()
         n_steps = self.n_steps(y[7:], dt)
         for _ in range(n_steps):
@@ -111,7 +127,8 @@ class Vehicle:
         return np.array(y)
 
     def coarse_step(self, state: list[float], wrench: Sequence[float], dt: float) -> list[float]:
-        """The same by the midpoint rule, in half the time; the quaternion's length is left alone."""
+        """The same by the midpoint rule, in half the time; the quaternion's length is left
+        alone."""
         n_steps = self.n_steps(state[7:], dt)
         h = dt / n_steps
         for _ in range(n_steps):
@@ -125,7 +142,10 @@ class Vehicle:
         k2 = self.derivative([a + 0.5 * dt * b for a, b in zip(y0, k1, strict=True)], wrench)
         k3 = self.derivative([a + 0.5 * dt * b for a, b in zip(y0, k2, strict=True)], wrench)
         k4 = self.derivative([a + dt * b for a, b in zip(y0, k3, strict=True)], wrench)
-        y = [a + dt / 6 * (b + 2 * (c + d) + e) for a, b, c, d, e in zip(y0, k1, k2, k3, k4, strict=True)]
+        y = [
+            a + dt / 6 * (b + 2 * (c + d) + e)
+            for a, b, c, d, e in zip(y0, k1, k2, k3, k4, strict=True)
+        ]
         norm = math.hypot(*y[3:7])  # of any size, as those of a motion beyond all bounds
         y[3:7] = [value / norm for value in y[3:7]]
         return y
@@ -136,7 +156,8 @@ Bodies = Dynamics[Array, Array]
 
 
 def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Array:
-    """Rate of change (12, ...) of states under wrenches (6, ...) [N, N m], in a current (2, ...) [m/s]."""
+    """Rate of change (12, ...) of states under wrenches (6, ...) [N, N m], in a current (2, ...)
+    [m/s]."""
     rotation = rotation_of_angles(state[3:6])
     u, v, w, p, q, r = state[6:]
     east, north = current
@@ -159,8 +180,8 @@ def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Arr
 
 
 def integrate(state: Array, wrench: Array, body: Bodies, current: Array, dt: float) -> Array:
-    """States (L, 12, ...) at the beginnings of L steps of `dt` [s], from the first one (12, ...), under
-    wrenches (L, 6, ...) that the body carries along: Runge-Kutta of order 4."""
+    """States (L, 12, ...) at the beginnings of L steps of `dt` [s], from the first one (12, ...),
+    under wrenches (L, 6, ...) that the body carries along: Runge-Kutta of order 4."""
     states = np.empty((len(wrench), *np.broadcast_shapes(state.shape, (12, *wrench.shape[2:]))))
     states[0] = state
     for k in range(len(wrench) - 1):
@@ -179,7 +200,9 @@ def body_rates(angles: Array, pace: Array) -> Array:
     cr, cp, _ = np.cos(angles.T)
     sr, sp, _ = np.sin(angles.T)
     roll, pitch, yaw = pace.T
-    return np.stack([roll - sp * yaw, cr * pitch + sr * cp * yaw, cr * cp * yaw - sr * pitch], axis=-1)
+    return np.stack(
+        [roll - sp * yaw, cr * pitch + sr * cp * yaw, cr * cp * yaw - sr * pitch], axis=-1
+    )
 
 
 def body_velocity(angles: Array, velocity: Array) -> Array:

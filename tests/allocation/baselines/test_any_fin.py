@@ -97,7 +97,9 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], list[FinM
 
 def write(path: Path, spec: FinModelSpec, changes: tuple[Change, ...], with_power: bool) -> None:
     law = make_law(spec)
-    command = np.stack(np.meshgrid(AMPLITUDE, FREQUENCY, CIRCLE, indexing="ij"), axis=-1).reshape(-1, 3)
+    command = np.stack(np.meshgrid(AMPLITUDE, FREQUENCY, CIRCLE, indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
     effectiveness = np.column_stack([law.force(command), law.power(command)])
     for change in changes:
         effectiveness = change(command, effectiveness)
@@ -164,7 +166,9 @@ def test_each_objective_is_kept_lower_by_its_own_setting(
 
 
 def test_what_is_no_objective_is_refused() -> None:
-    with pytest.raises(AllocationError, match="objective: expected one of power, effort, got 'thrift'"):
+    with pytest.raises(
+        AllocationError, match="objective: expected one of power, effort, got 'thrift'"
+    ):
         AnyRobot("sqp", objective="thrift")
     with pytest.raises(AllocationError, match="knows the settings .*objective"):
         AnyRobot("sqp", price=1.0)

@@ -1,4 +1,5 @@
-"""PX4's and ArduSub's allocation: numbers by hand, what they promise at limits, and what robots they take."""
+"""PX4's and ArduSub's allocation: numbers by hand, what they promise at limits, and what robots
+they take."""
 
 from dataclasses import replace
 
@@ -6,7 +7,13 @@ import numpy as np
 import pytest
 
 from finlab import Allocator, load_layout
-from finlab.allocation.baselines.autopilots import ArduSub, Px4, Px4Settings, frame_factors, normalised
+from finlab.allocation.baselines.autopilots import (
+    ArduSub,
+    Px4,
+    Px4Settings,
+    frame_factors,
+    normalised,
+)
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.exchange.motor_factors import FRAMES, SIGNS
@@ -98,12 +105,15 @@ def test_bluerov2_heavy_has_the_factors_of_its_frame() -> None:
     np.testing.assert_array_equal(method.factors, FRAMES["VECTORED_6DOF"])
     lost = HEAVY.without(["rear_left", "lift_front_left"])
     method = ArduSub(lost, ArduSub.settings_class(), yardstick(HEAVY))
-    np.testing.assert_array_equal(method.factors, np.delete(FRAMES["VECTORED_6DOF"], [3, 5], axis=0))
+    np.testing.assert_array_equal(
+        method.factors, np.delete(FRAMES["VECTORED_6DOF"], [3, 5], axis=0)
+    )
 
 
 @pytest.mark.parametrize("axis", range(6))
 def test_one_axis_of_ardusub_alone_gives_what_is_asked_up_to_its_limits(axis: int) -> None:
-    """Without arms that couple axes a demand gives its wrench; too much of it gives the same direction."""
+    """Without arms that couple axes a demand gives its wrench; too much of it gives the same
+    direction."""
     level = [replace(part, position=(*part.position[:2], 0.0)) for part in HEAVY.actuators]
     plant = plant_of(replace(HEAVY, actuators=tuple(level)))
     allocator = Allocator(plant.layout, "ardusub")
@@ -112,7 +122,9 @@ def test_one_axis_of_ardusub_alone_gives_what_is_asked_up_to_its_limits(axis: in
     near = plant.wrench(allocator.allocate(target).command)
     assert near[axis] == pytest.approx(target[axis])
     far = allocator.allocate(1e3 * target).command
-    np.testing.assert_allclose(plant.wrench(far)[axis] * near / target[axis], plant.wrench(far), atol=1e-9)
+    np.testing.assert_allclose(
+        plant.wrench(far)[axis] * near / target[axis], plant.wrench(far), atol=1e-9
+    )
     assert ((far == plant.lower) | (far == plant.upper))[:, 0].any()
 
 

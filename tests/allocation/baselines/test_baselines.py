@@ -1,4 +1,5 @@
-"""Every model-based method on small problems with known answers, at its limits and on degenerate layouts."""
+"""Every model-based method on small problems with known answers, at its limits and on degenerate
+layouts."""
 
 import math
 from typing import Any
@@ -39,7 +40,9 @@ def one_fin(**changes: object) -> Layout:
 def within(command: np.ndarray, layout: Layout) -> bool:
     lower = layout.lower
     upper = layout.upper
-    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+    return bool(
+        np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all()
+    )
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -62,12 +65,15 @@ def test_asked_too_much_one_fin_gives_all_it_has(method: str) -> None:
 @pytest.mark.parametrize("method", EXACT)
 def test_two_fins_turn_the_robot(method: str) -> None:
     layout = Layout(
-        "pair", (Fin("left", (0.0, 0.2, 0.0), math.pi / 2), Fin("right", (0.0, -0.2, 0.0), -math.pi / 2))
+        "pair",
+        (Fin("left", (0.0, 0.2, 0.0), math.pi / 2), Fin("right", (0.0, -0.2, 0.0), -math.pi / 2)),
     )
     result = make(method).allocate(layout, [0.0, 0.0, 0.0, 0.0, 0.0, 0.4])
-    # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a positive
-    # zero direction 0 pushes the left fin backward and the right one forward.
-    np.testing.assert_allclose(Plant(layout).body_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
+    # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a
+    # positive zero direction 0 pushes the left fin backward and the right one forward.
+    np.testing.assert_allclose(
+        Plant(layout).body_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3
+    )
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -76,7 +82,9 @@ def test_every_reachable_target_is_met(method: str) -> None:
     command = np.random.default_rng(4).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (3, 4, 3))
     targets = Plant(layout).wrench(command)
     answer = make(method).allocate_batch(layout, targets)
-    assert normalized_error(NORMALIZATION, Plant(layout).wrench(answer.command), targets).max() < 5e-3
+    assert (
+        normalized_error(NORMALIZATION, Plant(layout).wrench(answer.command), targets).max() < 5e-3
+    )
 
 
 def test_qp_returns_its_reference_where_that_is_the_answer() -> None:
@@ -93,7 +101,9 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     lost = make(method).allocate(layout, target, lost=["fin_2"]).command
     choice = make(method).choice
     rest = layout.without(["fin_2"])
-    alone = choice.kind(rest, choice.settings, yardstick(layout))  # errors are those of the whole robot
+    alone = choice.kind(
+        rest, choice.settings, yardstick(layout)
+    )  # errors are those of the whole robot
     removed = alone.solve(np.array([target]), policy=Policy()).command[0]
     assert np.isnan(lost[1]).all()
     np.testing.assert_array_equal(lost[[0, 2]], removed)
@@ -168,16 +178,22 @@ def test_the_papers_sqp_is_as_exact_as_slsqp_where_wrenches_can_be_had(name: str
         assert answer.reachable.all() and answer.err_norm.max() < 2e-6, method
 
 
-def test_the_papers_sqp_goes_on_to_other_starts_until_one_delivers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_papers_sqp_goes_on_to_other_starts_until_one_delivers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     errors = iter([4.0, 1.0, 2.0, 0.0, 0.0])
     starts = []
 
-    def descent(self: PaperSqp, target: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, list[float]]:
+    def descent(
+        self: PaperSqp, target: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, list[float]]:
         starts.append(start)
         return start, [9.0, next(errors)]
 
     monkeypatch.setattr(PaperSqp, "descent", descent)
-    answer = Allocator(load_layout("A"), "paper_sqp", n_starts=5, time_limit_s=60.0).allocate(np.ones(6))
+    answer = Allocator(load_layout("A"), "paper_sqp", n_starts=5, time_limit_s=60.0).allocate(
+        np.ones(6)
+    )
     assert len(starts) == 4  # the fourth delivers
     np.testing.assert_array_equal(answer.command, starts[3])
 

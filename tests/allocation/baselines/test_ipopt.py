@@ -25,7 +25,9 @@ def targets_of(layout: Layout, count: int = 3) -> np.ndarray:
     return 0.6 * plant.wrench(plant.sample(np.random.default_rng(1), (count,)))
 
 
-def answered(allocator: AnyRobot, layout: Layout, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def answered(
+    allocator: AnyRobot, layout: Layout, targets: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Power and error of the answers."""
     answers = [allocator.allocate(layout, target) for target in targets]
     return np.array([a.power for a in answers]), np.array([a.err_norm for a in answers])
@@ -49,7 +51,9 @@ def test_it_agrees_with_the_search_on_shipped_robots(name: str) -> None:
         every=5,
     ),
 )
-def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: tuple[float, float]) -> None:
+def test_it_agrees_with_the_search_on_any_fin_and_arc(
+    model: FinModelSpec, arc: tuple[float, float]
+) -> None:
     drawn = random_layout(np.random.default_rng(5), n_fins=5)
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
     layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
@@ -81,7 +85,9 @@ def test_it_delivers_exactly_what_power_would_pull_aside() -> None:
     flat = replace(
         layout, actuators=tuple(replace(part, position=(x, 0.1 * y, z)) for part, (x, y, z) in low)
     )
-    target = plant_of(flat).wrench(np.array([[20.0, 0, 0], [-5.0, 0, 0], [10.0, 0, 0], [8.0, 0, 0]]))
+    target = plant_of(flat).wrench(
+        np.array([[20.0, 0, 0], [-5.0, 0, 0], [10.0, 0, 0], [8.0, 0, 0]])
+    )
     answer = Allocator(flat, "ipopt").allocate(target)
     assert answer.err_norm < 1e-6
     assert answer.power == pytest.approx(Allocator(flat).allocate(target).power, rel=1e-4)
@@ -105,11 +111,14 @@ def strong(n_fins: int, angle: float = 1.0) -> Layout:
     limits = Limits((0.0, 1.5), (0.0, 20.0))
     model = FinModelSpec("drag", (("area", 0.2), ("lever", 0.5)))
     return Layout(
-        "strong", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + angle * i, limits, model) for i in range(n_fins))
+        "strong",
+        tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + angle * i, limits, model) for i in range(n_fins)),
     )
 
 
-@pytest.mark.parametrize("layout", [strong(1), strong(2, 0.0), strong(4)], ids=["one", "twins", "four"])
+@pytest.mark.parametrize(
+    "layout", [strong(1), strong(2, 0.0), strong(4)], ids=["one", "twins", "four"]
+)
 def test_strong_fins_on_long_levers_are_no_singular_problem(layout: Layout) -> None:
     targets = np.concatenate(
         [np.random.default_rng(0).normal(size=(4, 6)) * 10.0**k for k in range(-12, 7, 3)]

@@ -1,4 +1,5 @@
-"""Pods turn in time for wrenches that are known: less power, no more turning, nothing missed for it."""
+"""Pods turn in time for wrenches that are known: less power, no more turning, nothing missed for
+it."""
 
 import math
 
@@ -47,7 +48,8 @@ def waves(ticks: int, seed: int) -> Array:
 
 
 def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
-    """Returns mean power [W], turning of all pods [rad] and missed ticks, with so many wrenches known."""
+    """Returns mean power [W], turning of all pods [rad] and missed ticks, with so many wrenches
+    known."""
     allocator = Allocator(four_pods(), calm=10.0, period_s=PERIOD_S)
     wrench = waves(ticks, seed)
     command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in ARCS])
@@ -106,5 +108,7 @@ def test_lost_pods_and_free_axes_keep_out_of_it() -> None:
     wrench = np.array([30.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     before = allocator.allocate(wrench).command
     known = [wrench] * AHEAD
-    answer = allocator.allocate(wrench, previous=before, reference=known, lost=["left"], free=("Fy",))
+    answer = allocator.allocate(
+        wrench, previous=before, reference=known, lost=["left"], free=("Fy",)
+    )
     assert np.isnan(answer.command[0]).all() and np.isfinite(answer.command[1:]).all()

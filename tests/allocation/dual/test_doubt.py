@@ -22,7 +22,8 @@ def doubtful(layout: Layout, shares: Array) -> Layout:
     """The robot with actuators that err by shares (n,) of their forces, each by itself."""
     parts = zip(layout.actuators, shares, strict=True)
     return replace(
-        layout, actuators=tuple(replace(part, uncertainty=Uncertainty(float(s))) for part, s in parts)
+        layout,
+        actuators=tuple(replace(part, uncertainty=Uncertainty(float(s))) for part, s in parts),
     )
 
 
@@ -78,10 +79,13 @@ def test_no_price_of_doubt_is_better_by_its_own_measure_than_the_one_asked_for(k
     plant = plant_of(layout).at(flow)
     targets = 0.4 * plant.wrench(plant.sample(rng, (12,)))
     prices = (0.0, 1.0, 10.0, 100.0)
-    answers = [Allocator(layout, robust=price).allocate_batch(targets, flow=flow) for price in prices]
+    answers = [
+        Allocator(layout, robust=price).allocate_batch(targets, flow=flow) for price in prices
+    ]
     within = np.all([answer.reachable for answer in answers], axis=0)
     assert within.sum() >= 6
-    # Fins that are not alike all round count by their mean; drag errs, too, and has more than one valley.
+    # Fins that are not alike all round count by their mean; drag errs, too, and has more than one
+    # valley.
     slack = {"fins uneven": 1.02, "rudders": 1.5}.get(kind, 1.001)
     for price, own in zip(prices, answers, strict=True):
         least = np.min([total(other, price) for other in answers], axis=0)

@@ -27,7 +27,9 @@ def test_answers_of_robots_with_rudders_are_exact_and_above_a_bound_that_is_met(
             wrench = within(own, rng)
             answer = allocator.allocate(wrench, flow=flow)
             assert answer.err_norm <= 1e-6
-            np.testing.assert_allclose(Plant(robot).wrench(answer.command, flow=flow), wrench, atol=1e-4)
+            np.testing.assert_allclose(
+                Plant(robot).wrench(answer.command, flow=flow), wrench, atol=1e-4
+            )
             assert answer.bound is not None
             gaps.append(1.0 - answer.bound / answer.power)
     assert min(gaps) > -1e-5
@@ -44,7 +46,9 @@ def test_rudders_alone_give_nothing_at_rest_and_something_in_a_flow() -> None:
 
 
 def test_rudders_at_rest_turn_back_no_faster_than_their_drives() -> None:
-    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), 2.0, lift_slope=3.0, rate=0.5)
+    rudder = Rudder(
+        "r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), 2.0, lift_slope=3.0, rate=0.5
+    )
     result = finlab.Allocator(Layout("rudder", (rudder,))).allocate(
         [0, 1, 0, 0, 0, -0.5], previous=[[0.3, 0.0, 0.0]]
     )
@@ -77,7 +81,14 @@ def frame_of_foils(rng: np.random.Generator) -> Layout:
         stall = rng.uniform(0.35, 0.6)
         area = 10.0 ** rng.uniform(-2.3, -1.0)
         foil = Rudder(
-            f"f{i}", place, shaft, (1, 0, 0), area, (-most, most), rng.uniform(1.0, 6.0), stall=stall
+            f"f{i}",
+            place,
+            shaft,
+            (1, 0, 0),
+            area,
+            (-most, most),
+            rng.uniform(1.0, 6.0),
+            stall=stall,
         )
         parts.append(foil)
     for i in range(rng.integers(2, 4)):
@@ -114,7 +125,9 @@ def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
 
 
 @pytest.mark.parametrize("number", range(3))
-def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_known(number: int) -> None:
+def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_known(
+    number: int,
+) -> None:
     layout = load(random_robot("rudders", number, 21))
     flow = random_flow("rudders", number, 21)
     allocator = Allocator(layout)
@@ -125,7 +138,9 @@ def test_a_direction_is_kept_with_the_drag_at_rest_and_beats_a_share_that_is_kno
         for times in (1.5, 4.0):
             answer = allocator.allocate(times * wrench, policy="direction", flow=flow)
             share = answer.wrench @ wrench / (wrench @ wrench)
-            np.testing.assert_allclose(answer.wrench, share * wrench, atol=1e-6 * np.abs(wrench).max())
+            np.testing.assert_allclose(
+                answer.wrench, share * wrench, atol=1e-6 * np.abs(wrench).max()
+            )
             assert share >= 1.0 - 1e-3
 
 
@@ -139,7 +154,9 @@ def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(polic
         for flow in (None, AHEAD):
             asked = rng.normal(size=6) * [60.0, 20.0, 20.0, 5.0, 20.0, 20.0]
             previous = Plant(layout).sample(rng, ()) if rng.random() < 0.5 else None
-            answer = allocator.allocate(asked, policy=policy, lost=lost, flow=flow, previous=previous)
+            answer = allocator.allocate(
+                asked, policy=policy, lost=lost, flow=flow, previous=previous
+            )
             assert np.isfinite(answer.power)
             assert answer.bound is None or answer.bound <= answer.power + 1e-9
 

@@ -1,4 +1,5 @@
-"""Pods that push either way: exact, and cheapest of all angles and signs, beside scans and other searches."""
+"""Pods that push either way: exact, and cheapest of all angles and signs, beside scans and other
+searches."""
 
 import math
 from dataclasses import replace
@@ -24,7 +25,9 @@ MOST = 250.0
 
 def table(forward: float, reverse: float, least: float = LEAST, most: float = MOST) -> PowerTable:
     """A table of watts over F^1.5, with another factor in reverse."""
-    force = np.concatenate([least * np.linspace(1.0, 0.02, 50), [0.0], most * np.linspace(0.02, 1.0, 50)])
+    force = np.concatenate(
+        [least * np.linspace(1.0, 0.02, 50), [0.0], most * np.linspace(0.02, 1.0, 50)]
+    )
     watts = np.where(force < 0.0, reverse, forward) * np.abs(force) ** 1.5
     return PowerTable(tuple(zip(range(101), force.tolist(), watts.tolist(), strict=True)))
 
@@ -35,7 +38,10 @@ def pair(model: PowerLaw | PowerTable) -> Layout:
     ends = (LEAST, MOST)
     arc = (-HALF, HALF)
     return Layout(
-        "pair", tuple(Tilt(name, (-1.0, y, 0.0), (0, 0, 1), (1, 0, 0), ends, model, arc) for name, y in sides)
+        "pair",
+        tuple(
+            Tilt(name, (-1.0, y, 0.0), (0, 0, 1), (1, 0, 0), ends, model, arc) for name, y in sides
+        ),
     )
 
 
@@ -49,7 +55,9 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
         size = np.hypot(ahead, aside)
         least = np.full(len(left), np.inf)
         for sign, most, factor in ((1.0, MOST, factors[0]), (-1.0, -LEAST, factors[1])):
-            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= HALF + 1e-9) & (size <= most)
+            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= HALF + 1e-9) & (
+                size <= most
+            )
             least = np.where(inside, np.minimum(least, factor * size**1.5), least)
         total += least
     return float(total.min())
@@ -80,7 +88,8 @@ def test_surge_astern_turns_both_propellers_round() -> None:
 
 
 def random_pods(rng: np.random.Generator) -> Layout:
-    """One to three pods that push either way in arcs of any width, and up to two thrusters, in a plane."""
+    """One to three pods that push either way in arcs of any width, and up to two thrusters, in a
+    plane."""
     parts: list[Azimuth | Thruster] = []
     for i in range(rng.integers(1, 4)):
         most = rng.uniform(20.0, 200.0)
@@ -121,7 +130,9 @@ def test_random_pods_give_what_they_can_and_nobody_finds_less_power(seed: int) -
         assert answer.power <= min(others, float(plant.power(own).sum())) * (1.0 + 1e-4)
 
 
-def searched(plant: Plant, target: Array, scale: Array, power: float, rng: np.random.Generator) -> float:
+def searched(
+    plant: Plant, target: Array, scale: Array, power: float, rng: np.random.Generator
+) -> float:
     """Least power of SLSQP on commands from a few starts; infinite where none ends well."""
     used = plant.width > 0.0
     least = np.inf
@@ -157,7 +168,8 @@ def test_beyond_reach_pods_give_as_much_as_forward_and_reverse_allow(policy: str
 def test_from_tick_to_tick_a_pod_goes_through_rest_to_reverse() -> None:
     layout = pair(PowerLaw(0.05))
     slow = replace(
-        layout, actuators=tuple(replace(part, turn_rate=1.0, rate=400.0) for part in layout.actuators)
+        layout,
+        actuators=tuple(replace(part, turn_rate=1.0, rate=400.0) for part in layout.actuators),
     )
     allocator = Allocator(slow, period_s=0.1)
     before = np.array([[0.1, 60.0, 0.0]] * 2)

@@ -76,11 +76,15 @@ def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
 HOSTILE = {
     **SIMPLE,
     "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
-    "sixteen": Layout("many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))),
+    "sixteen": Layout(
+        "many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))
+    ),
 }
 
 
-@pytest.mark.parametrize("name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"])
+@pytest.mark.parametrize(
+    "name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"]
+)
 def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
     layout = HOSTILE[name]
     error = errors(search, layout, reachable(layout, 10))
@@ -104,7 +108,9 @@ def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
     assert batch.wrench_expected is None
 
 
-def test_a_force_table_that_was_measured_again_is_read_again(search: AnyRobot, tmp_path: Path) -> None:
+def test_a_force_table_that_was_measured_again_is_read_again(
+    search: AnyRobot, tmp_path: Path
+) -> None:
     grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
     table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
     layout = load_layout("A")
@@ -122,7 +128,12 @@ def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     s = math.sin(yaw)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     fins = [
-        Fin(fin.name, tuple((rotation @ fin.position).tolist()), fin.mounting_angle + yaw, fin.limits)
+        Fin(
+            fin.name,
+            tuple((rotation @ fin.position).tolist()),
+            fin.mounting_angle + yaw,
+            fin.limits,
+        )
         for fin in layout.fins
     ]
     turned = Layout("turned", tuple(fins))
@@ -131,12 +142,14 @@ def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     straight = search.allocate_batch(layout, targets).command
     again = search.allocate_batch(turned, rotated).command
     assert normalized_error(search.normalization, Plant(turned).wrench(again), rotated).max() < GOOD
-    # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new robot.
+    # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new
+    # robot.
     np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)
 
 
 def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
-    """Two fins span four directions; rounded to single precision a target lies a little beside them."""
+    """Two fins span four directions; rounded to single precision a target lies a little beside
+    them."""
     for seed in range(5):
         layout = random_layout(np.random.default_rng(seed), n_fins=2)
         allocator = Allocator(layout)

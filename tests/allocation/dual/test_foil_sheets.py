@@ -1,4 +1,5 @@
-"""Robots of few actuators with foils: what they give is a curved sheet, met exactly, near the stall, too."""
+"""Robots of few actuators with foils: what they give is a curved sheet, met exactly, near the
+stall, too."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +22,8 @@ EACH = 4
 
 
 def robot(rng: np.random.Generator, limit: float) -> Layout:
-    """Two to four foils that turn by a limit [rad], shafts across the way ahead, and as many thrusters."""
+    """Two to four foils that turn by a limit [rad], shafts across the way ahead, and as many
+    thrusters."""
     parts: list[Actuator] = []
     for i in range(rng.integers(2, 5)):
         turn = rng.uniform(0.0, 2.0 * math.pi)
@@ -37,7 +39,8 @@ def robot(rng: np.random.Generator, limit: float) -> Layout:
 
 
 def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocator, Array, float]]:
-    """Robots whose foils turn by a limit, wrenches (6,) of deflections up to `turned` [deg], their power."""
+    """Robots whose foils turn by a limit, wrenches (6,) of deflections up to `turned` [deg], their
+    power."""
     rng = np.random.default_rng(seed)
     for _ in range(ROBOTS):
         layout = robot(rng, math.radians(limit))
@@ -53,9 +56,12 @@ def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocato
 
 
 @pytest.mark.parametrize(
-    ("seed", "limit", "turned", "most"), [(411, 24.0, 24.0, 1), (412, 30.0, 24.0, 1), (413, 30.0, 30.0, 3)]
+    ("seed", "limit", "turned", "most"),
+    [(411, 24.0, 24.0, 1), (412, 30.0, 24.0, 1), (413, 30.0, 30.0, 3)],
 )
-def test_what_foils_give_near_the_stall_is_given(seed: int, limit: float, turned: float, most: int) -> None:
+def test_what_foils_give_near_the_stall_is_given(
+    seed: int, limit: float, turned: float, most: int
+) -> None:
     missed = 0
     dearer = 0
     exact = []

@@ -1,4 +1,5 @@
-"""The default method on random robots of all kinds, against judges that were written apart from it."""
+"""The default method on random robots of all kinds, against judges that were written apart from
+it."""
 
 import itertools
 from functools import cache
@@ -88,7 +89,9 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
         plant = OwnPlant(mixed_robots.fins_with_a_tail(number, 3))
         rng = np.random.default_rng(number)
         wrench = mixed_robots.within(plant, rng)
-        commands = plant.commands_of(finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench))
+        commands = plant.commands_of(
+            finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench)
+        )
         assert missing(plant, commands, wrench) <= REACHED
         assert plant.power(commands) <= 1.01 * lower_bound(plant, wrench)
 
@@ -96,8 +99,8 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
 @pytest.mark.parametrize("period", [0.02, 0.2])
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins", "mixed"])
 def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
-    """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in its
-    direction, among those that may follow."""
+    """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in
+    its direction, among those that may follow."""
     plant = OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7)))
     rng = np.random.default_rng(1)
     allocator = finlab.Allocator(mixed_robots.load(plant.layout), period_s=period)
@@ -115,7 +118,9 @@ def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
             near = plant.after(before, period)
             if error > REACHED and error > least_miss(near, wrench, 33) + 2e-3:
                 most = min(farthest(near, wrench, 33), 1.0)
-                assert missing(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(wrench / plant.scales)
+                assert missing(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(
+                    wrench / plant.scales
+                )
         before = commands
 
 
@@ -125,7 +130,8 @@ LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
 
 @cache
 def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
-    """A robot of 2 to 12 thrusters, its effectiveness matrix (6, n), and the ends of its forces (n,)."""
+    """A robot of 2 to 12 thrusters, its effectiveness matrix (6, n), and the ends of its forces
+    (n,)."""
     rng = np.random.default_rng([0xBE40, number])
     parts = []
     columns = []
@@ -138,7 +144,12 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
         ends.append([-float(rng.choice([0.0, 10.0, 40.0])), float(rng.uniform(1.0, 60.0))])
         columns.append([*axis, *(np.cross(place, axis) + turn * axis)])
         parts.append(
-            {"name": f"m{k}", "type": "thruster", "position_m": place.tolist(), "axis": axis.tolist()}
+            {
+                "name": f"m{k}",
+                "type": "thruster",
+                "position_m": place.tolist(),
+                "axis": axis.tolist(),
+            }
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
             | {"model": LAW}
         )
@@ -147,7 +158,8 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
 
 
 def _targets(number: int, allocator: Allocator, by: Array, low: Array, high: Array) -> Array:
-    """Wrenches (4, 6) near and far beyond the reach of a robot, half of them along what it can push."""
+    """Wrenches (4, 6) near and far beyond the reach of a robot, half of them along what it can
+    push."""
     rng = np.random.default_rng([0xBE41, number])
     some = rng.normal(size=(2, 6)) * allocator.scale
     own = (low + rng.random((2, len(low))) * (high - low)) @ by.T
@@ -175,7 +187,10 @@ def test_direction_gives_the_share_of_the_linear_programme_and_nothing_beside(nu
 def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int) -> None:
     allocator, by, low, high = robot = _robot(number)
     for target in _targets(number, *robot):
-        for policy, rows in ((None, slice(None)), (Policy("priority", order=(("Fz",), ("Fx",))), [2])):
+        for policy, rows in (
+            (None, slice(None)),
+            (Policy("priority", order=(("Fz",), ("Fx",))), [2]),
+        ):
             answer = allocator.allocate(target, policy=policy or "closest")
             scaled = (by / allocator.scale[:, None])[rows]
             wanted = (target / allocator.scale)[rows]
@@ -204,14 +219,25 @@ def test_one_code_one_answer_whose_bound_is_below_its_power(policy: str) -> None
 
 def test_a_command_inside_a_dead_band_is_neutral() -> None:
     rng = np.random.default_rng(4)
-    band = {"name": "t", "type": "thruster", "force_n": [-40.0, 50.0], "model": LAW, "dead_band_n": 3.0}
+    band = {
+        "name": "t",
+        "type": "thruster",
+        "force_n": [-40.0, 50.0],
+        "model": LAW,
+        "dead_band_n": 3.0,
+    }
     for number in range(12):
         parts = []
         for k in range(6):
             axis = rng.normal(size=3)
             axis /= np.linalg.norm(axis)
             parts.append(
-                band | {"name": f"t{k}", "axis": axis.tolist(), "position_m": rng.uniform(-1, 1, 3).tolist()}
+                band
+                | {
+                    "name": f"t{k}",
+                    "axis": axis.tolist(),
+                    "position_m": rng.uniform(-1, 1, 3).tolist(),
+                }
             )
         allocator = Allocator(parse_layout(mixed_robots.layout_of(f"b{number}", parts)))
         targets = rng.normal(size=(20, 6)) * allocator.scale * 10.0 ** rng.uniform(-2, 1, (20, 1))

@@ -1,4 +1,5 @@
-"""The bound of measured fins: below the power of every command, and near the least of smooth tables."""
+"""The bound of measured fins: below the power of every command, and near the least of smooth
+tables."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,8 @@ from tests.random_fins import write_fin_table
 
 
 def random_table(rng: np.random.Generator, limits: Array, noise: float) -> TableLaw:
-    """A noisy law with any lean and unevenness on uneven knots, up to beyond or short of limits (3, 2)."""
+    """A noisy law with any lean and unevenness on uneven knots, up to beyond or short of limits (3,
+    2)."""
     ends = limits[:2, 1] * rng.uniform(0.85, 1.2, 2)
     axes = [np.sort(rng.uniform(0.0, end, rng.integers(3, 7))) for end in ends]
     first = limits[2, 0]
@@ -31,7 +33,9 @@ def random_table(rng: np.random.Generator, limits: Array, noise: float) -> Table
     axes.append(first + width * np.sort(rng.permutation(40)[: rng.integers(9, 20)]) / 40)
     a, f, d = np.meshgrid(*axes, indexing="ij")
     size = (
-        rng.uniform(1.0, 8.0) * (a * f) ** rng.uniform(1.0, 2.0) * (1.0 + rng.uniform(0.0, 0.3) * np.cos(d))
+        rng.uniform(1.0, 8.0)
+        * (a * f) ** rng.uniform(1.0, 2.0)
+        * (1.0 + rng.uniform(0.0, 0.3) * np.cos(d))
     )
     angle = d + rng.uniform(-0.2, 0.2) * a
     force = size[..., None] * np.stack([0.1 + 0.0 * d, np.cos(angle), np.sin(angle)], axis=-1)
@@ -64,7 +68,9 @@ def measured(kind: str, number: int, folder: Path) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_no_command_is_worth_more_and_hardly_any_less(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_command_is_worth_more_and_hardly_any_less(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng([5, seed])
     covered = np.array([[0.0, 1.2], [0.0, 3.0], [-3.0, rng.choice([-2.0, 0.5, TURN - 3.0])]])
     law = random_table(rng, covered, rng.choice([0.0, 0.03, 0.2]))

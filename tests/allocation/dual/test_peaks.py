@@ -9,7 +9,9 @@ from finlab.research.evaluation.splits import make_case
 
 @pytest.mark.parametrize(("split", "layout", "target"), [("fins-mixed", 5, 6), ("any-shaft", 1, 7)])
 @pytest.mark.parametrize("previous", [False, True])
-def test_the_last_share_of_a_force_is_given(split: str, layout: int, target: int, previous: bool) -> None:
+def test_the_last_share_of_a_force_is_given(
+    split: str, layout: int, target: int, previous: bool
+) -> None:
     case = make_case(split, 10, 11, layout)
     allocator = Allocator(case.layout)
     wrench = case.targets[target]

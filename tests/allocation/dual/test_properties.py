@@ -70,7 +70,9 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
-def test_a_turned_robot_gets_the_turned_answer(search: AnyRobot, seed: int, limits: str, yaw: float) -> None:
+def test_a_turned_robot_gets_the_turned_answer(
+    search: AnyRobot, seed: int, limits: str, yaw: float
+) -> None:
     layout, target = drawn(seed, limits)
     c = math.cos(yaw)
     s = math.sin(yaw)
@@ -92,9 +94,12 @@ def test_a_turned_robot_gets_the_turned_answer(search: AnyRobot, seed: int, limi
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS)
-def test_a_mirrored_robot_gets_the_mirrored_answer(search: AnyRobot, seed: int, limits: str) -> None:
+def test_a_mirrored_robot_gets_the_mirrored_answer(
+    search: AnyRobot, seed: int, limits: str
+) -> None:
     layout, target = drawn(seed, limits)
-    # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they are.
+    # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they
+    # are.
     fins = [
         replace(
             fin,
@@ -128,7 +133,9 @@ def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: 
 
 @few(15)
 @given(seed=SEEDS)
-def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot, seed: int) -> None:
+def test_a_small_change_of_the_layout_changes_the_answer_little(
+    search: AnyRobot, seed: int
+) -> None:
     layout, target = drawn(seed)
     rng = np.random.default_rng(seed + 1)
     fins = [
@@ -144,7 +151,8 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot
     # A robot of few fins may have been moved away from the target.
     moved = normalized_error(search.normalization, Plant(other.layout).wrench(one.command), target)
     assert other.err_norm <= max(GOOD, moved)
-    # Fins that hardly span a wrench make the least power itself sensitive: then both are proved to be least.
+    # Fins that hardly span a wrench make the least power itself sensitive: then both are proved to
+    # be least.
     is_least = [answer.power <= (1.0 + 1e-4) * answer.bound for answer in (one, other)]
     assert same_power(one, other, 0.002) or all(is_least)
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]

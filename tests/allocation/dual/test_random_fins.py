@@ -20,7 +20,9 @@ from tests.random_fins import KINDS, random_robot
 
 Array = NDArray[np.float64]
 LAWS = KINDS[:3]
-AXES = np.concatenate([np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]), -np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])])
+AXES = np.concatenate(
+    [np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]), -np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])]
+)
 
 
 def reachable(layout: Layout, n: int, seed: int = 0) -> Array:
@@ -38,12 +40,18 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
 
 @pytest.mark.parametrize(
     ("limits", "kinds"),
-    crossed(["nominal", "varied"], [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS], every=7),
+    crossed(
+        ["nominal", "varied"],
+        [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS],
+        every=7,
+    ),
 )
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
     method = AnyRobot()
     for seed in range(4):
-        layout = random_robot(np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7))
+        layout = random_robot(
+            np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7)
+        )
         batch = method.allocate_batch(layout, reachable(layout, 12, seed))
         lower = layout.lower
         upper = layout.upper
@@ -60,7 +68,9 @@ def test_no_more_than_brute_force_finds() -> None:
         for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
             answer = method.allocate(layout, target)
             if answer.err_norm < 1e-5:
-                least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
+                least = least_cost(
+                    layout, target, answer.scale, "power", n_starts=6, also=answer.command
+                )
                 ratio.append(answer.power / least)
     assert len(ratio) >= 3
     assert np.max(ratio) < 1.001
@@ -111,7 +121,9 @@ def test_near_the_peak_of_soft_fins_it_is_as_cheap() -> None:
     case = make_split("fins", 10, 4, 77)[3]
     answer = Allocator(case.layout).allocate(case.targets[3])
     goal = "power"
-    least = least_cost(case.layout, answer.target, answer.scale, goal, n_starts=8, also=answer.command)
+    least = least_cost(
+        case.layout, answer.target, answer.scale, goal, n_starts=8, also=answer.command
+    )
     assert answer.err_norm < 1e-5 and answer.power < 1.001 * least
 
 
@@ -138,7 +150,8 @@ def least_cost(
 ) -> float:
     """The least cost found for a wrench (6,), infinite where no start reached it to 1e-5.
 
-    Starts are random commands, of which every other one has fins at rest, and `also`, a command (n, 3).
+    Starts are random commands, of which every other one has fins at rest, and `also`, a command (n,
+    3).
     """
     plant = Plant(layout)
     rng = np.random.default_rng(seed)
@@ -164,7 +177,9 @@ def least_cost(
     starts[..., :2] = np.where(resting[..., None], 0.0, starts[..., :2])
     if also is not None:
         starts = np.concatenate([(also - low)[None] / width, starts])
-    bounds = [(None, None) if axis == 2 and full[i] else (0.0, 1.0) for i in range(n) for axis in range(3)]
+    bounds = [
+        (None, None) if axis == 2 and full[i] else (0.0, 1.0) for i in range(n) for axis in range(3)
+    ]
     # Equations beyond the rank of what the fins can do only confuse the solver.
     axes = np.linalg.svd(plant.effectiveness[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
     rank = int((axes[1] > 1e-9 * axes[1][0]).sum())
@@ -177,7 +192,11 @@ def least_cost(
             start.ravel(),
             jac=lambda s: (meter.gradient(command(s)[None])[0] * width).ravel() / scale,
             bounds=bounds,
-            constraints={"type": "eq", "fun": lambda s: seen @ missing(s), "jac": lambda s: seen @ bent(s)},
+            constraints={
+                "type": "eq",
+                "fun": lambda s: seen @ missing(s),
+                "jac": lambda s: seen @ bent(s),
+            },
             method="SLSQP",
             options={"maxiter": 150, "ftol": 1e-10},
         )

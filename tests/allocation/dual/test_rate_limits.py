@@ -1,4 +1,5 @@
-"""From tick to tick: commands within the rates of the drives, and the wrench that they are in time for."""
+"""From tick to tick: commands within the rates of the drives, and the wrench that they are in time
+for."""
 
 import math
 from dataclasses import replace
@@ -61,7 +62,9 @@ def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) ->
 def smooth_path(seed: int) -> np.ndarray:
     """Slow sines (T, 6) in all axes."""
     rng = np.random.default_rng(seed)
-    return SLOW_PATH * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
+    return SLOW_PATH * np.sin(
+        rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +99,9 @@ def test_the_path_is_still_tracked_at_about_the_same_cost(free: Drive, steady: D
 
 
 def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
-    first = replace(penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0))
+    first = replace(
+        penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0)
+    )
     other = replace(penta, actuators=(first, *penta.fins[1:]))
     ride = drive(search, other, smooth_path(1)[:60], bound=True)
     assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
@@ -135,7 +140,9 @@ def test_arcs_are_kept(search: AnyRobot) -> None:
     assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
 
 
-def test_a_previous_command_that_is_the_answer_stays(method: AnyRobot, penta: Layout, free: Drive) -> None:
+def test_a_previous_command_that_is_the_answer_stays(
+    method: AnyRobot, penta: Layout, free: Drive
+) -> None:
     plant = Plant(penta)
     for tick in (0, 50, 120):
         before = free.command[tick]
@@ -160,8 +167,11 @@ def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
     assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
 
 
-def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: AnyRobot, penta: Layout) -> None:
-    """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is missing."""
+def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(
+    method: AnyRobot, penta: Layout
+) -> None:
+    """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is
+    missing."""
     target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
     previous = method.allocate(penta, target).command
     missing = []
@@ -190,7 +200,8 @@ def with_pole(pole: float) -> Layout:
 
 @pytest.mark.parametrize("pole", [1.0, 2.0, 3.5])
 def test_it_is_the_one_that_the_slowest_fin_is_in_time_for(pole: float) -> None:
-    """A filter that follows a ramp lags by what is looked ahead: what it gives is then what is asked for."""
+    """A filter that follows a ramp lags by what is looked ahead: what it gives is then what is
+    asked for."""
     asked = in_time(with_pole(pole), np.zeros(6), RISING)[0]
     lag = LagStep.of(np.array([pole]), PERIOD_S)
     value = np.zeros(1)

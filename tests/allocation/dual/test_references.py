@@ -1,4 +1,5 @@
-"""The judges of least watts agree with each other and with published figures of a BlueROV2 Heavy."""
+"""The judges of least watts agree with each other and with published figures of a BlueROV2
+Heavy."""
 
 from dataclasses import replace
 
@@ -29,10 +30,15 @@ HEAVY = OwnPlant(bluerov2_heavy())
         ((0, 0, 0, 2, 0, 0), (0, 0, 0, 0, 2.3256, -2.3256, 2.3256, -2.3256)),
         ((0, 0, 0, 0, 2, 0), (0, 0, 0, 0, 4.2373, 4.2373, -4.2373, -4.2373)),
         ((0, 0, 0, 0, 0, 2), (-2.9836, 2.9836, 2.9836, -2.9836, 0, 0, 0, 0)),
-        ((30, 15, -20, 0, 1, 3), (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741)),
+        (
+            (30, 15, -20, 0, 1, 3),
+            (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741),
+        ),
     ],
 )
-def test_the_pseudo_inverse_of_a_heavy(wrench: tuple[float, ...], forces: tuple[float, ...]) -> None:
+def test_the_pseudo_inverse_of_a_heavy(
+    wrench: tuple[float, ...], forces: tuple[float, ...]
+) -> None:
     np.testing.assert_allclose(np.linalg.pinv(HEAVY.effectiveness) @ wrench, forces, atol=6e-5)
     assert np.linalg.cond(HEAVY.effectiveness) == pytest.approx(8.48, abs=5e-3)
 
@@ -64,7 +70,8 @@ def test_three_ways_to_the_least_watts_of_a_heavy() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_bound_and_best_known_meet(kind: str) -> None:
-    """Where the bound by prices equals what is found, both are the optimum; wide arcs and holes included."""
+    """Where the bound by prices equals what is found, both are the optimum; wide arcs and holes
+    included."""
     plant = random_plant(kind, 0, 1)
     rng = np.random.default_rng(0)
     wrench = within(plant, rng)
@@ -120,15 +127,21 @@ def test_on_a_surveyed_frame_a_priority_misses_no_more_than_px4(lost: int) -> No
                 for name, how in (("dual", {"policy": policy}), ("px4", {}))
             )
             mine, own = (
-                missing_by_group(each.unallocated / each.scale, PX4_ORDER) for each in (ours, theirs)
+                missing_by_group(each.unallocated / each.scale, PX4_ORDER)
+                for each in (ours, theirs)
             )
-            assert not misses_more(mine, own).any(), np.stack([mine, own], 1)[misses_more(mine, own)]
+            assert not misses_more(mine, own).any(), np.stack([mine, own], 1)[
+                misses_more(mine, own)
+            ]
 
 
 @pytest.mark.parametrize(
-    "order", [Policy.order, (("Tz",), ("Fx", "Fz")), (("Fx", "Tz"), ("Fz",)), (("Fz", "Fx"), ("Tz",))]
+    "order",
+    [Policy.order, (("Tz",), ("Fx", "Fz")), (("Fx", "Tz"), ("Fz",)), (("Fz", "Fx"), ("Tz",))],
 )
 def test_an_axis_that_nothing_drives_holds_up_no_other(order: tuple[tuple[str, ...], ...]) -> None:
     allocator = Allocator(replace(load_layout("no_yaw"), axes=AXES))
-    answer = allocator.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.2], policy=Policy("priority", order=order))
+    answer = allocator.allocate(
+        [1.0, 0.0, 0.5, 0.0, 0.0, 0.2], policy=Policy("priority", order=order)
+    )
     np.testing.assert_allclose(answer.unallocated, [0.0, 0.0, 0.0, 0.0, 0.0, 0.2], atol=1e-4)

@@ -1,4 +1,5 @@
-"""What the core is given of a robot, against what it stands for, and what is kept between questions."""
+"""What the core is given of a robot, against what it stands for, and what is kept between
+questions."""
 
 import math
 
@@ -28,7 +29,8 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
     assert numbers[0] == POINTS
     support, slope, own, kept = numbers[1:].reshape(POINTS, 4).T
     for place, angle in enumerate(np.arange(POINTS) * 2.0 * math.pi / POINTS):
-        # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the best psi.
+        # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the
+        # best psi.
         worth = uneven(DENSE) * np.cos(angle - DENSE)
         best = int(worth.argmax())
         assert support[place] == pytest.approx(worth[best], abs=1e-6)
@@ -40,7 +42,9 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
 
 def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> None:
     robot = AnyRobot().method(load(bluerov2_heavy())).compiled.robot
-    dearer = max(T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5)
+    dearer = max(
+        T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5
+    )
     assert robot.largest_power == pytest.approx(8.0 * dearer, rel=1e-3)
 
 
@@ -62,8 +66,13 @@ def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
 
 
 def test_axes_that_come_together_only_are_told_where_they_are_asked_for_apart() -> None:
-    thruster = bluerov2_heavy()["actuators"][0] | {"position_m": [0.0, 0.1, 0.0], "axis": [1.0, 0.0, 0.0]}
-    allocator = Allocator(load(layout_of("aside", [thruster])))  # 1 N along x turns by -0.1 N m about z
+    thruster = bluerov2_heavy()["actuators"][0] | {
+        "position_m": [0.0, 0.1, 0.0],
+        "axis": [1.0, 0.0, 0.0],
+    }
+    allocator = Allocator(
+        load(layout_of("aside", [thruster]))
+    )  # 1 N along x turns by -0.1 N m about z
     together = allocator.allocate([10.0, 0.0, 0.0, 0.0, 0.0, -1.0])
     apart = allocator.allocate([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert together.reachable and not any("apart" in note for note in together.notes)

@@ -1,5 +1,6 @@
-"""A tick is the same question, asked of what the drives allow: limits and rates hold whatever comes, policies
-are those of a robot with such limits, bounds are no more than the power, and turning costs as `calm` says."""
+"""A tick is the same question, asked of what the drives allow: limits and rates hold whatever
+comes, policies are those of a robot with such limits, bounds are no more than the power, and
+turning costs as `calm` says."""
 
 import math
 from dataclasses import replace
@@ -15,14 +16,22 @@ from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from tests.hostile_robots import hostile_robot
-from tests.mixed_robots import KINDS, bluerov2_heavy, layout_of, random_flow, random_robot, with_rates
+from tests.mixed_robots import (
+    KINDS,
+    bluerov2_heavy,
+    layout_of,
+    random_flow,
+    random_robot,
+    with_rates,
+)
 
 PERIOD_S = 0.1
 POLICIES = ("closest", "direction", "priority")
 
 
 def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
-    """By how much a command (n, 3) passes limits or rates after another one; angles the shorter way round."""
+    """By how much a command (n, 3) passes limits or rates after another one; angles the shorter way
+    round."""
     worst = 0.0
     for part, old, new in zip(robot.actuators, before, after, strict=True):
         if np.isnan(new).any():
@@ -139,7 +148,9 @@ def pods_in_waves(calm: float) -> list[Allocation]:
     for tick in range(120):
         phase = 2.0 * math.pi * tick / 30.0
         target = (
-            0.3 * scale * np.array([math.sin(phase), math.cos(0.7 * phase), 0, 0, 0, math.sin(1.3 * phase)])
+            0.3
+            * scale
+            * np.array([math.sin(phase), math.cos(0.7 * phase), 0, 0, 0, math.sin(1.3 * phase)])
         )
         answers.append(allocator.allocate(target, previous=previous))
         previous = answers[-1].command
@@ -159,7 +170,9 @@ def test_what_calm_took_is_what_the_cheapest_answer_of_the_same_tick_takes_less(
     compared = 0
     for before, answer in zip(answers, answers[1:], strict=False):
         other = cheapest.allocate(np.nan_to_num(answer.wrench), previous=before.command)
-        assert answer.calm_power == pytest.approx(answer.power - other.power, abs=1e-6 * answer.power)
+        assert answer.calm_power == pytest.approx(
+            answer.power - other.power, abs=1e-6 * answer.power
+        )
         compared += answer.calm_power > 0.01 * answer.power
     assert compared > 5  # there is something to compare
 
@@ -170,7 +183,8 @@ def test_outside_of_ticks_calm_takes_nothing() -> None:
 
 
 def test_a_drive_passes_through_its_dead_band() -> None:
-    """It takes three ticks to leave a band that is wider than a step; then the robot gives what is asked."""
+    """It takes three ticks to leave a band that is wider than a step; then the robot gives what is
+    asked."""
     thruster = {
         "name": "only",
         "type": "thruster",

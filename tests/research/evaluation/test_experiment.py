@@ -21,7 +21,9 @@ WRENCH = ["eval", "wrench", "--layouts", "2", "--targets", "3", "--methods", "an
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
-def test_every_experiment_can_be_shown_and_made(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_experiment_can_be_shown_and_made(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     experiment = load_experiment(name)
     assert experiment.name == name and experiment.question.endswith((".", "?"))
     keys = [column.key for column in experiment.columns]
@@ -31,12 +33,16 @@ def test_every_experiment_can_be_shown_and_made(name: str, capsys: pytest.Captur
     assert main(["eval", name, "--help"]) == 0
     shown = capsys.readouterr().out
     assert all(
-        f"--{option.replace('_', '-')}" in shown for option in experiment.options() if option != "layout"
+        f"--{option.replace('_', '-')}" in shown
+        for option in experiment.options()
+        if option != "layout"
     )
     assert "--json" in shown
 
 
-def test_rows_table_and_json_are_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_table_and_json_are_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "rows.json"
     assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", str(file)]) == 0
     text = capsys.readouterr().out
@@ -79,8 +85,14 @@ def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> 
         ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
         ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
         ("wrench --seed -1 --methods qp", "seed: expected a number of at least 0, got -1"),
-        ("wrench --targets 1000000000", "targets: expected a number of at most 1000000, got 1000000000"),
-        ("temperature --temperatures 1,x", "temperatures: expected numbers with commas between, got '1,x'"),
+        (
+            "wrench --targets 1000000000",
+            "targets: expected a number of at most 1000000, got 1000000000",
+        ),
+        (
+            "temperature --temperatures 1,x",
+            "temperatures: expected numbers with commas between, got '1,x'",
+        ),
         ("temperature --temperatures 1,inf", "temperatures: expected a finite number, got inf"),
         (
             "wrench --methods qp --json missing/folder/rows.json",

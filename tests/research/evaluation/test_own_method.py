@@ -1,4 +1,5 @@
-"""A function of a stranger as a method, and every method on a robot of one's own; names of methods."""
+"""A function of a stranger as a method, and every method on a robot of one's own; names of
+methods."""
 
 import json
 from pathlib import Path
@@ -11,7 +12,11 @@ from finlab.cli import main
 from finlab.errors import AllocationError
 from finlab.layout.save import save_layout
 from finlab.research.evaluation.experiments.wrench import own_case
-from finlab.research.evaluation.method_specs import installed_methods, load_method_spec, load_method_specs
+from finlab.research.evaluation.method_specs import (
+    installed_methods,
+    load_method_spec,
+    load_method_specs,
+)
 from tests.terminal import refused
 
 SOURCE = """
@@ -52,7 +57,9 @@ def test_a_function_answers_for_one_target_and_for_many(file: Path) -> None:
     assert allocator.allocate_batch(np.zeros((3, 6))).command.shape == (3, 4, 3)
 
 
-def test_the_benchmark_shows_it_beside_finlabs(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_benchmark_shows_it_beside_finlabs(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = ["bench", f"{file}:rests", "dual", "--quick", "--splits", "id", "--json"]
     assert main(asked) == 0
     rows = json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]
@@ -78,7 +85,11 @@ def test_wrong_answers_are_told(file: Path, function: str, message: str) -> None
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("wants_more", "got 'weather'"), ("none", "holds no function 'none'"), ("", "holds no function")],
+    [
+        ("wants_more", "got 'weather'"),
+        ("none", "holds no function 'none'"),
+        ("", "holds no function"),
+    ],
 )
 def test_functions_that_cannot_be_asked(file: Path, name: str, message: str) -> None:
     assert message in refused(["bench", f"{file}:{name}"])
@@ -113,7 +124,9 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert main(["eval", "wrench", str(path), *sizes, "--json", str(file)]) == 0
     rows = json.loads(file.read_text())["rows"]
     assert [row["method"] for row in rows] == installed_methods(layout)
-    assert {row["split"] for row in rows} == {"layout pair"} and "layout pair" in capsys.readouterr().out
+    assert {row["split"] for row in rows} == {
+        "layout pair"
+    } and "layout pair" in capsys.readouterr().out
     by_name = {row["method"]: row for row in rows}
     assert by_name["dual"]["err_norm_max"] < 1e-4 and by_name["dual"]["n"] == 4
     assert by_name["ipopt"]["n"] == 1
@@ -122,9 +135,13 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
 def test_targets_are_seeded_and_within_reach() -> None:
     layout = finlab.load_layout("D")
     case, again, other = (own_case(layout, (), 8, seed) for seed in (3, 3, 4))
-    assert np.array_equal(case.targets, again.targets) and not np.array_equal(case.targets, other.targets)
+    assert np.array_equal(case.targets, again.targets) and not np.array_equal(
+        case.targets, other.targets
+    )
     # Products of fewer rows may round otherwise.
-    np.testing.assert_allclose(own_case(layout, (), 3, 3).targets, case.targets[:3], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(
+        own_case(layout, (), 3, 3).targets, case.targets[:3], rtol=1e-12, atol=1e-14
+    )
     assert finlab.Allocator(layout).allocate_batch(case.targets).reachable.all()
 
 

@@ -73,7 +73,9 @@ def test_page_and_rows_say_the_same(folder: Path) -> None:
 def test_each_table_has_the_command_that_makes_it_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    commands = re.findall(r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M)
+    commands = re.findall(
+        r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M
+    )
     assert [command.split()[1] for command in commands] == list(TINY)
     tables = json.loads((folder / TABLES).read_text("utf-8"))
     for name, command in zip(TINY, commands, strict=True):
@@ -88,10 +90,14 @@ def test_the_stored_report_knows_all_experiments_and_no_other() -> None:
     sections = re.findall(r"^## (\w+)$(.*?)(?=^## )", text, re.M | re.S)
     assert [name.lower() for name, _ in sections] == list(EXPERIMENTS)
     for name, section in sections:
-        ((command, commit),) = re.findall(r"^Made by `finlab eval (.*)` at commit (.*)\.$", section, re.M)
+        ((command, commit),) = re.findall(
+            r"^Made by `finlab eval (.*)` at commit (.*)\.$", section, re.M
+        )
         verb, *words = shlex.split(command)
         known = {option.replace("_", "-") for option in load_experiment(verb).options()}
-        assert verb == name.lower() and re.fullmatch("[0-9a-f]{12}", commit), "of a tree without changes"
+        assert verb == name.lower() and re.fullmatch("[0-9a-f]{12}", commit), (
+            "of a tree without changes"
+        )
         assert {word[2:].removeprefix("no-") for word in words if word.startswith("--")} <= known
 
 
@@ -126,7 +132,9 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
         ("-o somewhere --sections nothing", "sections: expected some of all, wrench, "),
     ],
 )
-def test_bad_input_is_one_sentence(arguments: str, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bad_input_is_one_sentence(
+    arguments: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(Path(report_page.__file__).parents[3])
     assert message in refused(["eval", "report", *arguments.split()])
     assert not os.path.exists("somewhere")
@@ -139,25 +147,38 @@ ROWS: list[dict[str, Any]] = [
 ]
 
 
-BLOCKS = ("# A title & more", "One **line**.", "## First section", Table(COLUMNS, ROWS), "- one\n- two")
+BLOCKS = (
+    "# A title & more",
+    "One **line**.",
+    "## First section",
+    Table(COLUMNS, ROWS),
+    "- one\n- two",
+)
 
 
 def test_markdown() -> None:
     text = to_markdown(*BLOCKS)
     assert text.startswith("# A title & more\n\nOne **line**.")
-    assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
+    assert (
+        "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
+    )
 
 
 def test_text_has_words_and_tables() -> None:
     text = to_text(*BLOCKS)
     assert "One **line**.\n\nFirst section\n\nmethod" in text and "\n- one\n- two" in text
-    assert "method                      error <\nours    0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
+    assert (
+        "method                      error <\nours    0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "value", "shown"),
     [
-        *(("error", v, s) for v, s in ((0.0, "0"), (2.9e-4, "0.00029"), (3.1e-13, "3.1e-13"), (1.84, "1.8"))),
+        *(
+            ("error", v, s)
+            for v, s in ((0.0, "0"), (2.9e-4, "0.00029"), (3.1e-13, "3.1e-13"), (1.84, "1.8"))
+        ),
         *(("three", v, s) for v, s in ((2.857, "2.86"), (178.4, "178"), (0.0, "0"))),
         *(
             ("share", v, s)
@@ -173,7 +194,16 @@ def test_numbers(name: str, value: float, shown: str) -> None:
 
 
 SMALL = {
-    "temperature": ["--layouts", "2", "--targets", "1", "--candidates", "8", "--temperatures", "0.01,1"],
+    "temperature": [
+        "--layouts",
+        "2",
+        "--targets",
+        "1",
+        "--candidates",
+        "8",
+        "--temperatures",
+        "0.01,1",
+    ],
     "ablation": ["--layouts", "2", "--targets", "1", "--candidates", "8"],
     "wrench": ["--layouts", "3", "--targets", "2", "--methods", "analytic,qp"],
 }
@@ -185,7 +215,10 @@ def test_the_verb_draws_its_picture(name: str, tmp_path: Path) -> None:
     path = tmp_path / "picture.png"
     assert main(["eval", name, *SMALL[name], "--plot", str(path)]) == 0
     with image.open(path) as picture:
-        assert min(picture.size) > 500 and len(set(picture.convert("L").resize((90, 60)).tobytes())) > 20
+        assert (
+            min(picture.size) > 500
+            and len(set(picture.convert("L").resize((90, 60)).tobytes())) > 20
+        )
 
 
 def test_a_picture_shows_the_rows() -> None:
@@ -197,9 +230,13 @@ def test_a_picture_shows_the_rows() -> None:
     assert mean == pytest.approx(total["err_norm_mean"])
     axes = fins_picture(rows).axes[0]
     np.testing.assert_allclose(axes.lines[0].get_ydata(), [row["err_norm_median"] for row in parts])
-    assert [label.get_text() for label in axes.get_xticklabels()] == [str(row["fins"]) for row in parts]
+    assert [label.get_text() for label in axes.get_xticklabels()] == [
+        str(row["fins"]) for row in parts
+    ]
 
-    rows = load_experiment("ablation").rows(variants=("ours",), layouts=2, targets=1, candidates=8, shown=2)
+    rows = load_experiment("ablation").rows(
+        variants=("ours",), layouts=2, targets=1, candidates=8, shown=2
+    )
     raw, refined = (each.get_offsets() for each in candidates_picture(rows).axes[0].collections)
     points = rows[0]["points"]
     np.testing.assert_allclose(raw, [each for point in points for each in point["raw"]])
@@ -211,20 +248,22 @@ def test_a_picture_shows_the_rows() -> None:
         for t in (1.0, 0.1)
     ]
     left, right = temperature_picture(rows).axes
-    assert left.lines[0].get_ydata().tolist() == [0.1, 1.0] and right.lines[0].get_ydata().tolist() == [
-        0.2,
-        2.0,
-    ]
+    assert left.lines[0].get_ydata().tolist() == [0.1, 1.0] and right.lines[
+        0
+    ].get_ydata().tolist() == [0.2, 2.0]
 
 
 @pytest.mark.parametrize(
-    ("file", "message"), [("picture.jpg", "ends in .png"), ("none/picture.png", "in an existing folder")]
+    ("file", "message"),
+    [("picture.jpg", "ends in .png"), ("none/picture.png", "in an existing folder")],
 )
 def test_a_picture_that_cannot_be_is_refused(file: str, message: str, tmp_path: Path) -> None:
     assert message in refused(["eval", "wrench", "--plot", str(tmp_path / file)])
 
 
-def test_without_matplotlib_one_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_one_sentence_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     error = refused(["eval", "wrench", "--plot", str(tmp_path / "picture.png")])
     assert "matplotlib is not installed" in error and "[plot]" in error

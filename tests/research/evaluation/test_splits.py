@@ -22,7 +22,8 @@ ROBOTS = {
     "mixed-actuators": (4, 10, {"fin", "thruster", "azimuth", "tilt"}),
     "any-shaft": (2, 8, {"fin"}),
 }
-"""Least and most actuators, and their types, in splits of other robots than those of horizontal fins."""
+"""Least and most actuators, and their types, in splits of other robots than those of horizontal
+fins."""
 QUICK = [split for split in SPLITS if split != "tables" and split not in ROBOTS]
 """Splits of fins of which many cases are drawn in no time; `tables` is `fins-mixed` with files."""
 
@@ -87,12 +88,16 @@ def test_limits() -> None:
     for split in (name for name in QUICK if name != "limits"):
         assert all(fin.limits == Limits() for case in _cases(split) for fin in case.layout.fins)
     limits = [fin.limits for case in _cases("limits") for fin in case.layout.fins]
-    assert all(0.3 <= each.amplitude[1] <= 0.8 and 1.0 <= each.frequency[1] <= 3.0 for each in limits)
+    assert all(
+        0.3 <= each.amplitude[1] <= 0.8 and 1.0 <= each.frequency[1] <= 3.0 for each in limits
+    )
     arcs = np.array([each.zero_direction[1] - each.zero_direction[0] for each in limits])
     confined = arcs < 2 * math.pi - 1e-9
     assert 0.2 < confined.mean() < 0.47
     assert (arcs[confined] >= math.pi / 2).all() and (arcs[confined] <= 1.5 * math.pi).all()
-    assert all(-math.pi <= low <= high <= math.pi for low, high in (each.zero_direction for each in limits))
+    assert all(
+        -math.pi <= low <= high <= math.pi for low, high in (each.zero_direction for each in limits)
+    )
 
 
 def test_failures() -> None:
@@ -105,7 +110,9 @@ def test_failures() -> None:
 def test_near_singular_layouts_are() -> None:
     for case in _cases("near-singular"):
         fins = case.layout.fins
-        turns = [math.remainder(fin.mounting_angle - fins[0].mounting_angle, math.pi) for fin in fins]
+        turns = [
+            math.remainder(fin.mounting_angle - fins[0].mounting_angle, math.pi) for fin in fins
+        ]
         parallel = max(map(abs, turns)) <= NEAR_ANGLE
         apart = np.abs(np.subtract(fins[0].position, fins[1].position)).max()
         assert parallel or (apart <= NEAR_POSITION and abs(turns[1]) <= NEAR_ANGLE)
@@ -114,7 +121,14 @@ def test_near_singular_layouts_are() -> None:
 FIN_RANGES = {
     "drag": {"area": (0.005, 0.04), "lever": (0.05, 0.15)},
     "lighthill": {"length": (0.1, 0.3), "width": (0.05, 0.15)},
-    "soft": {"k": (1, 8), "p": (1, 2), "x0": (0.6, 1.5), "q": (3, 6), "e": (0, 0.2), "d": (-0.15, 0.15)},
+    "soft": {
+        "k": (1, 8),
+        "p": (1, 2),
+        "x0": (0.6, 1.5),
+        "q": (3, 6),
+        "e": (0, 0.2),
+        "d": (-0.15, 0.15),
+    },
 }
 """The contract's."""
 
@@ -151,11 +165,16 @@ def test_tables_are_noisy_grids_of_random_fins() -> None:
         assert 0.005 < ((size - smooth) / size.mean()).std() < 0.06
         assert len(rows) == 8 * 9 * 12 and not rows[:, 3].any()
     stamp = path.stat().st_mtime_ns
-    assert make_split("tables", 1, 3, 1234)[0].layout == case.layout and path.stat().st_mtime_ns == stamp
+    assert (
+        make_split("tables", 1, 3, 1234)[0].layout == case.layout
+        and path.stat().st_mtime_ns == stamp
+    )
 
 
 def test_robots_of_other_fins_are_measured_by_their_own_wrenches() -> None:
-    assert all(case.sigma is None for split in ("id", "limits", "many-fins") for case in _cases(split))
+    assert all(
+        case.sigma is None for split in ("id", "limits", "many-fins") for case in _cases(split)
+    )
     for case in _cases("fins"):
         plant = plant_of(case.layout)
         wrench = plant.wrench(plant.sample(np.random.default_rng(1), (20_000,)))

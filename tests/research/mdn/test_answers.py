@@ -38,7 +38,9 @@ def random_forces(robot: EffortRobot, rows: int) -> Array:
     rng = np.random.default_rng(2)
     largest = robot.forces.fins.maximum
     shape = rows, len(largest)
-    return np.asarray(rng.random(shape) ** 3 * largest * np.exp(1j * rng.uniform(-np.pi, np.pi, shape)))
+    return np.asarray(
+        rng.random(shape) ** 3 * largest * np.exp(1j * rng.uniform(-np.pi, np.pi, shape))
+    )
 
 
 @pytest.mark.parametrize(("n", "limits"), [(4, "nominal"), (8, "nominal"), (6, "varied")])
@@ -47,7 +49,9 @@ def test_descents_end_near_the_target_with_less_effort_than_at_first(n: int, lim
     target, _ = targets_of(robot, 40)
     *_, found = descend(robot.forces, target, random_forces(robot, 40), 30)
     missed = np.linalg.norm(wrench(robot.forces, found.force) - target, axis=1)
-    assert np.median(missed) < 2e-3 and (missed < 0.05).mean() > (0.9 if limits == "nominal" else 0.6)
+    assert np.median(missed) < 2e-3 and (missed < 0.05).mean() > (
+        0.9 if limits == "nominal" else 0.6
+    )
 
 
 def test_answers_are_exact_and_the_cheapest_comes_first() -> None:
@@ -68,7 +72,9 @@ def test_where_none_is_exact_the_cheapest_of_the_nearest_is_first() -> None:
     robot = robot_of(4)
     error = np.array([[0.1, 0.10003, 0.3], [0.0, 0.0, 1e-3]])
     effort = np.array([[3.0, 2.0, 1.0], [2.0, 1.99, 1.0]])
-    given = Answers(np.zeros((2, 3, 4, 3)), np.zeros((2, 3, 6)), error, effort, np.arange(6).reshape(2, 3))
+    given = Answers(
+        np.zeros((2, 3, 4, 3)), np.zeros((2, 3, 6)), error, effort, np.arange(6).reshape(2, 3)
+    )
     assert ranked(robot, given).origin.tolist() == [[1, 0, 2], [4, 3, 5]]
     assert ranked(robot, given, bonus=0.01).origin[1].tolist() == [3, 4, 5], "a switch must pay"
 

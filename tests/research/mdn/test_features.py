@@ -1,4 +1,5 @@
-"""What the network of method `mdn` sees: it decides the problem, and knows of no size, axis or frame."""
+"""What the network of method `mdn` sees: it decides the problem, and knows of no size, axis or
+frame."""
 
 from dataclasses import replace
 
@@ -28,7 +29,9 @@ def problem_of(layout: Layout, std: np.ndarray = STD) -> EffortProblem:
 @pytest.fixture(params=[2, 5, 12])
 def layout(request: pytest.FixtureRequest) -> Layout:
     """Fins with limits of their own, one of which pushes unevenly and leans."""
-    layout = random_layout(np.random.default_rng(request.param), n_fins=request.param, limits="varied")
+    layout = random_layout(
+        np.random.default_rng(request.param), n_fins=request.param, limits="varied"
+    )
     uneven = FinModelSpec("soft", (("d", 0.2), ("e", 0.25), ("phi_e", 1.0)))
     return layout.replace_actuator("fin_1", model=uneven)
 
@@ -85,7 +88,8 @@ def test_a_fins_own_vectors_are_turned_to_its_force() -> None:
 
 
 def test_a_fin_with_stops_is_seen_within_them() -> None:
-    """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches all."""
+    """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches
+    all."""
     arc = Limits(zero_direction=(-0.5, 1.7))
     layout = Layout("arc", (Fin("a", (0.2, 0.1, 0.0), 0.3, arc), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
     static = robot_view(problem_of(layout)).static
@@ -139,9 +143,13 @@ def test_documented_features_of_a_hand_made_fin() -> None:
     node = found.nodes[0, 0]
     assert node.shape == (NODE_SIZE,) and found.frame[0, 0] == pytest.approx(1j, abs=1e-4)
     np.testing.assert_allclose(node[:3], [0.5, 0.2, np.log(0.251) / 7.0], atol=1e-3)
-    np.testing.assert_allclose(node[3:6], [1.0, 0.0, 0.0], atol=1e-3)  # the only fin: all depends on it
+    np.testing.assert_allclose(
+        node[3:6], [1.0, 0.0, 0.0], atol=1e-3
+    )  # the only fin: all depends on it
     assert node[6] == 0.0 and (np.diff(node[7:11]) > 0).all()
-    np.testing.assert_allclose(node[11:16], [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)  # the same all round
+    np.testing.assert_allclose(
+        node[11:16], [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6
+    )  # the same all round
     rest = problem.fins.smallest[0] / top
     assert node[16] == pytest.approx(np.sqrt(rest), rel=1e-6)
     np.testing.assert_allclose(node[17:20], [1.0, 0.0, 0.0], atol=1e-6)  # a full circle
@@ -197,11 +205,15 @@ def test_huge_inputs_are_no_warning(recwarn: pytest.WarningsRecorder) -> None:
 def test_likelihood_is_that_of_one_mixture_over_all_fins() -> None:
     draw = torch.Generator().manual_seed(0)
     sizes = (5, 4), (5, 3, 4, 2), (5, 3, 4)
-    given = ForceMixture(*(torch.randn(size, generator=draw, dtype=torch.float64) for size in sizes))
+    given = ForceMixture(
+        *(torch.randn(size, generator=draw, dtype=torch.float64) for size in sizes)
+    )
     way = torch.randn(5, 7, 3, 2, generator=draw, dtype=torch.float64)
     mean = given.mean.transpose(1, 2).flatten(2)
     std = given.log_std.exp()[..., None].expand(-1, -1, -1, 2).transpose(1, 2).flatten(2)
-    reference = MixtureSameFamily(Categorical(logits=given.logits), Independent(Normal(mean, std), 1))
+    reference = MixtureSameFamily(
+        Categorical(logits=given.logits), Independent(Normal(mean, std), 1)
+    )
     expected = reference.log_prob(way.flatten(2).transpose(0, 1)).T
     torch.testing.assert_close(given.log_prob(way), expected)
     # Warm, all components learn from every way; cold, the one that stands for it.
@@ -224,7 +236,9 @@ def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem
 
 
 @pytest.mark.parametrize(("model", "limits"), KINDS)
-def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, limits: Limits) -> None:
+def test_commands_give_the_forces_with_the_least_effort(
+    model: FinModelSpec, limits: Limits
+) -> None:
     layout, problem = compiled(model, limits)
     fins = problem.fins
     plant = plant_of(layout)
@@ -235,13 +249,17 @@ def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, lim
     np.testing.assert_allclose(found.size, wanted, rtol=1e-9)
     command, effort = realize(problem, found)
     given = plant.force(command)
-    np.testing.assert_allclose(given[..., 1] + 1j * given[..., 2], found.force, atol=0.01 * fins.maximum[0])
+    np.testing.assert_allclose(
+        given[..., 1] + 1j * given[..., 2], found.force, atol=0.01 * fins.maximum[0]
+    )
     # No other amplitude gives that force with less, wherever the frequency allows it.
     amplitude = np.linspace(*limits.amplitude, 60)[:, None]
     frequency = np.linspace(*limits.frequency, 400)
     for (row,), least, (size,) in zip(command, effort, wanted, strict=True):
         grid = np.stack(np.broadcast_arrays(amplitude, frequency, row[2]), axis=-1)
-        strong = np.linalg.norm(plant.force(grid[..., None, :])[..., 0, 1:], axis=-1) >= 0.999 * size
+        strong = (
+            np.linalg.norm(plant.force(grid[..., None, :])[..., 0, 1:], axis=-1) >= 0.999 * size
+        )
         upper = layout.upper[0]
         every = effort_of_shares(amplitude / upper[0], frequency / upper[1], row[2] / upper[2])
         assert least <= every[strong].min() * 1.01
@@ -249,7 +267,9 @@ def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, lim
 
 def test_what_a_fin_cannot_give_becomes_the_nearest_that_it_can() -> None:
     fins = compiled(FinModelSpec("drag", ()), ARC)[1].fins
-    asked = np.array([2.0 * fins.maximum * np.exp(0.4j), [1.0 * np.exp(2.0j)], [0.0j], [np.exp(-2.9j)]])
+    asked = np.array(
+        [2.0 * fins.maximum * np.exp(0.4j), [1.0 * np.exp(2.0j)], [0.0j], [np.exp(-2.9j)]]
+    )
     found = fins.project(asked)
     np.testing.assert_allclose(found.force[0], fins.maximum * np.exp(0.4j))
     np.testing.assert_allclose(found.force[1], np.cos(0.6) * np.exp(1.4j))

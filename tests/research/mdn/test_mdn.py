@@ -1,4 +1,5 @@
-"""Method `mdn`: proposals of the mixture, each searched to its end, whatever the network has learned."""
+"""Method `mdn`: proposals of the mixture, each searched to its end, whatever the network has
+learned."""
 
 import subprocess
 import sys
@@ -91,7 +92,8 @@ def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a
             if name == source
         ]
         assert any(
-            np.allclose(plant_force(layout_a, command), plant_force(layout_a, end), atol=5e-3) for end in ends
+            np.allclose(plant_force(layout_a, command), plant_force(layout_a, end), atol=5e-3)
+            for end in ends
         )
 
 
@@ -106,18 +108,23 @@ def test_from_tick_to_tick_candidates_keep_it_too(shipped: AnyRobot) -> None:
     assert away is not None and "the way it moves now" in away.source
 
 
-def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_more_candidates_than_components_are_drawn_by_a_seed(
+    shipped: AnyRobot, layout_a: Layout
+) -> None:
     many = AnyRobot("mdn", n_candidates=40)
     first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
     assert first is not None and other is not None
     assert len(first) == 40 and first == again and first != other
     still = AnyRobot("mdn", n_candidates=40, temperature=0.0)
     means = still.allocate(layout_a, TARGET).samples
-    assert means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
+    assert (
+        means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
+    )
 
 
 def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a: Layout) -> None:
-    """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
+    """Behind the means, 8,000 draws; and their spread is the component's own, by the
+    temperature."""
     weight = weights(shipped, layout_a)
     method, target = method_of(shipped, layout_a)
     m = len(weight)
@@ -194,7 +201,9 @@ def test_out_of_reach_it_delivers_what_the_default_method_does(
     policy: str, shipped: AnyRobot, layout_a: Layout
 ) -> None:
     far = 20.0 * np.array(TARGET)
-    answer, other = (method.allocate(layout_a, far, policy=policy) for method in (shipped, AnyRobot()))
+    answer, other = (
+        method.allocate(layout_a, far, policy=policy) for method in (shipped, AnyRobot())
+    )
     np.testing.assert_allclose(answer.wrench, other.wrench, atol=1e-3 * answer.scale[0])
     assert answer.effort is not None and other.effort is not None
     assert answer.effort <= other.effort * (1.0 + 1e-6)

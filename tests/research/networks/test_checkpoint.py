@@ -1,4 +1,5 @@
-"""Checkpoints: what is saved comes back, and everything that is not one is refused with a sentence."""
+"""Checkpoints: what is saved comes back, and everything that is not one is refused with a
+sentence."""
 
 import hashlib
 import json
@@ -46,8 +47,11 @@ def change_config(folder: Path, change: Callable[[Config], object]) -> None:
 
 
 def sign(folder: Path) -> None:
-    """Write the right SHA-256 of the weights, as someone would who builds checkpoints by other means."""
-    change_config(folder, lambda config: config.update(sha256=file_sha256(folder / "model.safetensors")))
+    """Write the right SHA-256 of the weights, as someone would who builds checkpoints by other
+    means."""
+    change_config(
+        folder, lambda config: config.update(sha256=file_sha256(folder / "model.safetensors"))
+    )
 
 
 def change_weights(folder: Path, change: Callable[[dict[str, torch.Tensor]], object]) -> None:
@@ -59,7 +63,8 @@ def change_weights(folder: Path, change: Callable[[dict[str, torch.Tensor]], obj
 
 
 def refusal(folder: Path) -> str:
-    """The sentence with which a folder is refused, at the latest by the method that would answer with it."""
+    """The sentence with which a folder is refused, at the latest by the method that would answer
+    with it."""
     with pytest.raises(CheckpointError) as caught:
         checkpoint.read_checkpoint(folder)
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
@@ -73,7 +78,15 @@ def test_round_trip(untrained_checkpoint: Path, tmp_path: Path) -> None:
     first = replace(first, metrics={"surrogate": {"error": 0.25}}, training={"seed": 7})
     second = checkpoint.write_checkpoint(tmp_path / "again", first)
     assert second.name == "again"
-    kept = ("preset", "training", "metrics", "fin_model", "sha256", "network_sizes", "surrogate_sizes")
+    kept = (
+        "preset",
+        "training",
+        "metrics",
+        "fin_model",
+        "sha256",
+        "network_sizes",
+        "surrogate_sizes",
+    )
     for name in kept:
         assert getattr(second, name) == getattr(first, name), name
     np.testing.assert_array_equal(np.array(second.normalization), np.array(first.normalization))
@@ -85,7 +98,16 @@ def test_round_trip(untrained_checkpoint: Path, tmp_path: Path) -> None:
 def test_the_files_are_safetensors_and_json_with_all_that_the_format_promises(folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {"model.safetensors", "config.json"}
     config = json.loads((folder / "config.json").read_text())
-    promised = {"format", "version", "preset", "sha256", "fin_model", "normalization", "surrogate", "network"}
+    promised = {
+        "format",
+        "version",
+        "preset",
+        "sha256",
+        "fin_model",
+        "normalization",
+        "surrogate",
+        "network",
+    }
     assert promised | {"training", "metrics"} == set(config)
     assert config["sha256"] == file_sha256(folder / "model.safetensors")
     prefixes = {name.split(".")[0] for name in load_file(folder / "model.safetensors")}
@@ -94,7 +116,8 @@ def test_the_files_are_safetensors_and_json_with_all_that_the_format_promises(fo
 
 def test_refuses_a_missing_folder(tmp_path: Path) -> None:
     assert re.search(
-        r"nowhere/config\.json: no such file; a checkpoint folder holds", refusal(tmp_path / "nowhere")
+        r"nowhere/config\.json: no such file; a checkpoint folder holds",
+        refusal(tmp_path / "nowhere"),
     )
 
 
@@ -107,7 +130,9 @@ def test_refuses_missing_weights(folder: Path) -> None:
 def test_refuses_a_cut_file(folder: Path, kept: int) -> None:
     path = folder / "model.safetensors"
     path.write_bytes(path.read_bytes()[:kept])
-    assert "its SHA-256 is not the one in config.json; the file was changed or cut off" in refusal(folder)
+    assert "its SHA-256 is not the one in config.json; the file was changed or cut off" in refusal(
+        folder
+    )
 
 
 def test_refuses_one_changed_bit(folder: Path) -> None:
@@ -131,7 +156,10 @@ def test_refuses_weights_of_another_format_even_when_signed(folder: Path) -> Non
         (b'{"format": "finlab-checkpoint",', "is not valid JSON"),
         (b"\xff\xfe\x00", "is not UTF-8 text"),
         (b"[]", "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
-        (b'{"model_type": "bert"}', "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
+        (
+            b'{"model_type": "bert"}',
+            "not a finlab checkpoint (expected format 'finlab-checkpoint')",
+        ),
         (b'"' + b"x" * 1_000_001 + b'"', "bytes, too large for a checkpoint's file"),
     ],
     ids=["empty", "cut", "binary", "list", "foreign", "huge"],
@@ -149,7 +177,9 @@ def test_refuses_another_version_and_says_what_to_do(folder: Path, version: obje
     assert "use the finlab that made it, or train again" in message
 
 
-@pytest.mark.parametrize("key", ["surrogate", "network", "normalization", "fin_model", "training", "metrics"])
+@pytest.mark.parametrize(
+    "key", ["surrogate", "network", "normalization", "fin_model", "training", "metrics"]
+)
 def test_refuses_a_missing_key_and_names_it(folder: Path, key: str) -> None:
     change_config(folder, lambda config: config.pop(key))
     assert f"do not fit together ('{key}')" in refusal(folder)
@@ -173,7 +203,9 @@ def test_refuses_weights_that_are_no_numbers(folder: Path, value: float) -> None
 
 
 def test_refuses_another_precision(folder: Path) -> None:
-    change_weights(folder, lambda tensors: tensors.update({k: v.double() for k, v in tensors.items()}))
+    change_weights(
+        folder, lambda tensors: tensors.update({k: v.double() for k, v in tensors.items()})
+    )
     assert "expected float32" in refusal(folder)
 
 
@@ -231,7 +263,9 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
 
 
-def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Path, tmp_path: Path) -> None:
+def test_a_network_over_forces_comes_back_without_a_surrogate(
+    untrained_mdn: Path, tmp_path: Path
+) -> None:
     first = checkpoint.read_checkpoint(untrained_mdn)
     assert first.surrogate_sizes is None and first.network_sizes is not None
     assert checkpoint.write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
@@ -262,7 +296,9 @@ def test_names_and_folders_are_told_apart(folder: Path) -> None:
         checkpoint.resolve_checkpoint("away/from/home")
 
 
-LOWER = torch.tensor([[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64)
+LOWER = torch.tensor(
+    [[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64
+)
 UPPER = torch.tensor([[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64)
 
 
@@ -270,7 +306,9 @@ def test_normalized_coordinates_go_from_minus_one_to_one_and_back() -> None:
     torch.testing.assert_close(to_normalized(LOWER, LOWER, UPPER)[:2], -torch.ones(2, 3).double())
     torch.testing.assert_close(to_normalized(UPPER, LOWER, UPPER)[:2], torch.ones(2, 3).double())
     command = LOWER + 0.3 * (UPPER - LOWER)
-    torch.testing.assert_close(to_command(to_normalized(command, LOWER, UPPER), LOWER, UPPER), command)
+    torch.testing.assert_close(
+        to_command(to_normalized(command, LOWER, UPPER), LOWER, UPPER), command
+    )
 
 
 def test_a_range_of_no_width_normalizes_to_zero() -> None:

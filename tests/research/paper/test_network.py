@@ -1,4 +1,5 @@
-"""The paper's network against PyTorch Geometric and PyTorch's own layers, and in numpy against itself."""
+"""The paper's network against PyTorch Geometric and PyTorch's own layers, and in numpy against
+itself."""
 
 import math
 from dataclasses import replace
@@ -25,7 +26,9 @@ M = 5
 def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
     """Weights of which none is zero or one, which would hide one that is misplaced."""
     draw = torch.Generator().manual_seed(2)
-    return {name: 0.3 * torch.randn(shape, generator=draw) for name, shape in config.shapes().items()}
+    return {
+        name: 0.3 * torch.randn(shape, generator=draw) for name, shape in config.shapes().items()
+    }
 
 
 def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
@@ -41,7 +44,9 @@ def random_robots() -> tuple[torch.Tensor, torch.Tensor]:
     rng = np.random.default_rng(5)
     layouts = [random_layout(rng, n_fins=5, limits="varied") for _ in range(12)]
     parts = ("position", "mounting_angle", "lower", "upper")
-    drawn = [torch.tensor(np.array([getattr(layout, part) for layout in layouts])) for part in parts]
+    drawn = [
+        torch.tensor(np.array([getattr(layout, part) for layout in layouts])) for part in parts
+    ]
     target = torch.randn(12, 6, generator=torch.Generator().manual_seed(5))
     return raw_features(*drawn).float(), target
 
@@ -60,7 +65,9 @@ def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
     x = torch.randn(3, n, CONFIG.width)
     found = graph_attention(weights, "graph.0", x)
     for row in range(3):
-        torch.testing.assert_close(found[row], reference(x[row], edges).detach(), atol=1e-4, rtol=1e-4)
+        torch.testing.assert_close(
+            found[row], reference(x[row], edges).detach(), atol=1e-4, rtol=1e-4
+        )
 
 
 def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
@@ -68,7 +75,9 @@ def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
     config = weights.network_of(NetworkConfig)
     x, target = random_robots()
     got = config(weights.network, x.numpy(), target.numpy())
-    expected = config(tensors(weights.network), x, target, torch.ones(x.shape[:2], dtype=torch.bool))
+    expected = config(
+        tensors(weights.network), x, target, torch.ones(x.shape[:2], dtype=torch.bool)
+    )
     for a, b in zip(got, expected, strict=True):
         assert a.dtype == np.float32
         np.testing.assert_allclose(a, b.numpy(), atol=2e-3, rtol=1e-3)
@@ -82,13 +91,19 @@ def test_transformer_is_that_of_pytorch() -> None:
     mask = torch.arange(5) < torch.arange(12)[:, None] % 4 + 2
     sizes = config.width, config.heads, config.feedforward
     layer = torch.nn.TransformerEncoderLayer(*sizes, dropout=0.0, batch_first=True, norm_first=True)
-    reference = torch.nn.TransformerEncoder(layer, config.transformer_layers, enable_nested_tensor=False)
+    reference = torch.nn.TransformerEncoder(
+        layer, config.transformer_layers, enable_nested_tensor=False
+    )
     named = {name: value for name, value in weights.items() if name.startswith("transformer.")}
-    reference.load_state_dict({name.removeprefix("transformer."): value for name, value in named.items()})
+    reference.load_state_dict(
+        {name.removeprefix("transformer."): value for name, value in named.items()}
+    )
     linear = torch.nn.functional.linear
     wrench = target[:, None].expand(-1, 5, -1)
     parts = ("enter", x), ("wrench", wrench)
-    both = [linear(part, weights[f"{name}.weight"], weights[f"{name}.bias"]) for name, part in parts]
+    both = [
+        linear(part, weights[f"{name}.weight"], weights[f"{name}.bias"]) for name, part in parts
+    ]
     joined = linear(torch.cat(both, -1), weights["join.weight"], weights["join.bias"])
     ends = weights["norm.weight"], weights["norm.bias"]
     hidden = reference(joined, src_key_padding_mask=~mask)
@@ -101,7 +116,9 @@ def test_fins_may_come_in_any_order() -> None:
     weights = random_weights()
     x, target = random_robots()
     order = torch.tensor([3, 0, 4, 1, 2])
-    for got, expected in zip(CONFIG(weights, x[:, order], target), CONFIG(weights, x, target), strict=True):
+    for got, expected in zip(
+        CONFIG(weights, x[:, order], target), CONFIG(weights, x, target), strict=True
+    ):
         torch.testing.assert_close(got, expected[:, order], atol=1e-4, rtol=1e-4)
 
 
@@ -117,14 +134,17 @@ def test_documented_meaning_of_the_features() -> None:
     layout = Layout("one", (Fin("bow", (0.3, -0.15, 0.06), math.pi / 2, limits),))
     expected = [1.0, -0.5, 0.2, 0.5, 0.1, 0.5, 0.1, 1.0, -1.0 / math.pi, 2.0 / math.pi]
     np.testing.assert_allclose(
-        raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)[0], expected
+        raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)[0],
+        expected,
     )
 
 
 def random_mixture() -> Mixture:
     draw = np.random.default_rng(11)
     mean = 1.8 * draw.random((B, N, M, 3)) - 0.9
-    return Mixture(2.0 * draw.normal(size=(B, N, M)), mean, 0.3 * draw.normal(size=(B, N, M, 3)) - 1.0)
+    return Mixture(
+        2.0 * draw.normal(size=(B, N, M)), mean, 0.3 * draw.normal(size=(B, N, M, 3)) - 1.0
+    )
 
 
 def drawn(mixture: Mixture, count: int, temperature: float = 1.0) -> np.ndarray:
@@ -147,7 +167,9 @@ def test_likelihoods_are_those_of_torchs_distributions() -> None:
     expected = distribution(mixture).log_prob(torch.from_numpy(x).transpose(0, 1)).transpose(0, 1)
     np.testing.assert_allclose(mixture.log_prob(x), expected.numpy(), rtol=1e-9)
     tensors = Mixture(*map(torch.from_numpy, mixture))
-    np.testing.assert_allclose(tensors.log_prob(torch.from_numpy(x)).numpy(), expected.numpy(), rtol=1e-9)
+    np.testing.assert_allclose(
+        tensors.log_prob(torch.from_numpy(x)).numpy(), expected.numpy(), rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("temperature", [1.0, 0.3])

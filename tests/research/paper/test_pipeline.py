@@ -1,4 +1,5 @@
-"""The paper's own pipeline on untrained networks: repeatable, inside limits, and refinement refines."""
+"""The paper's own pipeline on untrained networks: repeatable, inside limits, and refinement
+refines."""
 
 import subprocess
 import sys
@@ -61,7 +62,9 @@ def robot() -> Layout:
 def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
     lower = layout.lower
     upper = layout.upper
-    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+    return bool(
+        np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all()
+    )
 
 
 ABLATIONS: list[dict[str, object]] = [
@@ -81,12 +84,16 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
     options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
     method = AnyRobot("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
-    targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array([[1.0], [1], [1], [50], [0], [1e5]])
+    targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array(
+        [[1.0], [1], [1], [50], [0], [1e5]]
+    )
     assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
     assert keeps_limits(robot, result.command)
     assert result.candidates is not None and result.samples is not None
-    assert keeps_limits(robot, result.candidates.command) and keeps_limits(robot, result.samples.command)
+    assert keeps_limits(robot, result.candidates.command) and keeps_limits(
+        robot, result.samples.command
+    )
 
 
 @pytest.mark.parametrize("options", ABLATIONS)
@@ -100,7 +107,9 @@ def test_the_same_seed_gives_the_same_answer(
         assert not np.array_equal(first, other)
 
 
-def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, robot: Layout) -> None:
+def test_refinement_lowers_what_the_surrogate_sees(
+    checkpoint: TrainedWeights, robot: Layout
+) -> None:
     def believed(**options: object) -> float:
         method = AnyRobot("paper", checkpoint, **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_expected
@@ -119,7 +128,9 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
     result = method.allocate(robot, TARGET)
     assert result.candidates is not None and result.samples is not None
     np.testing.assert_array_equal(result.candidates.command[0], result.command)
-    assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
+    assert (
+        result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
+    )
     for offered in (result.candidates, result.samples):
         j_norm = normalized_error(method.normalization, offered.wrench, np.array(TARGET)) ** 2
         assert (np.diff(j_norm + 0.01 * offered.effort) >= -1e-5).all()
@@ -154,7 +165,10 @@ def test_the_shipped_networks_reach_the_target() -> None:
     share = np.random.default_rng(0).uniform(size=(10, layout.n_fins, 3))
     targets = Plant(layout).wrench(lower + share * (upper - lower))
     command = method.allocate_batch(layout, targets).command
-    assert np.median(normalized_error(method.normalization, Plant(layout).wrench(command), targets)) < 0.05
+    assert (
+        np.median(normalized_error(method.normalization, Plant(layout).wrench(command), targets))
+        < 0.05
+    )
 
 
 def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> None:
@@ -171,7 +185,9 @@ def place_of(robot: Layout) -> list[torch.Tensor]:
 def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -> None:
     """The whole refinement in PyTorch, from the raw candidates that the method drew."""
     method = AnyRobot("paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
-    before = AnyRobot("paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
+    before = AnyRobot(
+        "paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none"
+    )
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
@@ -179,7 +195,9 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     std = torch.tensor(method.normalization.std, dtype=torch.float32)
     wanted = torch.tensor(target, dtype=torch.float32)
     lower, upper = layout[2:]
-    x = to_normalized(torch.tensor(start.command, dtype=torch.float32), lower, upper).requires_grad_(True)
+    x = to_normalized(
+        torch.tensor(start.command, dtype=torch.float32), lower, upper
+    ).requires_grad_(True)
     optimizer = torch.optim.Adam([x], lr=ADAM_RATE)
     turns = torch.tensor(is_full_turn(robot.upper[:, 2] - robot.lower[:, 2]))
     best = x.detach().clone()
@@ -242,7 +260,8 @@ def test_refuses_settings_that_leave_nothing_to_answer_with(
 
 
 def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> None:
-    """Unrefined, the answer is the likeliest sample, or the one with the least J = J_norm + gamma J_en."""
+    """Unrefined, the answer is the likeliest sample, or the one with the least J = J_norm + gamma
+    J_en."""
     layout = load_layout(shipped_layouts()["A"])
     target = np.array([TARGET])
     chosen = {}

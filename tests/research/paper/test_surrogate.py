@@ -47,7 +47,9 @@ def commands(robot: Layout, rows: int) -> np.ndarray:
 
 @pytest.mark.parametrize("hidden", [(32,), (16, 8, 8)])
 @pytest.mark.parametrize("rows", [1, 2 * BLOCK + 3])
-def test_wrench_and_gradient_are_those_of_torch(hidden: tuple[int, ...], rows: int, robot: Layout) -> None:
+def test_wrench_and_gradient_are_those_of_torch(
+    hidden: tuple[int, ...], rows: int, robot: Layout
+) -> None:
     weights = untrained(*hidden)
     command = commands(robot, rows)
     surrogate = LayoutSurrogate(robot, weights)

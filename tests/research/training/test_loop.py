@@ -29,7 +29,9 @@ def terms_with(weights: dict[str, Tensor]) -> loop.Terms:
     return terms
 
 
-def run(folder: Path, settings: LoopSettings = SETTINGS, die_at: int = 10**9, **options: Any) -> State:
+def run(
+    folder: Path, settings: LoopSettings = SETTINGS, die_at: int = 10**9, **options: Any
+) -> State:
     """The weights of a run, which ends by an error at its second save after `die_at` steps."""
     weights = {name: torch.zeros(1, requires_grad=True) for name in ("slope", "shift")}
     shipped: list[State] = []
@@ -61,16 +63,23 @@ def test_a_run_that_died_ends_with_the_weights_and_the_log_of_one_that_did_not(
         with pytest.raises(KeyboardInterrupt):
             run(tmp_path / "died", die_at=step, resume=True)
     found = run(tmp_path / "died", resume=True)
-    assert np.array_equal(run(tmp_path / "died", resume=True)["slope"], found["slope"])  # nothing is left
+    assert np.array_equal(
+        run(tmp_path / "died", resume=True)["slope"], found["slope"]
+    )  # nothing is left
     assert all(np.array_equal(found[name], expected[name]) for name in expected)
-    logs = [[(row["step"], row["loss"]) for row in log_of(tmp_path / f)] for f in ("died", "undisturbed")]
+    logs = [
+        [(row["step"], row["loss"]) for row in log_of(tmp_path / f)]
+        for f in ("died", "undisturbed")
+    ]
     assert logs[0] == logs[1] and [step for step, _ in logs[0]] == ["0", "20", "40", "44"]
 
 
 def test_it_learns_and_leaves_curves_and_nothing_half(tmp_path: Path) -> None:
     (tmp_path / ".resume.pt.1.part").write_bytes(b"half")
     found = run(tmp_path, LoopSettings(400, 8, 0.05))
-    assert found["slope"] == pytest.approx(3.0, abs=0.05) and found["shift"] == pytest.approx(-1.0, abs=0.05)
+    assert found["slope"] == pytest.approx(3.0, abs=0.05) and found["shift"] == pytest.approx(
+        -1.0, abs=0.05
+    )
     assert {path.name for path in tmp_path.iterdir()} == {"log.csv", "curves.png", "resume.pt"}
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
 

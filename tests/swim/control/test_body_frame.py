@@ -14,7 +14,9 @@ from finlab.swim.control.contract import NO_WRENCH
 from finlab.swim.simulation import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight
 from tests.any_robot import AnyRobot
 
-AT_REST = control.Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
+AT_REST = control.Measurement(
+    0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
+)
 
 
 def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: int = 0) -> RunLog:
@@ -35,7 +37,11 @@ def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: i
 def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot) -> None:
     there = np.array([0.9, -0.7, -1.4])
     log = swim(
-        name, analytic, Trajectory("there", np.array([0.0, 45.0]), np.tile(there, (2, 1))), "waypoint", lost
+        name,
+        analytic,
+        Trajectory("there", np.array([0.0, 45.0]), np.tile(there, (2, 1))),
+        "waypoint",
+        lost,
     )
     away = np.linalg.norm(log.position - there, axis=1)
     assert away[0] > 1.0 and away[log.time > 35.0].max() < 0.1
@@ -70,7 +76,9 @@ def test_the_printed_law_of_a_waypoint_at_rest() -> None:
 def test_the_yaw_rate_is_damped_and_bounded() -> None:
     controller = control.VelocityController(load_layout("A"))
     turning = AT_REST._replace(rates=np.array([0.0, 0.0, 0.2]))
-    wrench = controller.wrench(turning, control.Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH)
+    wrench = controller.wrench(
+        turning, control.Setpoint(np.array([0.0, 0.0, -1.0]), 0.0), NO_WRENCH
+    )
     np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.yaw_damping], atol=1e-9)
     spun = AT_REST._replace(rates=np.array([0.0, 0.0, -99.0]))
     wrench = controller.wrench(spun, control.Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)

@@ -1,4 +1,5 @@
-"""A monitor beside a swim: what it finds, what it leaves alone, and what it hands to the allocator."""
+"""A monitor beside a swim: what it finds, what it leaves alone, and what it hands to the
+allocator."""
 
 import math
 from dataclasses import replace
@@ -12,7 +13,14 @@ from finlab.layout import Layout
 from finlab.layout.damage import Damage
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.control import FaultMonitor, Measurement, MonitorSettings
-from finlab.swim.simulation import NOISE_ALONE, ClosedLoop, Fault, RunLog, make_trajectory, perturbed
+from finlab.swim.simulation import (
+    NOISE_ALONE,
+    ClosedLoop,
+    Fault,
+    RunLog,
+    make_trajectory,
+    perturbed,
+)
 from tests.any_robot import AnyRobot
 from tests.ripple import rippled
 
@@ -21,7 +29,9 @@ PRIOR = 0.01
 """More than any fin's prior probability of being broken."""
 
 
-def swim(layout: Layout, allocator: Allocator, failures: list[Fault], **options: object) -> ClosedLoop:
+def swim(
+    layout: Layout, allocator: Allocator, failures: list[Fault], **options: object
+) -> ClosedLoop:
     """A swim with noise and a current, watched, of whose failures the allocator is not told."""
     return ClosedLoop(
         layout,
@@ -51,7 +61,9 @@ def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None
     np.testing.assert_allclose(log.strength[-1], 1.0, atol=0.15)
 
 
-@pytest.mark.parametrize("name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize(
+    "name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)]
+)
 def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> None:
     loop = swim(layout_a, AnyRobot().on(layout_a), [Fault(name, 12.0)])
     log = until(loop, 16.0)
@@ -92,7 +104,9 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobo
     log = until(loop, 20.0)
     assert loop.damage.lost == () and loop.damage.partly
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
-    assert math.remainder(loop.damage.stuck["front_left"] - held, 2 * math.pi) == pytest.approx(0.0, abs=0.35)
+    assert math.remainder(loop.damage.stuck["front_left"] - held, 2 * math.pi) == pytest.approx(
+        0.0, abs=0.35
+    )
 
 
 def test_a_repaired_fin_is_taken_back(layout_a: Layout) -> None:
@@ -105,7 +119,8 @@ def test_a_repaired_fin_is_taken_back(layout_a: Layout) -> None:
 
 
 def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> None:
-    """The allocator rests a fin, of which nothing is known then: its probability stays at its prior."""
+    """The allocator rests a fin, of which nothing is known then: its probability stays at its
+    prior."""
     loop = ClosedLoop(
         layout_a,
         analytic.on(layout_a),
@@ -161,7 +176,9 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
 
 
 @pytest.mark.parametrize("truth", ["ripple", "askew"])
-def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: AnyRobot, truth: str) -> None:
+def test_a_model_that_does_not_fit_raises_no_alarm(
+    layout_a: Layout, analytic: AnyRobot, truth: str
+) -> None:
     """Fins that shake the robot by several newtons, or push elsewhere than the model says."""
     built = perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
     loop = swim(layout_a, analytic.on(layout_a), [], truth=built)

@@ -1,4 +1,5 @@
-"""Where the model expects the robot to go, against the simulated body, and its slopes against differences."""
+"""Where the model expects the robot to go, against the simulated body, and its slopes against
+differences."""
 
 import numpy as np
 
@@ -10,8 +11,8 @@ from finlab.swim.vehicle.vehicle import Vehicle
 
 
 def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout_a: Layout) -> None:
-    """Period by period in a current, against the simulated body; slopes by differences, Munk's moments among
-    them: that of water that sinks past a robot under way is the largest of all."""
+    """Period by period in a current, against the simulated body; slopes by differences, Munk's
+    moments among them: that of water that sinks past a robot under way is the largest of all."""
     vehicle = Vehicle(complete_body(layout_a), (0.05, -0.03, 0.0))
     model = MotionModel(layout_a, 0.1)
     body = np.array([0.0, 0.0, 0.0, 1.0, *np.zeros(9)])
@@ -39,7 +40,9 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
         moved = before.copy()
         moved[column] += 1e-4
         slope = (model.step(moved, yaw, command, free, free).state - step.state) / 1e-4
-        np.testing.assert_allclose(step.transition[:, column], slope, 0.2, 0.03, err_msg=f"{column}")
+        np.testing.assert_allclose(
+            step.transition[:, column], slope, 0.2, 0.03, err_msg=f"{column}"
+        )
 
 
 def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) -> None:

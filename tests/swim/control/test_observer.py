@@ -70,14 +70,15 @@ def test_a_force_that_nobody_told_of_becomes_drift(robot: Layout) -> None:
     found, state = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 60.0, truth=light)
     lift = 0.01 * 19.0 * 9.81
     observer = MotionObserver(robot, PERIOD_S)
-    # At the speed that it has come to, drag and lift are in balance: no drift is left, though the model of
-    # the drawn robot alone would have it slowed down.
+    # At the speed that it has come to, drag and lift are in balance: no drift is left, though the
+    # model of the drawn robot alone would have it slowed down.
     assert state[9] > 0.03
     assert abs(found.drift[2]) < 0.15 * lift / observer.inertia[2]
 
 
 def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
-    """Sideways speed where added mass and damping balance, by hand: 100.7 v + 260 v |v| = -59 u r."""
+    """Sideways speed where added mass and damping balance, by hand: 100.7 v + 260 v |v| = -59 u
+    r."""
     observer = MotionObserver(robot, 0.01)
     sway = 0.0
     for _ in range(1000):
@@ -93,7 +94,8 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
     times = np.arange(0.0, 12.0, 0.1)
     flat = [path.setpoint(float(t)) for t in times]
     flat = [
-        s._replace(velocity=s.velocity * [1, 1, 0], acceleration=s.acceleration * [1, 1, 0]) for s in flat
+        s._replace(velocity=s.velocity * [1, 1, 0], acceleration=s.acceleration * [1, 1, 0])
+        for s in flat
     ]
     along = MotionObserver(robot, 0.1).wrenches_along(flat, np.zeros(2), 0.08)
     vehicle = Vehicle(complete_body(robot))

@@ -27,7 +27,9 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
     for fin in (1, 3):
         assert np.linalg.norm(before[fin]) < LEAST
         assert np.linalg.norm(after[fin]) == pytest.approx(LEAST, rel=0.05)
-        assert after[fin, 0] == pytest.approx(before[fin, 0], abs=0.02), "what it pushes ahead is kept"
+        assert after[fin, 0] == pytest.approx(before[fin, 0], abs=0.02), (
+            "what it pushes ahead is kept"
+        )
     assert after[1, 1] * after[3, 1] < 0.0, "together they lift little"
     command[1, 2] = np.pi  # now it is told to push astern: the side stays
     again = forces(layout_a, probe.added(command, NONE, np.zeros(4)))
@@ -45,14 +47,17 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
     beats = [np.isfinite(found.probed(command)[2, 0]) for _ in range(90)]
     assert beats == [30 <= k % 60 < 50 or k >= 60 and k < 80 for k in range(1, 91)]
     assert all(np.isnan(told.probed(command)[2, 0]) for _ in range(90))
-    for _ in range(40):  # ten ticks into a probe: it is turned and swings up as fast as the servos may
+    for _ in range(
+        40
+    ):  # ten ticks into a probe: it is turned and swings up as fast as the servos may
         probed = found.probed(command)
     push = forces(layout_a, probed)[2]
     assert push[1] == pytest.approx(FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
 
 
 def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None:
-    """Commands within the rates of fins that hardly push or are lost: what is sent is within them, too."""
+    """Commands within the rates of fins that hardly push or are lost: what is sent is within them,
+    too."""
     settings = replace(MonitorSettings(), probe_every_s=3.0)
     monitor = FaultMonitor(layout_a, settings=settings)
     rng = np.random.default_rng(0)

@@ -22,7 +22,9 @@ def robot() -> Layout:
 
 
 def first_wrench(robot: Layout, setpoint: Setpoint, yaw: float = 0.0) -> np.ndarray:
-    still = Measurement(0.0, np.array([0.0, 0.0, -1.0]), yaw, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
+    still = Measurement(
+        0.0, np.array([0.0, 0.0, -1.0]), yaw, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
+    )
     return TrackingController(robot).wrench(still, setpoint, np.zeros(6))
 
 
@@ -39,7 +41,9 @@ def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
 
 
 def test_it_pushes_towards_a_point_ahead_and_above(robot: Layout) -> None:
-    wrench = first_wrench(robot, Setpoint(np.array([1.0, 0.0, -0.5]), 0.1, np.array([0.1, 0.0, 0.0])))
+    wrench = first_wrench(
+        robot, Setpoint(np.array([1.0, 0.0, -0.5]), 0.1, np.array([0.1, 0.0, 0.0]))
+    )
     assert wrench[0] > 1.0 and wrench[2] > 1.0
     assert wrench[[1, 3, 4]] == pytest.approx(0.0)
     assert abs(wrench[5]) < 1e-9
@@ -61,7 +65,11 @@ def test_no_more_than_the_bounds_is_asked_for(robot: Layout) -> None:
 
 
 def error(
-    robot: Layout, pilot: Controller, truth: Layout | None = None, current: float = 0.0, path: str = "circle"
+    robot: Layout,
+    pilot: Controller,
+    truth: Layout | None = None,
+    current: float = 0.0,
+    path: str = "circle",
 ) -> float:
     """Root mean square distance from a path [m]."""
     path_ = make_trajectory(path)
@@ -80,7 +88,9 @@ def error(
         pytest.param(1.0, 0.07, 0.05, marks=pytest.mark.exhaustive),
     ],
 )
-def test_it_stays_near_to_a_path(robot: Layout, damping: float, current: float, most: float) -> None:
+def test_it_stays_near_to_a_path(
+    robot: Layout, damping: float, current: float, most: float
+) -> None:
     """The plant is not what the controller was told."""
     truth = perturbed(robot, damping=damping)
     assert error(robot, TrackingController(robot), truth, current) < most
@@ -95,6 +105,8 @@ def test_fins_that_turn_before_the_wrench_comes_keep_nearer_to_a_square() -> Non
     robot = load_layout("A")
     error = {}
     for name in ("analytic", "dual"):
-        log = ClosedLoop(robot, load_method_spec(name).on(robot), make_trajectory("square"), seed=3).run()
+        log = ClosedLoop(
+            robot, load_method_spec(name).on(robot), make_trajectory("square"), seed=3
+        ).run()
         error[name] = np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean())
     assert error["dual"] < 0.93 * error["analytic"]

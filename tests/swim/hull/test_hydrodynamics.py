@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from finlab.swim.hull.hydrodynamics import HullSolid, ellipsoid_added_mass, friction_damping, pressure_damping
+from finlab.swim.hull.hydrodynamics import (
+    HullSolid,
+    ellipsoid_added_mass,
+    friction_damping,
+    pressure_damping,
+)
 
 
-def box(size: tuple[float, float, float], center: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+def box(
+    size: tuple[float, float, float], center: tuple[float, float, float] = (0, 0, 0)
+) -> np.ndarray:
     mesh = trimesh.creation.box(size)
     return np.asarray(mesh.vertices[mesh.faces] + np.array(center))
 
@@ -52,7 +59,9 @@ def test_prolate_spheroids_by_lambs_closed_forms(slenderness: float) -> None:
     displaced = 1000.0 * 4 / 3 * math.pi * a * b * b
     twist = e**4 * (beta - alpha) / (2 - e**2) / (2 * e**2 - (2 - e**2) * (beta - alpha))
     own = displaced / 5 * (a**2 + b**2)
-    tolerance = 1e-3 if slenderness < 1.01 else 1e-9  # the closed forms themselves cancel near the sphere
+    tolerance = (
+        1e-3 if slenderness < 1.01 else 1e-9
+    )  # the closed forms themselves cancel near the sphere
     expected = (
         displaced * alpha / (2 - alpha),
         *(displaced * beta / (2 - beta),) * 2,

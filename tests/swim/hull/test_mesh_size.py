@@ -41,7 +41,10 @@ def instanced(mesh: trimesh.Trimesh, count: int) -> bytes:
     ("content", "sentence"),
     [
         (glb(150_000_000), r"asks for 150,000,000 values in its \d+ bytes"),
-        (instanced(trimesh.creation.icosphere(subdivisions=4), 100), "has 512,000 triangles with its instan"),
+        (
+            instanced(trimesh.creation.icosphere(subdivisions=4), 100),
+            "has 512,000 triangles with its instan",
+        ),
         (glb(3, accessors=[7]), "is not a GLB mesh that can be read"),
         (glb(3, meshes={}), "holds no triangles|is not a GLB mesh"),
         (b"glTF", "is not a GLB mesh that can be read"),

@@ -16,7 +16,9 @@ from finlab.swim.vehicle.vehicle import Vehicle
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
 
 
-def swim(truth: Layout, seconds: float, seed: int, noise: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def swim(
+    truth: Layout, seconds: float, seed: int, noise: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Commands (N, n, 3) and measurements (N, 12) of a robot whose fins wander at random."""
     rng = np.random.default_rng(seed)
     n = truth.n_fins
@@ -33,7 +35,9 @@ def swim(truth: Layout, seconds: float, seed: int, noise: float = 1.0) -> tuple[
         if k % 15 == 0:
             command = plant.sample(rng, ())
             # Pushes that tend to bring it back, so that it stays near the place where it began.
-            command[:, 2] = np.where(rng.random(n) < 0.5, command[:, 2], -np.sign(state[2]) * np.pi / 2)
+            command[:, 2] = np.where(
+                rng.random(n) < 0.5, command[:, 2], -np.sign(state[2]) * np.pi / 2
+            )
         commands[k] = command
         measured[k] = np.concatenate([state[:3], euler(state[3:7]), state[7:]])
         for _ in range(5):

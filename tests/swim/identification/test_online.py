@@ -1,4 +1,5 @@
-"""Learning on the way: a robot whose actuators lean and are weak is known after a minute of swimming."""
+"""Learning on the way: a robot whose actuators lean and are weak is known after a minute of
+swimming."""
 
 from dataclasses import replace
 
@@ -18,7 +19,8 @@ from tests.exhaustive import sampled
 
 @pytest.mark.parametrize("name", sampled(["A", "bluerov2_heavy"]))
 def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
-    """Actuators lean by 5 degrees, one this way and the next that way, and give 0.8 of their force."""
+    """Actuators lean by 5 degrees, one this way and the next that way, and give 0.8 of their
+    force."""
     layout = load_layout(name)
     truth = leaned(layout, np.radians(5.0 * (-1.0) ** np.arange(layout.n)))
     plant = plant_of(truth)
@@ -27,7 +29,9 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     targets = 0.6 * 0.8 * plant.wrench(command)
 
     def missed(allocator: Allocator) -> float:
-        away = 0.8 * plant.wrench(learner.factor * allocator.allocate_batch(targets).command) - targets
+        away = (
+            0.8 * plant.wrench(learner.factor * allocator.allocate_batch(targets).command) - targets
+        )
         return float(np.sqrt(np.mean((away / allocator.scale) ** 2)))
 
     learner = OnlineFit(layout)
@@ -47,7 +51,9 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     assert loop.layout == layout
 
 
-def test_what_cannot_be_learned_is_refused_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_learned_is_refused_in_a_sentence(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     fin = load_layout("A").fins[0]
     table = replace(fin, model=FinModelSpec("table", (("path", "fin.csv"),)))
     with pytest.raises(FinlabError, match="is a table, expected a law"):

@@ -1,4 +1,5 @@
-"""From a swim to a robot: known truths are found again, what is not there is not, what is unknown is said."""
+"""From a swim to a robot: known truths are found again, what is not there is not, what is unknown
+is said."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -58,7 +59,9 @@ def test_strengths_directions_and_centre_are_found_within_their_errors(fit: Robo
         assert found == pytest.approx(STRENGTH[name], abs=max(4.0 * error, 0.02)) and error < 0.05
     turned = fit.found("mounting")
     error = fit.found_error("mounting")
-    np.testing.assert_array_less(np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01))
+    np.testing.assert_array_less(
+        np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01)
+    )
     center = fit.found("center")
     error = fit.found_error("center")
     np.testing.assert_allclose(center, CENTER, atol=0.004)
@@ -74,7 +77,9 @@ def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> 
     assert "strength of front_left" in table(fit)
 
 
-def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: Layout, tmp_path: Path) -> None:
+def test_the_fitted_layout_allocates_for_the_true_robot(
+    fit: RobotFit, truth: Layout, tmp_path: Path
+) -> None:
     path = tmp_path / "fitted.yaml"
     write_robot(fit, path)
     fitted = load_layout(path)
@@ -85,7 +90,9 @@ def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: La
     targets = 0.6 * true.wrench(true.sample(np.random.default_rng(3), (30,)))
     allocator = AnyRobot()
     missed = [
-        np.linalg.norm(true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1).mean()
+        np.linalg.norm(
+            true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1
+        ).mean()
         for robot in (drawn, fitted)
     ]
     assert missed[1] < missed[0] / 4.0
@@ -101,7 +108,9 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     delay = found.found("delay")
     error = found.found_error("delay")
     # The made-up swims themselves take forces from the ends of steps of 0.02 s.
-    np.testing.assert_array_less(np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02))
+    np.testing.assert_array_less(
+        np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02)
+    )
     for name, (strength, own) in strengths(found).items():
         assert strength == pytest.approx(STRENGTH[name], abs=max(4.0 * own, 0.02))
 
@@ -128,8 +137,17 @@ def test_the_command_reads_a_csv_file(
     assert len(again) == 309
     np.testing.assert_allclose(again.motion, replay(drawn, command)[:309], atol=1e-6)
     np.testing.assert_allclose(again.measured[:, 6:], measured[:309, 6:], atol=1e-6)
-    np.testing.assert_allclose(wrapped(again.measured[:, 3:6] - measured[:309, 3:6]), 0.0, atol=1e-6)
-    arguments = ["fit", "robot", "--no-other-law", f"{tmp_path}/drawn.yaml", f"{tmp_path}/swim.csv", "-o"]
+    np.testing.assert_allclose(
+        wrapped(again.measured[:, 3:6] - measured[:309, 3:6]), 0.0, atol=1e-6
+    )
+    arguments = [
+        "fit",
+        "robot",
+        "--no-other-law",
+        f"{tmp_path}/drawn.yaml",
+        f"{tmp_path}/swim.csv",
+        "-o",
+    ]
     assert main([*arguments, f"{tmp_path}/found.json"]) == 0
     assert "strength of front_right" in capsys.readouterr().out
     assert load_layout(tmp_path / "found.json").names == drawn.names
@@ -138,7 +156,9 @@ def test_the_command_reads_a_csv_file(
 
 
 @pytest.mark.parametrize("name", sampled(["turtle_hybrid", "bluerov2_heavy", "catamaran"]))
-def test_strengths_of_any_actuators_are_found_in_a_minute_on_the_spot(name: str, tmp_path: Path) -> None:
+def test_strengths_of_any_actuators_are_found_in_a_minute_on_the_spot(
+    name: str, tmp_path: Path
+) -> None:
     layout = load_layout(name)
     loop = excitation(layout, 60.0, seed=3)
     shares = [(0.9, 0.7)[i % 2] for i in range(layout.n)]

@@ -35,7 +35,9 @@ def fitted(layout: Layout, path: Path) -> RobotFit:
         pytest.param("catamaran", 0, marks=pytest.mark.exhaustive),
     ],
 )
-def test_a_reversed_motor_is_named_and_the_rest_is_fitted(tmp_path: Path, name: str, motor: int) -> None:
+def test_a_reversed_motor_is_named_and_the_rest_is_fitted(
+    tmp_path: Path, name: str, motor: int
+) -> None:
     """The robot is sound and the layout wrong, so that no motor makes the swim end."""
     right = load_layout(name)
     wrong = opposed_in(right, [right.names[motor]])
@@ -60,18 +62,22 @@ def test_the_command_line_names_it_and_writes_the_corrected_layout(
         assert np.dot(part.frame[0], true.frame[0]) > 0.98
     drawn_part = drawn.actuators[drawn.index("rear_left")]
     assert (
-        np.dot(load_layout(output).actuators[drawn.index("rear_left")].frame[0], drawn_part.frame[0]) < -0.98
+        np.dot(
+            load_layout(output).actuators[drawn.index("rear_left")].frame[0], drawn_part.frame[0]
+        )
+        < -0.98
     )
 
 
 @pytest.mark.exhaustive
 def test_a_tumbling_robot_tells_its_reversed_lift_motor_too(tmp_path: Path) -> None:
-    """It tumbles at once, and its accelerations alone do not tell; the likelihood of a whole fit does."""
+    """It tumbles at once, and its accelerations alone do not tell; the likelihood of a whole fit
+    does."""
     layout = load_layout("bluerov2_heavy")
     truth = opposed_in(layout, ["lift_front_right"])
-    ClosedLoop(layout, Allocator(layout), make_trajectory("lissajous", 60.0), truth=truth, seed=4).run().save(
-        tmp_path / "swim.npz"
-    )
+    ClosedLoop(
+        layout, Allocator(layout), make_trajectory("lissajous", 60.0), truth=truth, seed=4
+    ).run().save(tmp_path / "swim.npz")
     assert fitted(layout, tmp_path / "swim.npz").opposed == ("lift_front_right",)
 
 

@@ -92,10 +92,14 @@ def test_time_must_rise_without_gaps(rows: Rows, pair: Layout, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("column", ["u", "roll"])
-def test_constant_columns_are_refused(rows: Rows, pair: Layout, tmp_path: Path, column: str) -> None:
+def test_constant_columns_are_refused(
+    rows: Rows, pair: Layout, tmp_path: Path, column: str
+) -> None:
     for line in range(2, len(rows) + 1):
         _set(rows, line, column, "0.25")
-    with pytest.raises(DataError, match=f"column {column} is 0.25 throughout; is the sensor connected"):
+    with pytest.raises(
+        DataError, match=f"column {column} is 0.25 throughout; is the sensor connected"
+    ):
         read(rows, pair, tmp_path)
 
 
@@ -162,16 +166,28 @@ def test_logs_of_another_robot_are_refused(pair: Layout, tmp_path: Path) -> None
     assert len(read_swim(tmp_path / "log.npz", pair)) == 300
 
 
-def test_thrusters_and_azimuths_are_commanded_by_force_and_angle(rows: Rows, tmp_path: Path) -> None:
+def test_thrusters_and_azimuths_are_commanded_by_force_and_angle(
+    rows: Rows, tmp_path: Path
+) -> None:
     layout = load_layout("catamaran")
     left, right, bow = layout.names
-    parts = [f"{left}.angle [deg]", f"{left}.force [N]", f"{right}.angle", f"{right}.force", f"{bow}.force"]
+    parts = [
+        f"{left}.angle [deg]",
+        f"{left}.force [N]",
+        f"{right}.angle",
+        f"{right}.force",
+        f"{bow}.force",
+    ]
     made = [rows[0][:13] + parts] + [row[:13] + ["90", "20", "0", "5", "-3"] for row in rows[1:]]
     for row in made[200:]:
         row[-1] = ""
     swim = read(made, layout, tmp_path)
-    np.testing.assert_allclose(swim.motion[190, -1], [[np.pi / 2, 20, 0], [0, 5, 0], [-3, 0, 0]], atol=1e-3)
+    np.testing.assert_allclose(
+        swim.motion[190, -1], [[np.pi / 2, 20, 0], [0, 5, 0], [-3, 0, 0]], atol=1e-3
+    )
     assert np.isnan(swim.motion[200:, :, 2]).all() and np.isfinite(swim.motion[:, :, :2]).all()
     made[50][-2] = "500"
-    with pytest.raises(DataError, match=f"line 51, column {right}.force, holds 500, expected N from"):
+    with pytest.raises(
+        DataError, match=f"line 51, column {right}.force, holds 500, expected N from"
+    ):
         read(made, layout, tmp_path)

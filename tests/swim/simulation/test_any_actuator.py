@@ -22,7 +22,9 @@ def error(log: RunLog) -> float:
     return float(np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize("name", sampled(["turtle_hybrid", "bluerov2", "mixed", "bluerov2_heavy"], every=2))
+@pytest.mark.parametrize(
+    "name", sampled(["turtle_hybrid", "bluerov2", "mixed", "bluerov2_heavy"], every=2)
+)
 def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
     robot = load_layout(name)
     log = ClosedLoop(robot, Allocator(robot), make_trajectory("circle"), seed=1).run()
@@ -43,11 +45,20 @@ def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
     assert np.abs(late).max() < 0.1 * np.abs(log.allocated[150:]).max()
 
 
-@pytest.mark.parametrize(("kind", "announced"), crossed(["lost", "torn", "stuck"], [True, False], every=2))
-def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str, announced: bool) -> None:
+@pytest.mark.parametrize(
+    ("kind", "announced"), crossed(["lost", "torn", "stuck"], [True, False], every=2)
+)
+def test_a_thruster_breaks_and_the_robot_keeps_its_path(
+    heavy: Layout, kind: str, announced: bool
+) -> None:
     fault = Fault(heavy.names[1], 15.0, kind)  # type: ignore[arg-type]
     loop = ClosedLoop(
-        heavy, Allocator(heavy), make_trajectory("circle"), failures=[fault], announced=announced, seed=2
+        heavy,
+        Allocator(heavy),
+        make_trajectory("circle"),
+        failures=[fault],
+        announced=announced,
+        seed=2,
     )
     assert error(loop.run()) < 0.08
 
@@ -56,20 +67,27 @@ def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: 
     path = make_trajectory("lissajous")
     lost = Fault(heavy.names[0], 0.5 * path.duration_s)
     whole = ClosedLoop(heavy, Allocator(heavy), path, seed=0).run()
-    loop = ClosedLoop(heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0)
+    loop = ClosedLoop(
+        heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0
+    )
     assert error(loop.run()) < 1.1 * error(whole)
     assert loop.damage.lost == (lost.name,)
 
 
 def test_a_body_that_is_less_damped_in_yaw_than_its_model_is_not_spun(heavy: Layout) -> None:
     truth = replace(heavy, body=OTHER_HEAVY)
-    log = ClosedLoop(heavy, Allocator(heavy), make_trajectory("lissajous"), truth=truth, seed=0).run()
+    log = ClosedLoop(
+        heavy, Allocator(heavy), make_trajectory("lissajous"), truth=truth, seed=0
+    ).run()
     assert error(log) < 0.06 and np.abs(log.motion[:, 5]).max() < 2.0
 
 
 def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
     loop = ClosedLoop(
-        heavy, Allocator(heavy), make_trajectory("circle"), failures=[Fault(heavy.names[0], 0.0, "torn", 0.4)]
+        heavy,
+        Allocator(heavy),
+        make_trajectory("circle"),
+        failures=[Fault(heavy.names[0], 0.0, "torn", 0.4)],
     )
     log = loop.run()
     late = log.asked[150:-2] - log.delivered[151:-1]
@@ -79,9 +97,13 @@ def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
 def test_a_rudder_that_is_torn_or_stuck_is_told_to_the_allocator() -> None:
     torpedo = load_layout("torpedo")
     path = make_trajectory("station")
-    loop = ClosedLoop(torpedo, Allocator(torpedo), path, monitor=FaultMonitor(torpedo), announced=True)
+    loop = ClosedLoop(
+        torpedo, Allocator(torpedo), path, monitor=FaultMonitor(torpedo), announced=True
+    )
     loop.fail("rudder_top", "torn", 0.5)
     assert loop.damage.torn == {"rudder_top": 0.5}
-    assert loop.damage.applied_to(torpedo).actuators[1].area == pytest.approx(0.5 * torpedo.actuators[1].area)
+    assert loop.damage.applied_to(torpedo).actuators[1].area == pytest.approx(
+        0.5 * torpedo.actuators[1].area
+    )
     loop.fail("elevator_left", "stuck")
     assert loop.damage.lost == ("elevator_left",)

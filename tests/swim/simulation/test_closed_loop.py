@@ -26,9 +26,13 @@ def swum(swim: sim.ClosedLoop, seconds: float) -> sim.RunLog:
 
 
 @pytest.mark.parametrize("truth", ["drawn", "ripple", "askew"])
-def test_it_follows_a_circle_whatever_its_fins_do(layout_a: Layout, analytic: AnyRobot, truth: str) -> None:
+def test_it_follows_a_circle_whatever_its_fins_do(
+    layout_a: Layout, analytic: AnyRobot, truth: str
+) -> None:
     built = sim.perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
-    loop = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle"), truth=built, seed=7)
+    loop = sim.ClosedLoop(
+        layout_a, analytic.on(layout_a), sim.make_trajectory("circle"), truth=built, seed=7
+    )
     log = swum(rippled(loop) if truth == "ripple" else loop, 20.0)
     error = np.linalg.norm(log.position - log.reference, axis=1)
     assert error.max() < 0.25
@@ -37,7 +41,9 @@ def test_it_follows_a_circle_whatever_its_fins_do(layout_a: Layout, analytic: An
 
 def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
     swims = [
-        sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=seed)
+        sim.ClosedLoop(
+            layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=seed
+        )
         for seed in (1, 1, 2)
     ]
     first, again, other = ([swim.step() for _ in range(30)][-1].position for swim in swims)
@@ -47,7 +53,10 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
 
 def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRobot) -> None:
     log = swum(
-        sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.straight(30.0, 0.15), sensors=sim.NO_NOISE), 20.0
+        sim.ClosedLoop(
+            layout_a, analytic.on(layout_a), sim.straight(30.0, 0.15), sensors=sim.NO_NOISE
+        ),
+        20.0,
     )
     late = log.time > 15.0
     assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
@@ -56,7 +65,10 @@ def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRo
 
 def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
     swim = sim.ClosedLoop(
-        layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), failures=[("front_left", 0.5)]
+        layout_a,
+        analytic.on(layout_a),
+        sim.make_trajectory("circle", 20.0),
+        failures=[("front_left", 0.5)],
     )
     ticks = [swim.step() for _ in range(8)]
     lost = layout_a.index("front_left")
@@ -84,14 +96,18 @@ def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
 
 
 def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: Path) -> None:
-    swim = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=3)
+    swim = sim.ClosedLoop(
+        layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=3
+    )
     ticks = [swim.step() for _ in range(5)]
     log = swim.log
     log.save(tmp_path / "log.npz")
     read = sim.load_log(tmp_path / "log.npz")
     assert (read.names, read.method, read.seed, read.n_ticks) == (layout_a.names, "analytic", 3, 5)
     for name in sim.Tick._fields:
-        np.testing.assert_array_equal(getattr(read, name), getattr(log_of_ticks_like(log, ticks), name))
+        np.testing.assert_array_equal(
+            getattr(read, name), getattr(log_of_ticks_like(log, ticks), name)
+        )
     (tmp_path / "bad.npz").write_bytes(b"no archive")
     for path in ("bad.npz", "missing.npz"):
         with pytest.raises(DataError, match="expected a swim log"):
@@ -101,7 +117,8 @@ def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: P
 def log_of_ticks_like(log: object, ticks: list[sim.Tick]) -> object:
     """The same log made anew from its ticks."""
     about = {
-        name: getattr(log, name) for name in ("layout", "names", "method", "controller", "task", "water")
+        name: getattr(log, name)
+        for name in ("layout", "names", "method", "controller", "task", "water")
     }
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
@@ -110,7 +127,11 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     events = [sim.Fault("front_left", 2.0), sim.Fault("back_left", 2.0, "torn", 0.5)]
     events += [sim.Fault("back_right", 2.0, "stuck"), sim.Fault("back_left", 4.0, "whole")]
     swim = sim.ClosedLoop(
-        layout_a, analytic.on(layout_a), sim.make_trajectory("circle"), failures=events, announced=False
+        layout_a,
+        analytic.on(layout_a),
+        sim.make_trajectory("circle"),
+        failures=events,
+        announced=False,
     )
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
@@ -120,7 +141,10 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()
     assert not log.force[after, lost].any(), "a fin that hangs still gives nothing"
-    assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
+    assert (
+        np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9
+        and np.ptp(log.command[after, stuck, 2]) > 0.02
+    )
     law = np.linalg.norm(swim._plant.body_forces(log.fin_motion), axis=-1)
     share = np.linalg.norm(log.force, axis=-1)[:, weak] / law[:, weak]
     assert np.median(share[after & (log.time < 4.0)]) == pytest.approx(0.5, abs=0.06)
@@ -159,7 +183,12 @@ def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share
     "body",
     [
         {"mass_kg": 7.0, "buoyancy_n": 3.0, "linear_damping": (14, 8, 6, 15, 18, 18)},
-        {"mass_kg": 1.0, "added_mass": (0.0,) * 6, "linear_damping": (100,) * 6, "inertia_kgm2": (0.1,) * 3},
+        {
+            "mass_kg": 1.0,
+            "added_mass": (0.0,) * 6,
+            "linear_damping": (100,) * 6,
+            "inertia_kgm2": (0.1,) * 3,
+        },
         {"mass_kg": 0.5, "quadratic_damping": (1000,) * 6, "inertia_kgm2": (0.001,) * 3},
     ],
     ids=["sinks", "held fast", "light"],
@@ -174,5 +203,7 @@ def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[st
     )
     for _ in range(60):
         tick = loop.step()
-        assert np.isfinite([*tick.motion, *tick.asked, *tick.fault_probability, *tick.strength_std]).all()
+        assert np.isfinite(
+            [*tick.motion, *tick.asked, *tick.fault_probability, *tick.strength_std]
+        ).all()
     assert np.abs(loop.state[7:]).max() < 10.0

@@ -32,7 +32,8 @@ def test_every_axis_and_every_fin_is_varied(swim: RunLog) -> None:
         assert np.ptp(command[:, 0]) > 0.3 and np.ptp(command[:, 1]) > 1.0
         counts, _ = np.histogram(command[:, 2], bins=4, range=(-np.pi, np.pi))
         assert counts.min() > 10
-        # Amplitude and frequency are no function of each other, or the law of the fin could not be told.
+        # Amplitude and frequency are no function of each other, or the law of the fin could not be
+        # told.
         assert abs(np.corrcoef(command[:, 0], command[:, 1])[0, 1]) < 0.8
     force = swim.force.reshape(len(swim.time), -1)
     assert np.linalg.matrix_rank(force - force.mean(axis=0), tol=1.0) >= min(
@@ -57,4 +58,6 @@ def test_what_cannot_be_shaken_is_refused() -> None:
     with pytest.raises(DataError, match="30 to 300 s, got 301"):
         excitation(layout, 301.0)
     error = refused(["simulate", "A", "--excite", "--lost", "front_left@3"])
-    assert "leave --controller, --lost, --torn, --stuck, --whole, --monitor and --learn out" in error
+    assert (
+        "leave --controller, --lost, --torn, --stuck, --whole, --monitor and --learn out" in error
+    )

@@ -27,7 +27,9 @@ def flapping(layout: Layout, amplitude: float, frequency: float, direction: floa
     return motion
 
 
-def cycle_mean(force: ActuatorForce, motion: FinMotion, cycles: int = 10, skip: int = 5) -> np.ndarray:
+def cycle_mean(
+    force: ActuatorForce, motion: FinMotion, cycles: int = 10, skip: int = 5
+) -> np.ndarray:
     """Mean force (3,) of the first fin over whole cycles."""
     command = motion.command.copy()
     per_cycle = round(1.0 / (command[0, 1] * DT))

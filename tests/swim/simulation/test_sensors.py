@@ -53,7 +53,9 @@ def test_what_is_late_is_of_a_while_ago() -> None:
     for k in range(100):
         state[:3] = 0.02 * k
         found = sensors.measure(0.02 * k, state)
-        assert found.position[0] == pytest.approx(0.02 * max(k - 5, 0)), "at rest before the beginning"
+        assert found.position[0] == pytest.approx(0.02 * max(k - 5, 0)), (
+            "at rest before the beginning"
+        )
         assert found.depth <= 0.0
     assert settings.dvl.delay_s == pytest.approx(0.1) and NO_NOISE.dvl.delay_s == 0.0
 

@@ -38,7 +38,9 @@ def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
         setpoint = path.setpoint(time)
         done = time / leg
         assert setpoint.velocity[0] == pytest.approx(12.0 / leg * done * (1.0 - done), abs=2e-3)
-        assert setpoint.acceleration[0] == pytest.approx(12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3)
+        assert setpoint.acceleration[0] == pytest.approx(
+            12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3
+        )
 
 
 def test_a_file_of_positions(tmp_path: Path) -> None:
@@ -68,7 +70,9 @@ def test_bad_files_are_one_sentence(tmp_path: Path, content: str, message: str) 
 
 
 def test_unknown_names_and_durations(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="circle, lissajous, square, dive, straight, station or a CSV file"):
+    with pytest.raises(
+        DataError, match="circle, lissajous, square, dive, straight, station or a CSV file"
+    ):
         make_trajectory("spiral")
     with pytest.raises(DataError, match="12 to 3600"):
         make_trajectory("circle", 1.0)

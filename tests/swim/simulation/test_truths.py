@@ -25,7 +25,8 @@ def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
     built = own_effectiveness(true)
     turn = np.einsum("nw,nw->n", built[:, 1, :3], drawn[:, 1, :3])
     np.testing.assert_allclose(np.degrees(np.arccos(turn)), 5.0, rtol=1e-6)
-    # One newton upwards pitches about the true centre: 1.6 cm further behind, 1.2 cm to the left of it.
+    # One newton upwards pitches about the true centre: 1.6 cm further behind, 1.2 cm to the left of
+    # it.
     np.testing.assert_allclose(
         built[:, 2, 3:5] - drawn[:, 2, 3:5], np.tile([-0.012, -0.016], (4, 1)), atol=1e-12
     )

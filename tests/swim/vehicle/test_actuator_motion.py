@@ -13,9 +13,18 @@ from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.fin_motion import FinLag
 
 LAW = PowerLaw(1.0)
-THRUSTER = Thruster("t", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 30.0), LAW, time_constant=0.3, rate=25.0)
+THRUSTER = Thruster(
+    "t", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 30.0), LAW, time_constant=0.3, rate=25.0
+)
 AZIMUTH = Azimuth(
-    "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 50.0), LAW, turn_rate=1.5, time_constant=0.2
+    "a",
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 1.0),
+    (1.0, 0.0, 0.0),
+    (0.0, 50.0),
+    LAW,
+    turn_rate=1.5,
+    time_constant=0.2,
 )
 RUDDER = Rudder(
     "r",

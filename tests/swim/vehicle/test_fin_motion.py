@@ -102,7 +102,8 @@ def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
 
 
 def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
-    """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi; the others have closed forms, too."""
+    """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi; the others have closed forms,
+    too."""
     amplitude = 0.4
     frequency = 1.25
     motion = flapping(pair, amplitude, frequency, 0.0)
@@ -117,7 +118,9 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
         torque.append(fin_power(*motion.speed_and_acceleration(), Blade(), 0.0).driving[0])
         driving.append(power.driving[0])
     swing = 2 * math.pi * frequency
-    assert np.mean(inertial) == pytest.approx(OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)
+    assert np.mean(inertial) == pytest.approx(
+        OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01
+    )
     assert np.mean(torque) == pytest.approx(Blade().power(amplitude, frequency), rel=0.01)
     # The mean squared torque: parts of inertia and of drag.
     squares = 0.5 * Blade().inertia ** 2 + 0.375 * (Blade().drag * amplitude) ** 2

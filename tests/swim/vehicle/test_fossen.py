@@ -1,7 +1,9 @@
-"""Our derivatives against Fossen's matrices in NED with Euler angles, written apart from the library.
+"""Our derivatives against Fossen's matrices in NED with Euler angles, written apart from the
+library.
 
-T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control: rotation and Euler rates (2.4, 2.27),
-Coriolis matrix from a mass matrix (3.46), restoring forces of a submerged body (4.6), relative motion (8).
+T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control: rotation and Euler rates
+(2.4, 2.27), Coriolis matrix from a mass matrix (3.46), restoring forces of a submerged body (4.6),
+relative motion (8).
 """
 
 from dataclasses import replace
@@ -38,7 +40,9 @@ def coriolis(m: np.ndarray, nu: np.ndarray) -> np.ndarray:
 
 
 def euler_of(r: np.ndarray) -> np.ndarray:
-    return np.array([np.arctan2(r[2, 1], r[2, 2]), -np.arcsin(r[2, 0]), np.arctan2(r[1, 0], r[0, 0])])
+    return np.array(
+        [np.arctan2(r[2, 1], r[2, 2]), -np.arcsin(r[2, 0]), np.arctan2(r[1, 0], r[0, 0])]
+    )
 
 
 def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
@@ -51,7 +55,8 @@ def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
 
 
 def fossen(p: Body, eta: np.ndarray, nu: np.ndarray, current: np.ndarray, tau: np.ndarray):
-    """(eta', nu') in NED for eta = (position, Euler angles), nu, the current in the world and tau."""
+    """(eta', nu') in NED for eta = (position, Euler angles), nu, the current in the world and
+    tau."""
     mass_rigid = np.diag([p.mass_kg] * 3 + list(p.inertia_kgm2))
     mass_added = np.diag(p.added_mass)
     phi, theta, psi = eta[3:]
@@ -116,11 +121,14 @@ def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: La
 
         np.testing.assert_allclose(SIGNS * ours[7:], nu_rate, atol=1e-10)
         np.testing.assert_allclose(FLIP @ ours[:3], eta_rate[:3], atol=1e-12)
-        # Attitude: the rotation a moment later, from the quaternion's rate and from the Euler angles' rates.
+        # Attitude: the rotation a moment later, from the quaternion's rate and from the Euler
+        # angles' rates.
         h = 1e-6
         later = quaternion + h * ours[3:7]
         ours_later = FLIP @ Rotation.from_quat(np.roll(later, -1)).as_matrix() @ FLIP
-        np.testing.assert_allclose(ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9)
+        np.testing.assert_allclose(
+            ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9
+        )
 
 
 def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
@@ -134,7 +142,9 @@ def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
     found = np.array(jacobian(body, flow))
     for k in range(6):
         step = h * np.eye(6)[k][:, None]
-        ahead, behind = (np.array(accelerations(body, flow + s * step, up, wrench)) for s in (1, -1))
+        ahead, behind = (
+            np.array(accelerations(body, flow + s * step, up, wrench)) for s in (1, -1)
+        )
         np.testing.assert_allclose(found[:, k], (ahead - behind) / (2 * h), atol=1e-6)
     np.testing.assert_allclose(jacobian(body, flow[:, 3].tolist()), found[:, :, 3], atol=1e-12)
     np.testing.assert_allclose(damping_jacobian(body, flow), -found.diagonal().T, atol=1e-12)

@@ -6,8 +6,9 @@ from scipy.spatial.transform import Rotation
 from finlab.swim.vehicle.attitude import euler, quaternion_of
 from finlab.swim.vehicle.fossen import ucat_body
 
-# Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics, damping
-# from the simulator's set of September 2024, whose centre of buoyancy is 0.05 m above the centre of gravity.
+# Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics,
+# damping from the simulator's set of September 2024, whose centre of buoyancy is 0.05 m above the
+# centre of gravity.
 PUBLISHED = {
     "X_udot": -40.0, "Y_vdot": -21.0, "Z_wdot": -149.0,
     "K_pdot": -0.1269, "M_qdot": -1.2052, "N_rdot": -2.3064,
@@ -17,7 +18,8 @@ PUBLISHED = {
 
 
 def test_ucats_layout_file_holds_the_published_values() -> None:
-    """Half a turn about x flips the signs of a diagonal in pairs, so its entries stay as they are."""
+    """Half a turn about x flips the signs of a diagonal in pairs, so its entries stay as they
+    are."""
     shipped = ucat_body()
     assert (shipped.mass_kg, shipped.inertia_kgm2) == (19.0, (0.1574, 0.4646, 0.51151))
     names = {
@@ -26,7 +28,9 @@ def test_ucats_layout_file_holds_the_published_values() -> None:
         "quadratic_damping": ("X_uu", "Y_vv", "Z_ww", "K_pp", "M_qq", "N_rr"),
     }
     for key, derivatives in names.items():
-        assert getattr(shipped, key) == tuple(-PUBLISHED.get(name, -0.0) for name in derivatives), key
+        assert getattr(shipped, key) == tuple(-PUBLISHED.get(name, -0.0) for name in derivatives), (
+            key
+        )
     assert shipped.center_of_buoyancy_m == (0.0, 0.0, 0.05), "above the centre of gravity"
 
 

@@ -6,7 +6,14 @@ import numpy as np
 
 from finlab.swim.vehicle.attitude import euler, quaternion_of
 from finlab.swim.vehicle.fossen import GRAVITY, Dynamics, dynamics_of, ucat_body
-from finlab.swim.vehicle.vehicle import Bodies, Vehicle, body_rates, body_velocity, derivative, integrate
+from finlab.swim.vehicle.vehicle import (
+    Bodies,
+    Vehicle,
+    body_rates,
+    body_velocity,
+    derivative,
+    integrate,
+)
 
 CURRENT = (0.07, -0.04)
 

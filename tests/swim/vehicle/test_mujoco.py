@@ -1,8 +1,9 @@
-"""The rigid body against MuJoCo over a minute: position and attitude under wrenches that turn with the body.
+"""The rigid body against MuJoCo over a minute: position and attitude under wrenches that turn with
+the body.
 
-Added mass, damping and buoyancy are off on our side, gravity and fluid on MuJoCo's: its fluid model leaves
-out half of the added mass, so it cannot judge those. What is checked is the rigid body: the Coriolis and
-gyroscopic terms, the attitude, and the integration.
+Added mass, damping and buoyancy are off on our side, gravity and fluid on MuJoCo's: its fluid model
+leaves out half of the added mass, so it cannot judge those. What is checked is the rigid body: the
+Coriolis and gyroscopic terms, the attitude, and the integration.
 """
 
 import mujoco
@@ -57,7 +58,10 @@ def test_a_minute_under_changing_wrenches_agrees() -> None:
         state = vehicle.step(state, wrench.tolist(), DT)
         turn = matrix_of(state[3:7]).T @ matrix_of(data.qpos[3:7])
         angle = (
-            np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+            np.linalg.norm(
+                [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+            )
+            / 2
         )
         worst_place = max(worst_place, float(np.abs(state[:3] - data.qpos[:3]).max()))
         worst_angle = max(worst_angle, float(angle))

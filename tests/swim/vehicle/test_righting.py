@@ -36,7 +36,11 @@ def test_a_body_overturns_above_that_speed_and_not_below(name: str) -> None:
 def test_only_a_robot_that_nothing_rights_is_told_of() -> None:
     layout = load_layout("ucat")
     assert righting_words(layout) is None
-    flat = replace(layout, body=replace(complete_body(layout), center_of_buoyancy_m=(0.0, 0.0, 0.0)))
+    flat = replace(
+        layout, body=replace(complete_body(layout), center_of_buoyancy_m=(0.0, 0.0, 0.0))
+    )
     assert str(righting_words(flat)).startswith("no righting moment: overturns in pitch from 0.")
-    top = replace(layout, body=replace(complete_body(layout), center_of_buoyancy_m=(0.0, 0.0, -0.02)))
+    top = replace(
+        layout, body=replace(complete_body(layout), center_of_buoyancy_m=(0.0, 0.0, -0.02))
+    )
     assert righting_words(top) == "no righting moment: overturns in pitch at rest"

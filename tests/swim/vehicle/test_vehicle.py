@@ -63,7 +63,11 @@ def energy_of(vehicle: Vehicle, state: np.ndarray) -> float:
     kinetic = 0.5 * float(np.dot(vehicle.inertia, state[7:13] ** 2))
     _, _, z, qw, qx, qy, qz = state[:7]
     up = (2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy))
-    return kinetic + vehicle.weight * z - vehicle.lift * (z + float(np.dot(up, vehicle.dynamics.center)))
+    return (
+        kinetic
+        + vehicle.weight * z
+        - vehicle.lift * (z + float(np.dot(up, vehicle.dynamics.center)))
+    )
 
 
 def test_without_drag_the_energy_is_kept(ucat: Body) -> None:
@@ -71,7 +75,9 @@ def test_without_drag_the_energy_is_kept(ucat: Body) -> None:
     state = at_rest()
     state[7:] = (0.3, 0.1, -0.2, 0.4, 0.3, 0.5)
     before = energy_of(vehicle, state)
-    assert energy_of(vehicle, swim(vehicle, state, STILL, 10.0, 0.01)) == pytest.approx(before, abs=1e-5)
+    assert energy_of(vehicle, swim(vehicle, state, STILL, 10.0, 0.01)) == pytest.approx(
+        before, abs=1e-5
+    )
 
 
 def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
@@ -81,14 +87,19 @@ def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
     start[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
     wrench = (4.0, 1.0, -2.0, 0.3, 0.2, 0.8)
     fine = swim(vehicle, start, wrench, 2.0, 0.000625)
-    errors = [np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.04, 0.02, 0.01)]
+    errors = [
+        np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.04, 0.02, 0.01)
+    ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (orders > 3.7).all(), orders
-    assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, "the step that is used"
+    assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, (
+        "the step that is used"
+    )
 
 
 def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> None:
-    """Damping many times faster than the step: the body comes to the speed at which drag meets the thrust."""
+    """Damping many times faster than the step: the body comes to the speed at which drag meets the
+    thrust."""
     body = replace(
         ucat, linear_damping=(0.0,) * 6, quadratic_damping=(2e3,) * 6, added_mass=None, mass_kg=1.0
     )
@@ -99,7 +110,9 @@ def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> Non
 def test_shipped_robots_need_one_step_and_impossible_ones_say_so(ucat: Body) -> None:
     assert Vehicle(ucat).n_steps((0.6, 0.2, 0.3, 1.0, 0.5, 1.0), 0.02) == 1
     vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 3 + (1e5, 0.0, 0.0)))
-    with pytest.raises(LayoutError, match=r"body: its motion changes .* times a second.*check mass, inertia"):
+    with pytest.raises(
+        LayoutError, match=r"body: its motion changes .* times a second.*check mass, inertia"
+    ):
         vehicle.step(at_rest(), STILL, 0.02)
     with pytest.raises(LayoutError, match="beyond all bounds"):
         vehicle.step(np.full(STATE_SIZE, np.nan), STILL, 0.02)

@@ -1,4 +1,5 @@
-"""The paper's ablation: one stage of its pipeline changed at a time, scored by surrogate and plant."""
+"""The paper's ablation: one stage of its pipeline changed at a time, scored by surrogate and
+plant."""
 
 from collections.abc import Sequence
 from itertools import cycle, islice
@@ -21,8 +22,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "random_warm_start": {"warm_start": "random"},
     "ours": {},
 }
-"""The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the refined
-ones, so no refinement follows the mean."""
+"""The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the
+refined ones, so no refinement follows the mean."""
 TIMED_CALLS = 5  # single calls whose mean time a row shows, after one that is not counted
 
 
@@ -45,8 +46,8 @@ def run(
         targets: on each layout.
         candidates: drawn for each target.
         checkpoint: of method paper, a shipped name or a folder.
-        shown: layouts for whose first target each row has the candidates, raw and refined, as pairs of
-            normalized error by the surrogate and effort (key points, in the JSON alone).
+        shown: layouts for whose first target each row has the candidates, raw and refined, as pairs
+            of normalized error by the surrogate and effort (key points, in the JSON alone).
         seed: of all draws; all rows have the same cases and candidates.
     """
     check_names("variants", variants, VARIANTS)
@@ -90,8 +91,8 @@ def run(
 
 
 def candidate_points(method: MethodSpec, case: Case, seed: int) -> dict[str, list[list[float]]]:
-    """Normalized error by the surrogate and effort of the candidates for the first target of a case, `raw` as
-    they were drawn and `refined`."""
+    """Normalized error by the surrogate and effort of the candidates for the first target of a
+    case, `raw` as they were drawn and `refined`."""
     target = case.targets[0]
     answer = method.on(case.layout).allocate(target, lost=case.lost, seed=seed)
     points = {}
@@ -130,9 +131,12 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "The paper says neither which model scored its table nor whether its normalized error is J_norm, the "
-        "squared norm of its equation, or the root: commands are scored twice here, and J_norm stands beside "
-        "the printed value. The mean row refines nothing; the random warm start is the best four of as many "
+        "The paper says neither which model scored its table nor whether its normalized error is "
+        "J_norm, the "
+        "squared norm of its equation, or the root: commands are scored twice here, and J_norm "
+        "stands beside "
+        "the printed value. The mean row refines nothing; the random warm start is the best four "
+        "of as many "
         "uniform draws."
     ),
     quick={"layouts": 5, "targets": 4},

@@ -1,8 +1,9 @@
 """Figures of single swims as rows, and means over seeds, for all closed-loop experiments.
 
-Absolute and relative trajectory error after J. Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM
-Systems, IROS 2012. Robot and reference share one world frame and one clock, so nothing is aligned and samples
-are paired by time. Only positions count: the reference prescribes no attitude.
+Absolute and relative trajectory error after J. Sturm et al., A Benchmark for the Evaluation of
+RGB-D SLAM Systems, IROS 2012. Robot and reference share one world frame and one clock, so nothing
+is aligned and samples are paired by time. Only positions count: the reference prescribes no
+attitude.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,7 +30,8 @@ LOST_M = 1.0
 
 
 class Swim(NamedTuple):
-    """One robot along one path, allocated by a method, steered by a controller, with or without losses."""
+    """One robot along one path, allocated by a method, steered by a controller, with or without
+    losses."""
 
     layout: Layout
     path: Trajectory
@@ -53,7 +55,8 @@ def repeated(
     what: str,
     row_of: Callable[[RunLog], Row],
 ) -> list[tuple[Case, list[Row]]]:
-    """Each case with what `row_of` makes of its swim with each seed, on the cluster where there is one."""
+    """Each case with what `row_of` makes of its swim with each seed, on the cluster where there is
+    one."""
     swims = [swim._replace(seed=seed) for _, swim in cases for seed in seeds]
     rows = map_parts(partial(_row, methods, row_of), swims, what, "swim")
     return [(case, list(islice(rows, len(seeds)))) for case, _ in cases]
@@ -63,27 +66,31 @@ def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swi
     allocator = methods[swim.method].on(swim.layout)
     law = make_controller(swim.controller, swim.layout)
     lost = [(name, swim.lost_s) for name in swim.lost]
-    return row_of(ClosedLoop(swim.layout, allocator, swim.path, law, failures=lost, seed=swim.seed).run())
+    return row_of(
+        ClosedLoop(swim.layout, allocator, swim.path, law, failures=lost, seed=swim.seed).run()
+    )
 
 
 def absolute_error(position: Array, reference: Array) -> float:
-    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m], world
-    frame."""
+    """ATE: root mean square of the distance between positions (N, 3) and reference (N, 3) [m],
+    world frame."""
     return float(np.sqrt(np.square(position - reference).sum(axis=-1).mean()))
 
 
 def relative_error(position: Array, reference: Array, delta: int) -> float:
-    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. Raises
-    DataError: there are no two samples that far apart."""
+    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m].
+    Raises DataError: there are no two samples that far apart."""
     if not 0 < delta < len(position):
-        raise DataError(f"relative error: expected a step of 1 to {len(position) - 1} samples, got {delta}")
+        raise DataError(
+            f"relative error: expected a step of 1 to {len(position) - 1} samples, got {delta}"
+        )
     error = position - reference
     return absolute_error(error[delta:], error[:-delta])
 
 
 def depth_error(position: Array, reference: Array) -> float:
-    """Root mean square error of the depth [m] of positions (N, 3) beside a reference (N, 3) [m], world
-    frame."""
+    """Root mean square error of the depth [m] of positions (N, 3) beside a reference (N, 3) [m],
+    world frame."""
     return float(np.sqrt(np.square(position[:, 2] - reference[:, 2]).mean()))
 
 
@@ -93,8 +100,8 @@ def speed_error(log: RunLog) -> Array:
 
 
 def follow_row(log: RunLog) -> Row:
-    """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the piece of
-    the relative error counts as one piece."""
+    """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the
+    piece of the relative error counts as one piece."""
     position = log.position
     reference = log.reference
     piece = round(RTE_DELTA_S / float(log.time[1] - log.time[0]))
@@ -129,16 +136,17 @@ def over_seeds(rows: Sequence[Row]) -> Row:
 def mean_rows(keys: Sequence[str], done: Iterable[tuple[Case, Sequence[Row]]]) -> list[Row]:
     """One row for each case, a value for each key, of the rows of its runs."""
     return [
-        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)} for case, rows in done
+        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}
+        for case, rows in done
     ]
 
 
 def with_losses(
     layouts: Sequence[str], counts: Sequence[int]
 ) -> tuple[list[tuple[Layout, int, tuple[str, ...]]], list[tuple[Layout, int]]]:
-    """For each file or shipped name and number of fins the first that may be lost so that the robot can be
-    steered, and those robots and numbers of which all are needed. Numbers that leave no fin are left out.
-    Raises DataError: a negative number."""
+    """For each file or shipped name and number of fins the first that may be lost so that the robot
+    can be steered, and those robots and numbers of which all are needed. Numbers that leave no fin
+    are left out. Raises DataError: a negative number."""
     if min(counts) < 0:
         raise DataError(f"lost: expected numbers from 0, got {min(counts)}")
     robots = [in_worker(load_layout, name) for name in layouts]
@@ -161,6 +169,7 @@ ERRORS = (
 """Columns of `follow_row`."""
 ABOUT_ERRORS = (
     "ATE: root mean square distance to the reference, nothing aligned; RTE: of displacements over "
-    f"{RTE_DELTA_S:g} s; spread: standard deviation over runs. Inertial power is the paper's sum of I alpha "
+    f"{RTE_DELTA_S:g} s; spread: standard deviation over runs. Inertial power is the paper's sum "
+    "of I alpha "
     "omega, of its magnitudes."
 )

@@ -43,13 +43,17 @@ class Fault:
 
 
 def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
-    """The healthy robot, each fin and each pair lost from the start, and each fin at a time [s]; never
-    all."""
+    """The healthy robot, each fin and each pair lost from the start, and each fin at a time [s];
+    never all."""
     names = layout.names
     lost = [((), 0.0), *(((name,), 0.0) for name in names)]
-    lost += [(pair, 0.0) for pair in combinations(names, 2)] + [((name,), half_way_s) for name in names]
+    lost += [(pair, 0.0) for pair in combinations(names, 2)] + [
+        ((name,), half_way_s) for name in names
+    ]
     return [
-        Fault(tuple(fins), time, steers(layout, tuple(fins))) for fins, time in lost if len(fins) < len(names)
+        Fault(tuple(fins), time, steers(layout, tuple(fins)))
+        for fins, time in lost
+        if len(fins) < len(names)
     ]
 
 
@@ -66,7 +70,8 @@ def run(
 
     Args:
         layout: a layout file or shipped name.
-        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x,
+        y, z.
         methods: names as in eval wrench.
         controller: tracking, waypoint (the paper's), velocity.
         runs: of each, with other noise.
@@ -88,7 +93,9 @@ def run(
     for row, (_, errors_of) in zip(rows, done, strict=True):
         row["over_healthy"] = row["ate"] / healthy[row["method"]]
         row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
-    return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
+    return rows + [
+        {"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable
+    ]
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
@@ -102,7 +109,8 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
 
 experiment = Experiment(
     name="faults",
-    question="How closely does a robot follow a path when fins are lost, from the start or half-way?",
+    question="How closely does a robot follow a path when fins are lost, from the start or "
+    "half-way?",
     columns=(
         Column("fault", "fault"),
         Column("method", "method", "code"),
@@ -113,9 +121,11 @@ experiment = Experiment(
         *POWER,
     ),
     run=run,
-    note=f"{ABOUT_ERRORS} Losses are announced. The path is kept where no run was ever farther than "
+    note=f"{ABOUT_ERRORS} Losses are announced. The path is kept where no run was ever farther "
+    "than "
     f"{LOST_M:g} m away; not swum: the fins that are left cannot give surge, heave and yaw "
-    f"independently. Aimed at: one lost fin lets the error grow to at most {ALLOWED} times. The paper's "
+    f"independently. Aimed at: one lost fin lets the error grow to at most {ALLOWED} times. The "
+    "paper's "
     "runs took place in a pool.",
     quick={"runs": 1, "methods": ("dual",)},
     printed=_printed,

@@ -1,7 +1,8 @@
-"""Hard days: named swims in which something is not as the designer of the robot assumed. Plain data.
+"""Hard days: named swims in which something is not as the designer of the robot assumed. Plain
+data.
 
-What a day says is true of the robot and its surroundings; allocator, controller and monitor know the layout,
-the laws of its fins, and what is announced.
+What a day says is true of the robot and its surroundings; allocator, controller and monitor know
+the layout, the laws of its fins, and what is announced.
 """
 
 import math
@@ -16,7 +17,14 @@ from finlab.layout import Body, Layout, load_layout
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.splits import make_split
 from finlab.swim.control import FaultMonitor, steers
-from finlab.swim.simulation import ClosedLoop, Fault, SensorSettings, Trajectory, make_trajectory, perturbed
+from finlab.swim.simulation import (
+    ClosedLoop,
+    Fault,
+    SensorSettings,
+    Trajectory,
+    make_trajectory,
+    perturbed,
+)
 
 TWO = ("A", "C")  # those that swim most of the days: a symmetric one and one that is not
 CURRENT = (0.05, -0.05, 0.0)  # 7 cm/s across the path [m/s]
@@ -34,7 +42,8 @@ OTHER_HEAVY = Body(
 """The same robot by github.com/PX4/PX4-gazebo-models, 2026 (BSD-3); it displaces 0.0135 m^3."""
 
 BUILT_OFF = {"askew": math.radians(5.0), "center": (-0.016, 0.012, 0.0)}
-"""A robot that is not built as drawn: actuators turned by 5 degrees, the centre of gravity 2 cm off."""
+"""A robot that is not built as drawn: actuators turned by 5 degrees, the centre of gravity 2 cm
+off."""
 
 
 class Case(NamedTuple):
@@ -48,14 +57,14 @@ class Case(NamedTuple):
 class HardDay:
     """One scenario: its name for `--scenarios`, and what is hard, in a sentence.
 
-    `duration_s` None is the trajectory's own time [s]; `scale` is how many times larger the path is than the
-    shipped one. With `mixed_fins` all methods are given fins of split `fins-mixed`, others for each seed.
-    `body` is the true one where it is another than the layout's, `truth` holds options of
-    `finlab.swim.simulation.perturbed`, and `current` is the velocity of the water in the world [m/s]. `weak`
-    is the share of its thrust that one fin gives, each in its turn, without an announcement; `lost` is how
-    many fins are lost half-way, each and each pair in its turn, and where this is not `announced`, a
-    `FaultMonitor` has to find it. `jets` are what actuators truly do to each other, which methods are
-    told where they are `jets_known`.
+    `duration_s` None is the trajectory's own time [s]; `scale` is how many times larger the path is
+    than the shipped one. With `mixed_fins` all methods are given fins of split `fins-mixed`, others
+    for each seed. `body` is the true one where it is another than the layout's, `truth` holds
+    options of `finlab.swim.simulation.perturbed`, and `current` is the velocity of the water in the
+    world [m/s]. `weak` is the share of its thrust that one fin gives, each in its turn, without an
+    announcement; `lost` is how many fins are lost half-way, each and each pair in its turn, and
+    where this is not `announced`, a `FaultMonitor` has to find it. `jets` are what actuators truly
+    do to each other, which methods are told where they are `jets_known`.
     """
 
     name: str
@@ -100,7 +109,11 @@ class HardDay:
 
     def believed(self, robot: Layout) -> Layout:
         """What methods are told of a robot."""
-        return replace(robot, interaction=self.jets if self.jets_known else None) if self.jets else robot
+        return (
+            replace(robot, interaction=self.jets if self.jets_known else None)
+            if self.jets
+            else robot
+        )
 
     def true(self, robot: Layout) -> Layout:
         """What a believed robot truly is."""
@@ -108,7 +121,8 @@ class HardDay:
         return perturbed(replace(robot, **own), **self.truth)  # type: ignore[arg-type]
 
     def is_hopeless(self, case: Case) -> bool:
-        """Whether what is left of the robot cannot give independently what the controller commands."""
+        """Whether what is left of the robot cannot give independently what the controller
+        commands."""
         return self.lost > 0 and not steers(load_layout(case.layout), case.fins)
 
     def swim(self, case: Case, method: MethodSpec, seed: int) -> ClosedLoop:
@@ -135,7 +149,9 @@ class HardDay:
 
 
 HARD_DAYS = (
-    HardDay("nominal", "Everything is as drawn; sensors are noisy, biased and late.", PAPER_LAYOUTS),
+    HardDay(
+        "nominal", "Everything is as drawn; sensors are noisy, biased and late.", PAPER_LAYOUTS
+    ),
     HardDay("damping-double", "The body is damped twice as much.", truth={"damping": 2.0}),
     HardDay(
         "parameters-high",
@@ -147,7 +163,9 @@ HARD_DAYS = (
     HardDay("buoyant", "The robot is 1 % too buoyant.", truth={"buoyancy": 1.01}),
     HardDay("late", "All sensors are 100 ms later.", sensors=SensorSettings().later(0.1)),
     HardDay("square", "A square with stops at its corners.", trajectory="square"),
-    HardDay("station", "Keep a place in a current of 7 cm/s.", trajectory="station", current=CURRENT),
+    HardDay(
+        "station", "Keep a place in a current of 7 cm/s.", trajectory="station", current=CURRENT
+    ),
     HardDay("hexa", "Six fins.", ("hexa",)),
     HardDay(
         "fins-mixed",
@@ -167,9 +185,16 @@ HARD_DAYS = (
     HardDay("lost-two", "Two fins are lost half-way, announced.", ("A",), lost=2),
     HardDay("restricted", "Stops keep the fins within arcs.", ("restricted",)),
     HardDay("saturated", "The path asks for more than the fins can give.", duration_s=36.0),
-    HardDay("offset", "Centre of gravity and fins are not where the layout has them.", truth=BUILT_OFF),
+    HardDay(
+        "offset", "Centre of gravity and fins are not where the layout has them.", truth=BUILT_OFF
+    ),
     HardDay("heavy", "Eight thrusters; everything is as drawn.", HEAVY),
-    HardDay("heavy-other-body", "Eight thrusters, and the body of another source.", HEAVY, body=OTHER_HEAVY),
+    HardDay(
+        "heavy-other-body",
+        "Eight thrusters, and the body of another source.",
+        HEAVY,
+        body=OTHER_HEAVY,
+    ),
     HardDay(
         "heavy-lost-one",
         "One of eight thrusters is lost half-way, and a monitor has to find out.",
@@ -177,13 +202,30 @@ HARD_DAYS = (
         lost=1,
         announced=False,
     ),
-    HardDay("heavy-jets", "Jets hit each other and the hull, and nobody knows.", HEAVY, jets=Jets()),
-    HardDay("heavy-jets-known", "The same, and the allocator is told.", HEAVY, jets=Jets(), jets_known=True),
-    HardDay("heavy-lost-two", "Two of eight thrusters are lost half-way, announced.", HEAVY, lost=2),
     HardDay(
-        "torpedo", "A propeller and tail fins that need speed.", ("torpedo",), "circle", 120.0, scale=25.0
+        "heavy-jets", "Jets hit each other and the hull, and nobody knows.", HEAVY, jets=Jets()
+    ),
+    HardDay(
+        "heavy-jets-known",
+        "The same, and the allocator is told.",
+        HEAVY,
+        jets=Jets(),
+        jets_known=True,
+    ),
+    HardDay(
+        "heavy-lost-two", "Two of eight thrusters are lost half-way, announced.", HEAVY, lost=2
+    ),
+    HardDay(
+        "torpedo",
+        "A propeller and tail fins that need speed.",
+        ("torpedo",),
+        "circle",
+        120.0,
+        scale=25.0,
     ),
     HardDay("hybrid", "Four fins and two thrusters.", ("turtle_hybrid",)),
-    HardDay("hybrid-lost", "One fin or thruster of six is lost half-way.", ("turtle_hybrid",), lost=1),
+    HardDay(
+        "hybrid-lost", "One fin or thruster of six is lost half-way.", ("turtle_hybrid",), lost=1
+    ),
 )
 """The suite, in the order in which it is printed."""

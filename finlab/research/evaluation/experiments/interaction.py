@@ -1,4 +1,5 @@
-"""Robots whose jets hit each other and the hull: what answers miss by a plant that no method was told."""
+"""Robots whose jets hit each other and the hull: what answers miss by a plant that no method was
+told."""
 
 import tempfile
 from collections.abc import Callable, Iterator
@@ -53,8 +54,9 @@ def run(
     """One row for each group of robots and each model of what actuators do to each other.
 
     Args:
-        plant: judge and teacher, as file.py:function or module:function of a layout and commands (K, n, 3)
-            that gives wrenches (K, 6); the formula of jets with other constants when left out.
+        plant: judge and teacher, as file.py:function or module:function of a layout and commands
+            (K, n, 3) that gives wrenches (K, 6); the formula of jets with other constants when left
+            out.
         robots: of each group.
         targets: on each robot, wrenches of random commands by the plant.
         layouts: that the networks learn from, 20 samples each with 2 % noise.
@@ -85,7 +87,13 @@ Model = Callable[[Samples], Interaction | None]
 
 
 def _models(
-    judge: Judge, layouts: int, steps: int, network: str | None, own: tuple[int, ...], seed: int, folder: Path
+    judge: Judge,
+    layouts: int,
+    steps: int,
+    network: str | None,
+    own: tuple[int, ...],
+    seed: int,
+    folder: Path,
 ) -> dict[str, Model]:
     from finlab.research.interaction.surrogate_form import trained_surrogate
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
@@ -122,12 +130,16 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
         method.plant.interaction = told
         command = method.solve(wrenches, policy=CLOSEST).command
         if name == "oracle":
-            command = np.array([_exact(judge, method, w, u) for w, u in zip(wrenches, command, strict=True)])
+            command = np.array(
+                [_exact(judge, method, w, u) for w, u in zip(wrenches, command, strict=True)]
+            )
         missed = (judge(layout, command) - wrenches) / scale
         force = body_force(method.plant.force(command), layout.frames)
         deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
         watts = method.plant.power(command).sum(axis=1)
-        each += zip(*(np.linalg.norm(part, axis=-1) for part in (missed, deviation)), watts, strict=True)
+        each += zip(
+            *(np.linalg.norm(part, axis=-1) for part in (missed, deviation)), watts, strict=True
+        )
     error, expected, power = (np.array(column) for column in zip(*each, strict=True))
     known = float(np.sqrt((expected**2).mean()))
     return {
@@ -141,14 +153,17 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
 
 
 def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
-    """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton steps."""
+    """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton
+    steps."""
     plant = method.plant
     width = np.maximum(method.plant.width, NEARLY)
     best = command
     least = np.inf
     for _ in range(ROUNDS):
         steps = 1e-4 * np.eye(command.size).reshape(-1, *command.shape) * width
-        given = judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
+        given = (
+            judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
+        )
         error = float(np.linalg.norm(given[0] - wrench / method.scale))
         if error < least:
             best = command
@@ -157,7 +172,9 @@ def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
             break
         slope = ((given[1:] - given[0]) / 1e-4).T
         change = np.linalg.lstsq(slope, wrench / method.scale - given[0], rcond=1e-6)[0]
-        command = plant.feasible(command + np.clip(change, -0.2, 0.2).reshape(command.shape) * width)
+        command = plant.feasible(
+            command + np.clip(change, -0.2, 0.2).reshape(command.shape) * width
+        )
     return best
 
 
@@ -178,7 +195,8 @@ class _ByDifferences(Interaction):
         moved = flat[:, None] + step * np.eye(count).reshape(count, *flat.shape[1:])
         here = self._function(flat)
         slope = (
-            self._function(moved.reshape(-1, *flat.shape[1:])).reshape(len(flat), count, 6) - here[:, None]
+            self._function(moved.reshape(-1, *flat.shape[1:])).reshape(len(flat), count, 6)
+            - here[:, None]
         ) / step
         return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
 
@@ -187,8 +205,8 @@ class _ByDifferences(Interaction):
 
 
 class Ridge(_ByDifferences):
-    """What the laws leave of own samples, by ridge regression on forces, their sizes and products of these,
-    with the penalty that leaves least of samples left out one by one."""
+    """What the laws leave of own samples, by ridge regression on forces, their sizes and products
+    of these, with the penalty that leaves least of samples left out one by one."""
 
     def __init__(self, count: int, samples: Samples) -> None:
         """Takes how many of the samples count, and the samples."""
@@ -214,13 +232,16 @@ class Ridge(_ByDifferences):
             alone = (left - (left_u * kept) @ (left_u.T @ left)) / (1.0 - leverage)[:, None]
             if (alone**2).sum() < best:
                 best = float((alone**2).sum())
-                weights = right.T @ ((values / (values**2 + penalty**2))[:, None] * (left_u.T @ left))
+                weights = right.T @ (
+                    (values / (values**2 + penalty**2))[:, None] * (left_u.T @ left)
+                )
         super().__init__(lambda force: features(force) @ weights * scale)
 
 
 experiment = Experiment(
     name="interaction",
-    question="Where jets hit each other and the hull: what do answers miss that know the laws alone, a "
+    question="Where jets hit each other and the hull: what do answers miss that know the laws "
+    "alone, a "
     "formula, a network, or the robot's own samples?",
     columns=(
         Column("robots", "robots", "text"),
@@ -234,8 +255,10 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets are wrenches "
-        "of random commands by the plant. The oracle goes on from the network's answer by the plant itself."
+        "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets "
+        "are wrenches "
+        "of random commands by the plant. The oracle goes on from the network's answer by the "
+        "plant itself."
     ),
     quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
     full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},

@@ -1,6 +1,7 @@
 """Time of one call: near and far from the limits of robots, out of reach and from tick to tick.
 
-Methods answer the same targets in one run, the default one beside IPOPT. All times are the processor's.
+Methods answer the same targets in one run, the default one beside IPOPT. All times are the
+processor's.
 """
 
 import math
@@ -18,7 +19,12 @@ from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, paper_figures, progress
-from finlab.research.evaluation.method_specs import MethodSpec, can_run, load_method_spec, load_method_specs
+from finlab.research.evaluation.method_specs import (
+    MethodSpec,
+    can_run,
+    load_method_spec,
+    load_method_specs,
+)
 from finlab.research.random_layouts import random_layout, random_robot, random_thruster
 
 DOMAIN = 0xF1257  # leads the seed of every robot
@@ -28,7 +34,8 @@ TARGETS = 40  # directions of wrenches on each of them
 WARM_UP = 2  # first calls on each robot that are not counted; a robot keeps its layout for long
 FAR = 1e3  # how many times a wrench lies beyond its robot's reach for certain
 TICK, AT = 0.05, 0.6
-"""From tick to tick a target goes by this share of the way to the next direction, at this share of reach."""
+"""From tick to tick a target goes by this share of the way to the next direction, at this share of
+reach."""
 _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
 
 
@@ -48,8 +55,8 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each robot, call and method that takes such a robot. Raises DataError: a robot or a reach
-    that is none.
+    """One row for each robot, call and method that takes such a robot. Raises DataError: a robot or
+    a reach that is none.
 
     Args:
         robots: fins-N or thrusters-N, random ones of so many.
@@ -61,17 +68,25 @@ def run(
         seed: of robots and targets.
     """
     kinds = {name: _ROBOT.fullmatch(name) for name in robots}
-    if wrong := [name for name, kind in kinds.items() if kind is None or not 2 <= int(kind[2]) <= 64]:
-        raise DataError(f"robots: expected fins-N or thrusters-N, N from 2 to 64, got {wrong[0]!r:.60}")
+    if wrong := [
+        name for name, kind in kinds.items() if kind is None or not 2 <= int(kind[2]) <= 64
+    ]:
+        raise DataError(
+            f"robots: expected fins-N or thrusters-N, N from 2 to 64, got {wrong[0]!r:.60}"
+        )
     if min(reach) <= 0.0:
         raise DataError(f"reach: expected numbers above 0, got {min(reach):g}")
-    specs = load_method_specs([name for name in methods if can_run(name)] or [REFERENCE], checkpoint)
+    specs = load_method_specs(
+        [name for name in methods if can_run(name)] or [REFERENCE], checkpoint
+    )
     ours = load_method_spec(REFERENCE, checkpoint)
     rows = list[Row]()
     for name, kind in kinds.items():
         assert kind is not None
         timed = [_robot(ours, kind[1], int(kind[2]), seed, k) for k in range(LAYOUTS)]
-        able = {each: spec for each, spec in specs.items() if spec.choice.kind.fits(timed[0].layout)}
+        able = {
+            each: spec for each, spec in specs.items() if spec.choice.kind.fits(timed[0].layout)
+        }
         for share in (*reach, None):
             rows += _rows(name, timed, able, share, calls, budget)
     return rows
@@ -83,7 +98,11 @@ def _robot(method: MethodSpec, kind: str, count: int, seed: int, k: int) -> Time
     name = f"{kind}-{count}"
     ends = (count, count)
     fins = kind == "fins"
-    layout = random_layout(rng, name, ends) if fins else random_robot(rng, name, ends, (random_thruster,))
+    layout = (
+        random_layout(rng, name, ends)
+        if fins
+        else random_robot(rng, name, ends, (random_thruster,))
+    )
     plant = plant_of(layout)
     allocator = method.on(layout)
     wrenches = plant.wrench(plant.sample(rng, (TARGETS,)))
@@ -98,7 +117,8 @@ def _rows(
     calls: int,
     budget: float,
 ) -> list[Row]:
-    """A row for each method; without a share of reach, targets wander and the command before is known."""
+    """A row for each method; without a share of reach, targets wander and the command before is
+    known."""
     what = f"{share:g} of reach" if share is not None else "next tick"
     rows = list[Row]()
     answers = dict[str, list[Allocation]]()
@@ -122,9 +142,9 @@ def _rows(
 def call_times(
     method: MethodSpec, timed: Sequence[Timed], share: float | None, calls: int, budget: float
 ) -> tuple[list[float], list[Allocation]]:
-    """The processor's time of each counted call [ms], at most so many, of robots visited in turn, and its
-    answer. Without a share of reach targets wander, with the command of the tick before. After its part of
-    the budget [s] a robot gets no further call."""
+    """The processor's time of each counted call [ms], at most so many, of robots visited in turn,
+    and its answer. Without a share of reach targets wander, with the command of the tick before.
+    After its part of the budget [s] a robot gets no further call."""
     times = list[float]()
     answers = list[Allocation]()
     ahead = -(-calls // len(timed))
@@ -157,7 +177,11 @@ def _wandering(rim: Array, tick: int) -> Array:
 def _printed(rows: Sequence[Row]) -> list[Row]:
     cycle_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     return [
-        {"method": "paper", "call": "cycle on a Jetson Orin Nano, printed in the paper", "p50_ms": cycle_ms}
+        {
+            "method": "paper",
+            "call": "cycle on a Jetson Orin Nano, printed in the paper",
+            "p50_ms": cycle_ms,
+        }
     ]
 
 
@@ -177,12 +201,18 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Whole calls of allocate, one target each, one after the other. Reach: the most that a robot gives "
-        "in the direction of the target; beyond it, methods answer with the nearest wrench. Next tick: "
-        f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` and `mdn` "
+        "Whole calls of allocate, one target each, one after the other. Reach: the most that a "
+        "robot gives "
+        "in the direction of the target; beyond it, methods answer with the nearest wrench. Next "
+        "tick: "
+        f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` "
+        "and `mdn` "
         "alone keep to. Power: where both deliver."
     ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
-    full={"methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"), "budget": 1.0},
+    full={
+        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"),
+        "budget": 1.0,
+    },
     printed=_printed,
 )

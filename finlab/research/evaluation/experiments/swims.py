@@ -20,14 +20,40 @@ from finlab.swim.simulation import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}
 REPORTED = (
-    *("nominal", "damping-double", "parameters-high", "current", "buoyant", "late", "station", "hexa"),
-    *("fins-mixed", "weak", "lost-one-unannounced", "lost-two", "restricted", "saturated", "offset"),
+    *(
+        "nominal",
+        "damping-double",
+        "parameters-high",
+        "current",
+        "buoyant",
+        "late",
+        "station",
+        "hexa",
+    ),
+    *(
+        "fins-mixed",
+        "weak",
+        "lost-one-unannounced",
+        "lost-two",
+        "restricted",
+        "saturated",
+        "offset",
+    ),
 )
 """Days of the whole report, which has a quarter of an hour."""
 GAP_N = 0.1
-"""A tick whose wrench misses what was asked by more than this, torques as forces at `LEVER_M`, counts as out
-of reach [N]."""
-FIGURES = ("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "cpu_s_per_min", "turn")
+"""A tick whose wrench misses what was asked by more than this, torques as forces at `LEVER_M`,
+counts as out of reach [N]."""
+FIGURES = (
+    "ate",
+    "rte",
+    "depth_rmse",
+    "driving_w",
+    "peak_w",
+    "out_of_reach",
+    "cpu_s_per_min",
+    "turn",
+)
 """All figures of a swim."""
 LARGEST = ("turn", "peak_w")  # those of which a row has the largest of its swims, not the mean
 
@@ -54,13 +80,15 @@ def run(
     specs = load_method_specs(methods, checkpoint)
     for day in map(DAYS.__getitem__, scenarios):
         robots = [load_layout(name) for name in day.layouts]
-        taken = {name: spec for name, spec in specs.items() if all(map(spec.choice.kind.fits, robots))}
+        taken = {
+            name: spec for name, spec in specs.items() if all(map(spec.choice.kind.fits, robots))
+        }
         yield from day_rows(day, taken, range(seed, seed + seeds))
 
 
 def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int]) -> list[Row]:
-    """One row per method: means over its swims, and the largest steps and peaks; hopeless cases are left
-    out."""
+    """One row per method: means over its swims, and the largest steps and peaks; hopeless cases are
+    left out."""
     cases = [case for case in day.cases() if not day.is_hopeless(case)]
     parts = list(product(methods, cases, seeds))
     done = map_parts(partial(_swim, day, methods), parts, day.name, "swim")
@@ -85,8 +113,9 @@ def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case
 
 
 def swim_figures(log: RunLog, cpu_s: float) -> Row:
-    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and cost of one
-    swim along a trajectory, which took `cpu_s` seconds of the processor, simulation included."""
+    """Errors [m], driving power with motor losses [W], steadiness per tick (radians and Hz), and
+    cost of one swim along a trajectory, which took `cpu_s` seconds of the processor, simulation
+    included."""
     minutes = log.n_ticks * float(log.time[1] - log.time[0]) / 60.0
     gap = np.linalg.norm((log.asked - log.allocated) / [1, 1, 1, LEVER_M, LEVER_M, LEVER_M], axis=1)
     turn = command_change(log.command)[..., 2]
@@ -102,7 +131,8 @@ def swim_figures(log: RunLog, cpu_s: float) -> Row:
 
 experiment = Experiment(
     name="swims",
-    question="How do methods swim on days on which body, water, sensors or fins are not as believed?",
+    question="How do methods swim on days on which body, water, sensors or fins are not as "
+    "believed?",
     columns=(
         Column("scenario", "scenario", "code"),
         Column("method", "method", "code"),
@@ -116,11 +146,18 @@ experiment = Experiment(
         Column("cpu_s_per_min", "CPU per min", "three", unit="s"),
     ),
     run=run,
-    note=f"{ABOUT_ERRORS} Means over swims; peaks and turns (of a zero direction from tick to tick) are the "
+    note=f"{ABOUT_ERRORS} Means over swims; peaks and turns (of a zero direction from tick to "
+    "tick) are the "
     "largest. Power with the motors' losses. "
     f"Lost: swims that were ever farther than {LOST_M:g} m away. Out of reach: ticks at "
-    f"which commands miss more than {GAP_N:g} N of what is asked, torques at {LEVER_M:g} m. Processor's time "
-    "with the simulation's. What the days are: `finlab/research/evaluation/experiments/hard_days.py`.",
-    quick={"scenarios": ("nominal", "current", "lost-one"), "methods": ("dual", "analytic"), "seeds": 1},
+    f"which commands miss more than {GAP_N:g} N of what is asked, torques at {LEVER_M:g} m. "
+    "Processor's time "
+    "with the simulation's. What the days are: "
+    "`finlab/research/evaluation/experiments/hard_days.py`.",
+    quick={
+        "scenarios": ("nominal", "current", "lost-one"),
+        "methods": ("dual", "analytic"),
+        "seeds": 1,
+    },
     full={"scenarios": REPORTED, "seeds": 1, "methods": ("dual", "analytic")},
 )

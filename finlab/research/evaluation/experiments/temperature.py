@@ -28,7 +28,8 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each temperature, before any refinement. Raises DataError: a temperature of 0 or less.
+    """One row for each temperature, before any refinement. Raises DataError: a temperature of 0 or
+    less.
 
     Args:
         temperatures: of the draw, above 0.
@@ -71,8 +72,9 @@ def run(
 
 
 def diversity(command: Array, layout: Layout) -> float:
-    """Mean distance between two of the commands (K, n, 3): root mean square over all their entries, each in
-    units of its range; zero directions of a full circle are compared the short way round."""
+    """Mean distance between two of the commands (K, n, 3): root mean square over all their entries,
+    each in units of its range; zero directions of a full circle are compared the short way
+    round."""
     width = np.maximum(layout.upper - layout.lower, 1e-9)
     first, second = np.triu_indices(len(command), k=1)
     if len(first) == 0:
@@ -85,7 +87,8 @@ def diversity(command: Array, layout: Layout) -> float:
 
 experiment = Experiment(
     name="temperature",
-    question="What does the temperature of the draw do to the candidates of the paper's network (figure A)?",
+    question="What does the temperature of the draw do to the candidates of the paper's network "
+    "(figure A)?",
     columns=(
         Column("temperature", "T", "three"),
         Column("n", "targets", "count"),
@@ -95,8 +98,10 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Diversity, which the paper does not define: the mean distance between two candidates in units of "
-        "the command ranges. J: squared error plus weighted effort, by the surrogate, before refinement."
+        "Diversity, which the paper does not define: the mean distance between two candidates in "
+        "units of "
+        "the command ranges. J: squared error plus weighted effort, by the surrogate, before "
+        "refinement."
     ),
     quick={"layouts": 10, "targets": 1},
     full={"layouts": 60},

@@ -1,4 +1,5 @@
-"""Errors and power of two autopilots' allocation, within reach and beyond, on robots of thrusters."""
+"""Errors and power of two autopilots' allocation, within reach and beyond, on robots of
+thrusters."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -30,8 +31,9 @@ METHODS: dict[str, tuple[MethodName, dict[str, Any], Order | None]] = {
 }
 """Name -> method, its settings, and the order in which it means to keep axes."""
 ROBOTS = ("bluerov2_heavy", "even", "surveyed", "random")
-"""BlueROV2 Heavy, whose rear thrusters sit 1 cm further out than those in front; the same without; BlueROV2
-with thrusters a little out of place, so that the axis that nothing drives is driven badly; random ones."""
+"""BlueROV2 Heavy, whose rear thrusters sit 1 cm further out than those in front; the same without;
+BlueROV2 with thrusters a little out of place, so that the axis that nothing drives is driven badly;
+random ones."""
 FRONT = 0.14  # how far the front thrusters are ahead [m]
 SURVEYED = 0.005  # by how much places differ from the drawing [m]
 FAR = 1e3  # times a target, surely out of reach
@@ -74,8 +76,11 @@ def run(
     return rows
 
 
-def _draws(robot: str, lost: int, layouts: int, targets: int, seed: int) -> Iterator[tuple[Layout, Array]]:
-    """What is left of robots, and wrenches (N, 6) at the edge of reach, along those of uniform commands."""
+def _draws(
+    robot: str, lost: int, layouts: int, targets: int, seed: int
+) -> Iterator[tuple[Layout, Array]]:
+    """What is left of robots, and wrenches (N, 6) at the edge of reach, along those of uniform
+    commands."""
     for k in range(layouts):
         rng = np.random.default_rng([DOMAIN, seed, ROBOTS.index(robot), lost, k])
         layout = _robot(robot, rng, seed, k)
@@ -95,25 +100,34 @@ def _robot(robot: str, rng: np.random.Generator, seed: int, k: int) -> Layout:
     elif robot == "even":
         places[2:4, 0] = -FRONT
     moved = zip(layout.actuators, places.tolist(), strict=True)
-    return replace(layout, actuators=tuple(replace(part, position=tuple(place)) for part, place in moved))
+    return replace(
+        layout, actuators=tuple(replace(part, position=tuple(place)) for part, place in moved)
+    )
 
 
 def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
-    """By method arrays (N,): what it misses and takes of targets (N, 6) on a robot, and what `dual` misses in
-    its order."""
+    """By method arrays (N,): what it misses and takes of targets (N, 6) on a robot, and what `dual`
+    misses in its order."""
     layout, targets = part
     dual = Allocator(layout)
     scored = dict[str, dict[str, Array]]()
     bound = dual.allocate_batch(targets).bound
     ranked: dict[Order, Array] = {
-        order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated / dual.scale
+        order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated
+        / dual.scale
         for order in (PX4_ORDER, ARDUSUB_ORDER)
     }
     for method, (name, settings, order) in METHODS.items():
         answer = Allocator(layout, name, **settings).allocate_batch(targets)
-        scored[method] = {"missed": answer.err_norm, "power": answer.power, "bound": np.asarray(bound)}
+        scored[method] = {
+            "missed": answer.err_norm,
+            "power": answer.power,
+            "bound": np.asarray(bound),
+        }
         if order is not None:
-            own, ours = (missing_by_group(x, order) for x in (answer.unallocated / dual.scale, ranked[order]))
+            own, ours = (
+                missing_by_group(x, order) for x in (answer.unallocated / dual.scale, ranked[order])
+            )
             scored[method] |= {"first": own[:, 0], "dual_first": ours[:, 0]}
             scored[method]["dual_more"] = np.asarray(misses_more(ours, own), float)
     return scored
@@ -126,7 +140,8 @@ def missing_by_group(missing: Array, order: Order) -> Array:
 
 
 def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
-    """Whether (N,) the first misses (N, G) more than the other in the first group in which they differ."""
+    """Whether (N,) the first misses (N, G) more than the other in the first group in which they
+    differ."""
     differ = np.abs(one - other) > ALIKE
     first = differ.argmax(axis=1)[:, None]
     more: NDArray[np.bool_] = np.take_along_axis(one - other, first, axis=1)[:, 0] > ALIKE
@@ -134,20 +149,26 @@ def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
 
 
 def _figures(scored: Sequence[dict[str, Array]]) -> Row:
-    by = {key: np.concatenate([np.asarray(each[key], float) for each in scored]) for key in scored[0]}
+    by = {
+        key: np.concatenate([np.asarray(each[key], float) for each in scored]) for key in scored[0]
+    }
     fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
     row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}
     if fine.any():
         power = by["power"][fine]
         bound = by["bound"][fine]
-        row |= {"watts": float(power.sum() / bound.sum()), "watts_max": float((power / bound).max())}
+        row |= {
+            "watts": float(power.sum() / bound.sum()),
+            "watts_max": float((power / bound).max()),
+        }
     means = ("missed", "first", "dual_first", "dual_more")
     return row | {f"{key}_mean": float(by[key].mean()) for key in means if key in by}
 
 
 experiment = Experiment(
     name="thrusters",
-    question="What do the autopilots PX4 and ArduSub miss and take, within reach and beyond, beside `dual`?",
+    question="What do the autopilots PX4 and ArduSub miss and take, within reach and beyond, "
+    "beside `dual`?",
     columns=(
         Column("robot", "robot", "code"),
         Column("lost", "lost", "count"),
@@ -164,12 +185,18 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Targets lie along the wrenches of uniform commands. Not delivered: clipped, or coupled aside. "
-        "Missing: over the robot's yardstick. The first axes are those that the autopilot means to keep "
-        "(PX4: roll and pitch, then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, then the "
-        "others); `dual` gets the same order as a priority, and misses more where it does so in the first "
-        "group in which the two differ. Power over the least: over the watts that no answer can undercut, "
-        "where the target is delivered. Pseudo-inverse: PX4's without desaturation. `surveyed`: a BlueROV2 "
+        "Targets lie along the wrenches of uniform commands. Not delivered: clipped, or coupled "
+        "aside. "
+        "Missing: over the robot's yardstick. The first axes are those that the autopilot means "
+        "to keep "
+        "(PX4: roll and pitch, then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, "
+        "then the "
+        "others); `dual` gets the same order as a priority, and misses more where it does so in "
+        "the first "
+        "group in which the two differ. Power over the least: over the watts that no answer can "
+        "undercut, "
+        "where the target is delivered. Pseudo-inverse: PX4's without desaturation. `surveyed`: a "
+        "BlueROV2 "
         "with each thruster up to 5 mm out of place."
     ),
     quick={"robots": ("bluerov2_heavy",), "lost": (0, 1), "reach": (0.8, 2.0)},

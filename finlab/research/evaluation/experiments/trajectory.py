@@ -1,4 +1,5 @@
-"""Several layouts, whole and with fins lost, follow a trajectory by the paper's controller and by ours."""
+"""Several layouts, whole and with fins lost, follow a trajectory by the paper's controller and by
+ours."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -44,13 +45,16 @@ def run(
     paths: bool = False,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout, number of lost fins, controller and method, and one over all layouts.
+    """One row for each layout, number of lost fins, controller and method, and one over all
+    layouts.
 
     Args:
         layouts: names or files.
-        trajectory: circle, lissajous, square, dive, straight, station, or a CSV file with t, x, y, z.
+        trajectory: circle, lissajous, square, dive, straight, station, or a CSV file with t, x, y,
+        z.
         methods: names as in eval wrench.
-        controllers: tracking, waypoint (the paper's), velocity (the paper's, which keeps no course).
+        controllers: tracking, waypoint (the paper's), velocity (the paper's, which keeps no
+        course).
         lost: how many fins are lost, announced from the start; a robot that needs them is left out.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -73,7 +77,9 @@ def run(
     for row, (case, errors) in zip(rows, done, strict=True):
         row |= {"path": errors[0]["path"]} if paths else {}
         every.setdefault(("all", *case[1:]), []).extend(errors)
-    rows += [{"layout": robot.name, "lost": n, "method": "cannot be steered"} for robot, n in needed]
+    rows += [
+        {"layout": robot.name, "lost": n, "method": "cannot be steered"} for robot, n in needed
+    ]
     return rows + mean_rows(keys, sorted(every.items(), key=lambda each: each[0][1]))
 
 
@@ -88,7 +94,9 @@ def _picture(rows: Sequence[Row]) -> "Figure":
     """The paths of all rows that have one, a column for each layout."""
     swims: dict[str, tuple[Array, Array, dict[str, tuple[Array, Array]]]] = {}
     for row in [row for row in rows if "path" in row]:
-        time, position, reference = (np.array(row["path"][key]) for key in ("t", "position", "reference"))
+        time, position, reference = (
+            np.array(row["path"][key]) for key in ("t", "position", "reference")
+        )
         paths = swims.setdefault(row["layout"], (time, reference, {}))[2]
         paths[f"{row['controller']} by {row['method']}, {row['lost']} lost"] = time, position
     return paths_picture(swims)
@@ -98,7 +106,9 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
     figures = paper_figures()
     layouts = {row["layout"] for row in rows}
     about = {"controller": "waypoint", "method": "paper's method, printed"}
-    healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
+    healthy = [
+        {"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()
+    ]
     pool = [
         {"layout": "in the pool", "lost": count} | about | table["ours"]
         for count, table in enumerate(figures["fault_tolerance"].values())
@@ -108,7 +118,8 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
 
 experiment = Experiment(
     name="trajectory",
-    question="How closely do the paper's layouts follow a path, whole and with fins lost, by its waypoint "
+    question="How closely do the paper's layouts follow a path, whole and with fins lost, by its "
+    "waypoint "
     "controller and by ours?",
     columns=(
         Column("layout", "layout"),
@@ -120,8 +131,10 @@ experiment = Experiment(
         *POWER,
     ),
     run=run,
-    note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with lost fins "
-    "in a pool, on paths that it does not print. Lost are the first fins without which a robot can be "
+    note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with "
+    "lost fins "
+    "in a pool, on paths that it does not print. Lost are the first fins without which a robot "
+    "can be "
     "steered.",
     quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": (0, 1)},
     printed=_printed,

@@ -1,4 +1,5 @@
-"""Robots, whole and with fins lost, keep a speed and a depth by the paper's PID controller and by ours."""
+"""Robots, whole and with fins lost, keep a speed and a depth by the paper's PID controller and by
+ours."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -18,7 +19,8 @@ KEYS = ("layout", "lost", "speed", "controller", "method")
 SETTLED_S = 10.0
 """After this time the start from rest is over [s]."""
 BASELINE = "fixed_frequency"
-"""Method that stands for the paper's baseline, of which it does not say whether the frequency varies."""
+"""Method that stands for the paper's baseline, of which it does not say whether the frequency
+varies."""
 
 
 def run(
@@ -31,8 +33,8 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout, number of lost fins, speed, controller and method, and one over all speeds.
-    Raises DataError: a duration of no more than `SETTLED_S`, or over an hour.
+    """One row for each layout, number of lost fins, speed, controller and method, and one over all
+    speeds. Raises DataError: a duration of no more than `SETTLED_S`, or over an hour.
 
     Args:
         layouts: names or files.
@@ -45,22 +47,32 @@ def run(
         seed: of the first run's noise.
     """
     if not SETTLED_S < duration <= 3600.0:
-        raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
+        raise DataError(
+            f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}"
+        )
     check_names("controllers", controllers, CONTROLLERS)
     specs = load_method_specs(methods, checkpoint)
     paths = [(speed, straight(duration, speed)) for speed in SPEEDS]
     able, _ = closed_loop.with_losses(layouts, lost)
     cases = [
         ((robot.name, count, speed, law, name), closed_loop.Swim(robot, path, name, law, fins))
-        for (robot, count, fins), (speed, path), law, name in product(able, paths, controllers, specs)
+        for (robot, count, fins), (speed, path), law, name in product(
+            able, paths, controllers, specs
+        )
     ]
     done: dict[closed_loop.Case, list[Row]] = {}
-    for case, errors in closed_loop.repeated(specs, cases, range(seed, seed + runs), "velocity", _row):
+    for case, errors in closed_loop.repeated(
+        specs, cases, range(seed, seed + runs), "velocity", _row
+    ):
         for shown in (case, (*case[:2], None, *case[3:])):
             done.setdefault(shown, []).extend(errors)
     order = sorted(done, key=lambda case: (case[:2], case[2] is None))
     rows = closed_loop.mean_rows(KEYS, [(case, done[case]) for case in order])
-    base = {case[:4]: row["inertial_w"] for case, row in zip(order, rows, strict=True) if case[4] == BASELINE}
+    base = {
+        case[:4]: row["inertial_w"]
+        for case, row in zip(order, rows, strict=True)
+        if case[4] == BASELINE
+    }
     for case, row in zip(order, rows, strict=True) if base else ():
         row["over_baseline"] = row["inertial_w"] / base[case[:4]]
     return rows
@@ -106,7 +118,8 @@ experiment = Experiment(
         Column("over_baseline", "inertial power over fixed_frequency", "ratio"),
     ),
     run=run,
-    note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's sum of I "
+    note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's "
+    "sum of I "
     "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
     quick={"layouts": ("A",), "lost": (0,)},
     full={"layouts": ("A",), "lost": (0,), "runs": 5},

@@ -12,15 +12,40 @@ from finlab.layout.load import layout_and_lost
 from finlab.physics import plant_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, paper_figures
-from finlab.research.evaluation.method_specs import SLOW, MethodSpec, installed_methods, load_method_specs
+from finlab.research.evaluation.method_specs import (
+    SLOW,
+    MethodSpec,
+    installed_methods,
+    load_method_specs,
+)
 from finlab.research.evaluation.plots import fins_picture
-from finlab.research.evaluation.scoring import Columns, joined, mean_interval, run_method, share_interval
+from finlab.research.evaluation.scoring import (
+    Columns,
+    joined,
+    mean_interval,
+    run_method,
+    share_interval,
+)
 from finlab.research.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
 from finlab.research.executor import map_parts
 
-SUCCESS_LEVELS = (0.01, 0.5, 1.0)  # levels t of `success_t`, the share of targets with `err_norm <= t`
+SUCCESS_LEVELS = (
+    0.01,
+    0.5,
+    1.0,
+)  # levels t of `success_t`, the share of targets with `err_norm <= t`
 OWN_DOMAIN = 0x0711  # leads the seed of the draws on a user's own layout
-HARD = ("id", "ood", "ood-fins", "limits", "failure", "near-singular", "fins-mixed", "tables", "many-fins")
+HARD = (
+    "id",
+    "ood",
+    "ood-fins",
+    "limits",
+    "failure",
+    "near-singular",
+    "fins-mixed",
+    "tables",
+    "many-fins",
+)
 """Splits of the report."""
 
 
@@ -38,12 +63,12 @@ def run(
     """One row for each split and method.
 
     Args:
-        layout: a layout file, bundle or shipped name in place of a split: one case, of that many targets,
-            with errors over the robot's own wrenches.
-        split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
-            many-fins, thrusters, azimuths, mixed-actuators, any-shaft.
-        methods: names; by default dual and paper, on LAYOUT all that are installed. Of several splits each
-            method answers those whose robots it takes.
+        layout: a layout file, bundle or shipped name in place of a split: one case, of that many
+            targets, with errors over the robot's own wrenches.
+        split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed,
+            tables, many-fins, thrusters, azimuths, mixed-actuators, any-shaft.
+        methods: names; by default dual and paper, on LAYOUT all that are installed. Of several
+            splits each method answers those whose robots it takes.
         layouts: of each split.
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
@@ -52,13 +77,21 @@ def run(
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
-    usual = ("dual", "paper") if layout is None else installed_methods(in_worker(load_layout, layout))
+    usual = (
+        ("dual", "paper") if layout is None else installed_methods(in_worker(load_layout, layout))
+    )
     specs = load_method_specs(methods or usual, checkpoint, patient=True)
     rows: list[Row] = []
     for name, cases in sets.items():
         robot = cases[0]().layout
-        able = {each: spec for each, spec in specs.items() if len(sets) == 1 or spec.choice.kind.fits(robot)}
-        answered = list(map_parts(partial(_scores, able, subsample), list(enumerate(cases)), name, "layout"))
+        able = {
+            each: spec
+            for each, spec in specs.items()
+            if len(sets) == 1 or spec.choice.kind.fits(robot)
+        }
+        answered = list(
+            map_parts(partial(_scores, able, subsample), list(enumerate(cases)), name, "layout")
+        )
         for method in able:
             scores = joined([each[method] for each in answered])
             rows.append(_row(name, method, None, scores))
@@ -75,11 +108,14 @@ def _scores(
     number = numbered[0]
     made = numbered[1]()
     firsts = {method: subsample if method in SLOW else None for method in methods}
-    return {each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods}
+    return {
+        each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods
+    }
 
 
 def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
-    """Means, quantiles and shares of a split, or of its robots of so many fins, with their intervals."""
+    """Means, quantiles and shares of a split, or of its robots of so many fins, with their
+    intervals."""
     error = scores["err_norm"]
     group = scores["layout"]
     about = {"split": split, "method": method, "fins": fins, "n": len(group), "scored_by": "plant"}
@@ -112,18 +148,23 @@ def _cases(
         names = list(SPLITS) if split == ("all",) else split
         for name in names:
             make_split(name, 1, 1, seed)  # refuses what there is not
-        return {name: [partial(make_case, name, targets, seed, k) for k in range(layouts)] for name in names}
+        return {
+            name: [partial(make_case, name, targets, seed, k) for k in range(layouts)]
+            for name in names
+        }
     if split != ("id",):
         raise DataError(
-            f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
+            f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one "
+            "of them out"
         )
     robot, lost = in_worker(layout_and_lost, layout)
     return {f"layout {robot.name}": [partial(own_case, robot, lost, targets, seed)]}
 
 
 def own_case(layout: Layout, lost: tuple[str, ...], n_targets: int, seed: int) -> Case:
-    """A user's own layout as a case: wrenches of uniform commands of the actuators that work, and errors over
-    the robot's own wrenches. A smaller number of targets gives the first of a larger one."""
+    """A user's own layout as a case: wrenches of uniform commands of the actuators that work, and
+    errors over the robot's own wrenches. A smaller number of targets gives the first of a larger
+    one."""
     plant = plant_of(layout.without(lost))
     target_seed, sigma_seed = np.random.SeedSequence((OWN_DOMAIN, seed)).spawn(2)
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
@@ -161,10 +202,13 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Scored by the plant, the actuators' own laws or tables. Errors in standard deviations of the "
+        "Scored by the plant, the actuators' own laws or tables. Errors in standard deviations of "
+        "the "
         "wrenches of random layouts; on fins, fins-mixed and tables, on robots of other actuators "
-        "and on a layout of your own, of the robot's wrenches. Intervals: where another seed lands, 95 times "
-        "of 100. Time: that of all targets of a layout over their number. Printed: the paper's figures, on "
+        "and on a layout of your own, of the robot's wrenches. Intervals: where another seed "
+        "lands, 95 times "
+        "of 100. Time: that of all targets of a layout over their number. Printed: the paper's "
+        "figures, on "
         "its own layouts and targets."
     ),
     quick={"split": HARD[:4], "methods": ("dual", "paper", "sqp"), "layouts": 10, "targets": 5},

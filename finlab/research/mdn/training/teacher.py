@@ -1,4 +1,5 @@
-"""The teacher: descents from many random forces, the ways they find to deliver a target, and their files."""
+"""The teacher: descents from many random forces, the ways they find to deliver a target, and their
+files."""
 
 import io
 from dataclasses import dataclass
@@ -46,7 +47,8 @@ class AnswerSettings:
     targets: int = 48
     """Targets for each robot."""
     sharpness: float = 0.03
-    """By how much dearer a way may be, as a share of the cost, for its weight to fall to a third."""
+    """By how much dearer a way may be, as a share of the cost, for its weight to fall to a
+    third."""
 
 
 class Ways(NamedTuple):
@@ -59,8 +61,8 @@ class Ways(NamedTuple):
 
 
 def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
-    """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES` ways
-    each."""
+    """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES`
+    ways each."""
     rows = len(target)
     maximum = problem.fins.maximum
     n = len(maximum)
@@ -81,13 +83,15 @@ def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Ar
 
 
 def root_share(force: AnyArray, largest: Array) -> AnyArray:
-    """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count, too."""
+    """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count,
+    too."""
     share = force / largest
     return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
 
 
 def shares_of_ways(ways: Ways, sharpness: float) -> Array:
-    """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness best))."""
+    """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness
+    best))."""
     best = ways.cost[:, :1]
     with np.errstate(invalid="ignore"):
         weight = np.exp(-(ways.cost / np.maximum(best, 1e-12) - 1.0) / sharpness)
@@ -131,7 +135,9 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     return path
 
 
-def _answers(rng: np.random.Generator, robot: EffortRobot, settings: AnswerSettings) -> dict[str, Array]:
+def _answers(
+    rng: np.random.Generator, robot: EffortRobot, settings: AnswerSettings
+) -> dict[str, Array]:
     """One robot, its targets and the ways to deliver them, as the network sees them."""
     target = random_targets(rng, robot, settings.targets)
     view = robot.view
@@ -146,7 +152,8 @@ def _answers(rng: np.random.Generator, robot: EffortRobot, settings: AnswerSetti
 
 
 def read_answers(path: Path) -> dict[int, dict[str, Array]]:
-    """The arrays of a file by number of fins; robots (R, ...), targets (R, T, ...), ways (R, T, L, n)."""
+    """The arrays of a file by number of fins; robots (R, ...), targets (R, T, ...), ways (R, T, L,
+    n)."""
     groups: dict[int, dict[str, Array]] = {}
     with np.load(path, allow_pickle=False) as file:
         for key in file.files:
@@ -188,7 +195,8 @@ class Answers:
         return sum(len(group["asked"]) for group in self._groups.values())
 
     def draw(self, rng: np.random.Generator, size: int) -> Batch:
-        """A random batch; robots are seen as they are or as their mirror image, with fins in any order."""
+        """A random batch; robots are seen as they are or as their mirror image, with fins in any
+        order."""
         counts = np.array([len(group["asked"]) for group in self._groups.values()])
         n = list(self._groups)[int(rng.choice(len(counts), p=counts / counts.sum()))]
         group = self._groups[n]
@@ -216,13 +224,16 @@ def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:
 
 
 def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> Array:
-    """Normalized targets (count, 6): half are wrenches of uniform commands, a quarter of commands where some
-    fins rest, a quarter one to three axes together, as far as no fin gives more than its largest force."""
+    """Normalized targets (count, 6): half are wrenches of uniform commands, a quarter of commands
+    where some fins rest, a quarter one to three axes together, as far as no fin gives more than its
+    largest force."""
     plant = robot.plant
     quarter = count // 4
     command = plant.sample(rng, (count - quarter,))
     rests = rng.random((quarter, plant.n_fins)) > rng.uniform(0.3, 1.0, (quarter, 1))
-    command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])
+    command[:quarter, :, :2] = np.where(
+        rests[..., None], plant.lower[:, :2], command[:quarter, :, :2]
+    )
     full = robot.forces.effectiveness * np.repeat(robot.view.largest, 2)[:, None]
     axes = rng.random((quarter, 6)).argsort(axis=1) < rng.integers(1, 4, (quarter, 1))
     wanted = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))

@@ -1,8 +1,9 @@
 """`finlab train mdn`: a joint mixture over all fins' forces, taught by descents from many starts.
 
-Processes answer random targets on random robots and write files; then the network learns from them by Adam.
-The loss is the mixture's negative log-likelihood of the different ways to deliver a target, weighted by their
-costs: so components come to stand for ways, and the cheapest way's gets the largest weight.
+Processes answer random targets on random robots and write files; then the network learns from them
+by Adam. The loss is the mixture's negative log-likelihood of the different ways to deliver a
+target, weighted by their costs: so components come to stand for ways, and the cheapest way's gets
+the largest weight.
 """
 
 import math
@@ -35,12 +36,15 @@ from finlab.whole_file import make_folder, sweep_parts
 
 @dataclass(frozen=True)
 class MdnTraining(LoopSettings):
-    """How the network of method `mdn` is trained: the likelihood of the ways that the teacher has found."""
+    """How the network of method `mdn` is trained: the likelihood of the ways that the teacher has
+    found."""
 
     anneal: int = 2500
-    """Steps over which components stop sharing what they stand for; at first all of them learn from all."""
+    """Steps over which components stop sharing what they stand for; at first all of them learn from
+    all."""
     spread: float = 0.02
-    """Weight of the entropy of the components' mean weights over a batch, so that none is left unused."""
+    """Weight of the entropy of the components' mean weights over a batch, so that none is left
+    unused."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +80,10 @@ ANSWERS_SHARE = 0.5
 def train_mdn(
     preset: str, out: Path, *, seed: int = 0, resume: bool = False, **training: Any
 ) -> TrainedWeights:
-    """Write the answers that are missing in `out/answers`, train a preset's network on them, and write a
-    checkpoint, once a minute and at the end; `seed` is that of answers and first weights, `resume` goes on
-    from the state in `out`, and fields of `MdnTraining` replace the recipe's where they are not None. Raises
-    DataError: an unknown preset, or a file that cannot be written."""
+    """Write the answers that are missing in `out/answers`, train a preset's network on them, and
+    write a checkpoint, once a minute and at the end; `seed` is that of answers and first weights,
+    `resume` goes on from the state in `out`, and fields of `MdnTraining` replace the recipe's where
+    they are not None. Raises DataError: an unknown preset, or a file that cannot be written."""
     started = time.monotonic()
     if preset not in RECIPES:
         raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r}")
@@ -87,12 +91,22 @@ def train_mdn(
     settings = replace(recipe.training, **{k: v for k, v in training.items() if v is not None})
     # One yardstick of errors for all that is shipped; the network does not depend on it.
     normalization = read_normalization(resolve_checkpoint("paper"))
-    parts: dict[str, Any] = {"training": settings, "answers": recipe.answers, "network": recipe.network}
-    identity = {"preset": preset, "seed": seed, **{name: asdict(part) for name, part in parts.items()}}
+    parts: dict[str, Any] = {
+        "training": settings,
+        "answers": recipe.answers,
+        "network": recipe.network,
+    }
+    identity = {
+        "preset": preset,
+        "seed": seed,
+        **{name: asdict(part) for name, part in parts.items()},
+    }
 
     def save(network: State, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
-        write_checkpoint(out, replace(trained, preset=preset, training={"mdn": identity | progress}))
+        write_checkpoint(
+            out, replace(trained, preset=preset, training={"mdn": identity | progress})
+        )
 
     folder = make_folder(out / "answers")
     if resume and (out / STATE_FILE).exists():  # the answers of the run that goes on
@@ -109,9 +123,11 @@ def train_mdn(
     return read_checkpoint(out)
 
 
-def answers_in(folder: Path, settings: AnswerSettings, seed: int, until: float = math.inf) -> list[Path]:
-    """The files of answers, in order; those that are missing are written first, on all cores, as many as are
-    done at the time `until` of `time.monotonic`, but two at least."""
+def answers_in(
+    folder: Path, settings: AnswerSettings, seed: int, until: float = math.inf
+) -> list[Path]:
+    """The files of answers, in order; those that are missing are written first, on all cores, as
+    many as are done at the time `until` of `time.monotonic`, but two at least."""
     sweep_parts(folder)
     write = partial(write_answers, folder, settings, seed)
     made = list[Path]()
@@ -131,7 +147,8 @@ def make_terms(
     held_out = Answers(files[:1])
     learned = Answers(files[1:])
     rows = [
-        held_out.draw(np.random.default_rng([TRAIN_SEED, k]), training.batch_size) for k in range(HELD_OUT)
+        held_out.draw(np.random.default_rng([TRAIN_SEED, k]), training.batch_size)
+        for k in range(HELD_OUT)
     ]
     judged: Tensor | None = None
 
@@ -139,7 +156,9 @@ def make_terms(
         nonlocal judged
         if judged is None or step % JUDGE_EVERY == 0:
             with torch.no_grad():
-                judged = torch.stack([losses(net, batch, 1.0, 0.0)["loss"] for batch in rows]).mean()
+                judged = torch.stack(
+                    [losses(net, batch, 1.0, 0.0)["loss"] for batch in rows]
+                ).mean()
         batch = learned.draw(np.random.default_rng([TRAIN_SEED + seed, step]), training.batch_size)
         cold = min(1.0, step / max(training.anneal, 1))
         temper = float(batch.nodes.shape[1]) ** (1.0 - cold)
@@ -148,13 +167,19 @@ def make_terms(
     return terms
 
 
-def losses(net: Callable[..., ForceMixture], batch: Batch, temper: float, spread: float) -> dict[str, Tensor]:
-    """The loss and its parts, means over a batch; per fin, so that robots of many fins count no more.
+def losses(
+    net: Callable[..., ForceMixture], batch: Batch, temper: float, spread: float
+) -> dict[str, Tensor]:
+    """The loss and its parts, means over a batch; per fin, so that robots of many fins count no
+    more.
 
-    For `temper` see `ForceMixture.log_prob`; `spread` weighs the entropy of the components' mean weights.
+    For `temper` see `ForceMixture.log_prob`; `spread` weighs the entropy of the components' mean
+    weights.
     """
     mixture = net(batch.nodes, batch.pairs)
-    likelihood = (mixture.log_prob(batch.way, temper) * batch.weight).sum(-1).mean() / batch.nodes.shape[1]
+    likelihood = (mixture.log_prob(batch.way, temper) * batch.weight).sum(
+        -1
+    ).mean() / batch.nodes.shape[1]
     share = mixture.logits.softmax(-1).mean(0)
     entropy = -(share * torch.log(share + 1e-9)).sum()
     # As many components as would have this entropy if all of them were used alike.

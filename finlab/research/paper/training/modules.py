@@ -1,7 +1,8 @@
-"""The paper's surrogate in torch, and the terms of both losses, for robots of mixed numbers of fins.
+"""The paper's surrogate in torch, and the terms of both losses, for robots of mixed numbers of
+fins.
 
-Robots are padded to n fins; the padding mask (B, n) is True where there is one. The network itself is
-`NetworkConfig`.
+Robots are padded to n fins; the padding mask (B, n) is True where there is one. The network itself
+is `NetworkConfig`.
 """
 
 from collections.abc import Callable
@@ -18,8 +19,8 @@ from finlab.research.paper.training.samples import Batch
 from finlab.research.training.loop import Weights, first_weights
 
 FIRST_WEIGHT = 2.0
-"""Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines must be
-learned, and wide first weights start nearer to that."""
+"""Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines
+must be learned, and wide first weights start nearer to that."""
 
 
 def features(batch: Batch) -> Tensor:
@@ -40,9 +41,9 @@ def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) 
 
 
 def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch: Batch) -> Tensor:
-    """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate (Eq. 4):
-    F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine correction from the pooled
-    descriptor of the layout."""
+    """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate
+    (Eq. 4): F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine
+    correction from the pooled descriptor of the layout."""
     x = features(batch)
     mask = batch.mask
     inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
@@ -91,7 +92,8 @@ def guidance(
 
 
 def negative_entropy(mixture: Mixture, mask: Tensor) -> Tensor:
-    """L_ent = sum_k pi_k log pi_k (B,) (Eq. 7), the mean over the fins where `mask` (B, n) is True."""
+    """L_ent = sum_k pi_k log pi_k (B,) (Eq. 7), the mean over the fins where `mask` (B, n) is
+    True."""
     log_weight = mixture.logits.log_softmax(-1)
     value = (log_weight.exp() * log_weight).sum(-1)
     mean: Tensor = (value * mask).sum(1) / mask.sum(1)

@@ -1,5 +1,5 @@
-"""Named recipes: `paper` (the printed numbers, our choices elsewhere), `short` (20 minutes on two cores) and
-`smoke` (seconds); and the model card of what they make."""
+"""Named recipes: `paper` (the printed numbers, our choices elsewhere), `short` (20 minutes on two
+cores) and `smoke` (seconds); and the model card of what they make."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,7 +20,8 @@ class PaperLoop(LoopSettings):
     """How one of the two networks is trained."""
 
     one_layout: bool = False
-    """Whether a step sees commands of one random layout, as printed of the surrogate, or of many."""
+    """Whether a step sees commands of one random layout, as printed of the surrogate, or of
+    many."""
 
 
 @dataclass(frozen=True)
@@ -107,19 +108,21 @@ PRINTED = {
 }
 """What the paper prints of the numbers below; of the others nothing."""
 CHOICES = """
-Choices that the paper leaves open, in the surrogate: further hidden layers, SiLU between layers, outputs in
-units of 4 N, wide first weights, tanh in the pooled descriptor. In the network: residual connections around
-GATv2, a linear layer from node and wrench to the Transformer's width, normalization before each block, log
-sigma through a tanh. In training: one sample per target in the guidance, whose gradient passes the clamp and
-does not reach the mixture's weights; entropy as the mean over fins; gradients clipped at norm 1; matrix
-products in bfloat16 where the device is faster with it. Of inference: see `PaperSettings`.
+Choices that the paper leaves open, in the surrogate: further hidden layers, SiLU between layers,
+outputs in units of 4 N, wide first weights, tanh in the pooled descriptor. In the network:
+residual connections around GATv2, a linear layer from node and wrench to the Transformer's width,
+normalization before each block, log sigma through a tanh. In training: one sample per target in
+the guidance, whose gradient passes the clamp and does not reach the mixture's weights; entropy as
+the mean over fins; gradients clipped at norm 1; matrix products in bfloat16 where the device is
+faster with it. Of inference: see `PaperSettings`.
 
 `log.csv` and `curves.png` show the training; `config.json` holds the same numbers.
 """
 
 
 def write_card(folder: Path, weights: TrainedWeights) -> None:
-    """Write the model card of a checkpoint of the paper's kind. Raises DataError: it cannot be written."""
+    """Write the model card of a checkpoint of the paper's kind. Raises DataError: it cannot be
+    written."""
     parts = [*weights.training.items(), ("network", weights.network_sizes)]
     parts += [("surrogate sizes", weights.surrogate_sizes), *weights.metrics.items()]
     rows = [row for name, part in parts for row in _rows(name, part)]
@@ -127,7 +130,8 @@ def write_card(folder: Path, weights: TrainedWeights) -> None:
     what = "Surrogate" if weights.network_sizes is None else "Network and surrogate"
     text = (
         f"# Model card: `{weights.name}`\n\n{what} of method `paper`, preset `{weights.preset}`.\n"
-        f"Weights: SHA-256 {weights.sha256}.\n\n| | printed | done |\n|---|---|---|\n{table}\n{CHOICES}"
+        f"Weights: SHA-256 {weights.sha256}.\n\n| | printed | done "
+        f"|\n|---|---|---|\n{table}\n{CHOICES}"
     )
     write_whole(folder / CARD_FILE, text, DataError)
 

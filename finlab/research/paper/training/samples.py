@@ -1,7 +1,9 @@
-"""The paper's data set (data generation): random layouts, uniform commands, and the wrenches they cause.
+"""The paper's data set (data generation): random layouts, uniform commands, and the wrenches they
+cause.
 
-This is all the knowledge of physics that training needs: no inverse is ever solved for. A set is a folder of
-parts and a `data.json` that says how it was drawn and holds the wrenches' mean and standard deviation.
+This is all the knowledge of physics that training needs: no inverse is ever solved for. A set is a
+folder of parts and a `data.json` that says how it was drawn and holds the wrenches' mean and
+standard deviation.
 """
 
 import io
@@ -70,19 +72,25 @@ class DataSettings:
 
 
 def generate(folder: Path, settings: DataSettings) -> None:
-    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay. Raises
-    DataError: the folder holds a set that was drawn otherwise, or a file cannot be written."""
+    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay.
+    Raises DataError: the folder holds a set that was drawn otherwise, or a file cannot be
+    written."""
     make_folder(folder)
     sweep_parts(folder)
     if (folder / DATA_FILE).exists() and about(folder)["settings"] != settings.as_values():
-        raise DataError(f"{folder}: holds a data set that was drawn otherwise; take an empty folder")
+        raise DataError(
+            f"{folder}: holds a data set that was drawn otherwise; take an empty folder"
+        )
     _write_about(folder, settings, None)
     count = -(-settings.layouts // settings.together)
     missing = [number for number in range(count) if not part_file(folder, number).exists()]
     drawn = map_parts(partial(drawn_part, settings), missing, "data", jobs=cores())
     for number, content in zip(missing, drawn, strict=True):
         write_whole(part_file(folder, number), content, DataError)
-    rows = (read_part(part_file(folder, k))["wrench"].reshape(-1, 6).astype(np.float64) for k in range(count))
+    rows = (
+        read_part(part_file(folder, k))["wrench"].reshape(-1, 6).astype(np.float64)
+        for k in range(count)
+    )
     sums = [(wrench.sum(0), (wrench**2).sum(0)) for wrench in rows]
     total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
     deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
@@ -101,17 +109,22 @@ def drawn_part(settings: DataSettings, number: int) -> bytes:
 
 
 def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
-    """One layout padded with zeros, and its commands; they depend on the seed and the number alone."""
+    """One layout padded with zeros, and its commands; they depend on the seed and the number
+    alone."""
     rng = np.random.default_rng([DATA_SEED, settings.seed, number])
     varied = rng.random() < settings.varied_limits
     layout = random_layout(rng, limits="varied" if varied else "nominal")
-    layout = Layout(layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins))
+    layout = Layout(
+        layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins)
+    )
     plant = Plant(layout)
     command = plant.sample(rng, (settings.commands,))
     more = N_FINS - layout.n
 
     def padded(values: AnyArray, axis: int = 0) -> AnyArray:
-        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(np.float32)
+        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(
+            np.float32
+        )
 
     return {
         **{name: padded(getattr(layout, name)) for name in ROBOT[:-1]},
@@ -127,34 +140,52 @@ def part_file(folder: Path, number: int) -> Path:
 
 
 def read_part(path: Path) -> dict[str, AnyArray]:
-    """The arrays of a part by name, R layouts, then commands (R, C, n, 3) and wrenches (R, C, 6) [N, N m].
+    """The arrays of a part by name, R layouts, then commands (R, C, n, 3) and wrenches (R, C, 6)
+    [N, N m].
 
     Raises DataError: it is missing or damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in FIELDS}
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise DataError(f"{path}: no part of a data set ({error}); remove it and generate again") from error
+        raise DataError(
+            f"{path}: no part of a data set ({error}); remove it and generate again"
+        ) from error
 
 
 def about(folder: Path) -> dict[str, Any]:
     """What `data.json` says: settings and normalization. Raises DataError: there is none."""
     path = folder / DATA_FILE
-    text = decoded(read_file(path, 1_000_000, "a data set's file", DataError), str(path), "JSON", DataError)
+    text = decoded(
+        read_file(path, 1_000_000, "a data set's file", DataError), str(path), "JSON", DataError
+    )
     about = parse_json(text, str(path), DataError)
-    if not isinstance(about, dict) or (about.get("format"), about.get("version")) != (FORMAT, VERSION):
-        raise DataError(f"{path}: not a finlab data set (expected format {FORMAT!r}, version {VERSION})")
+    if not isinstance(about, dict) or (about.get("format"), about.get("version")) != (
+        FORMAT,
+        VERSION,
+    ):
+        raise DataError(
+            f"{path}: not a finlab data set (expected format {FORMAT!r}, version {VERSION})"
+        )
     return about
 
 
 def _write_about(folder: Path, settings: DataSettings, normalization: Normalization | None) -> None:
-    values = normalization and {name: part.tolist() for name, part in normalization._asdict().items()}
-    about = {"format": FORMAT, "version": VERSION, "settings": settings.as_values(), "normalization": values}
+    values = normalization and {
+        name: part.tolist() for name, part in normalization._asdict().items()
+    }
+    about = {
+        "format": FORMAT,
+        "version": VERSION,
+        "settings": settings.as_values(),
+        "normalization": values,
+    }
     write_whole(folder / DATA_FILE, json.dumps(about, indent=2) + "\n", DataError)
 
 
 class Batch(NamedTuple):
-    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all zeros."""
+    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all
+    zeros."""
 
     position: Tensor
     """(B, n, 3), body frame [m]."""
@@ -181,10 +212,14 @@ class DataSet:
         try:
             self.settings: dict[str, Any] = said["settings"]
             """As in `data.json`."""
-            self.layouts, self.commands = (int(self.settings[name]) for name in ("layouts", "commands"))
+            self.layouts, self.commands = (
+                int(self.settings[name]) for name in ("layouts", "commands")
+            )
             self.normalization = Normalization.parse(said["normalization"])
         except (KeyError, TypeError, ValueError) as error:
-            raise DataError(f"{folder}: an unfinished data set; run `finlab data generate` again") from error
+            raise DataError(
+                f"{folder}: an unfinished data set; run `finlab data generate` again"
+            ) from error
         count = -(-self.layouts // DataSettings(commands=self.commands).together)
         parts = [read_part(part_file(folder, k)) for k in range(count)]
         joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
@@ -196,19 +231,26 @@ class DataSet:
         self._order = torch.empty(0)
 
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
-        """Some rows of batch number `step` of `size` samples, a function of step and seed: random commands
-        of one layout (paper, surrogate pretraining), a new one in each step, or of all, reordered in each
-        epoch. Raises DataError: there are fewer samples than a batch has."""
+        """Some rows of batch number `step` of `size` samples, a function of step and seed: random
+        commands of one layout (paper, surrogate pretraining), a new one in each step, or of all,
+        reordered in each epoch. Raises DataError: there are fewer samples than a batch has."""
         count = self.layouts if one_layout else self.layouts * self.commands
         if not one_layout and size > count:
-            raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")
+            raise DataError(
+                f"batches of {size} samples need at least as many, the data set has {count}"
+            )
         epoch, place = divmod(step, count if one_layout else count // size)
         if epoch != self._epoch:
             draw = seeded_generator(seed, epoch, self._device)
-            self._epoch, self._order = epoch, torch.randperm(count, generator=draw, device=self._device)
+            self._epoch, self._order = (
+                epoch,
+                torch.randperm(count, generator=draw, device=self._device),
+            )
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
-            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[rows]
+            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[
+                rows
+            ]
             layout = self._order[place].expand(len(command))
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]

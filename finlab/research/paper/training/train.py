@@ -1,5 +1,5 @@
-"""`finlab train surrogate` and `finlab train allocator`: the physics surrogate is trained first and on its
-own, then the network with the surrogate frozen."""
+"""`finlab train surrogate` and `finlab train allocator`: the physics surrogate is trained first and
+on its own, then the network with the surrogate frozen."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -12,12 +12,23 @@ from torch import Tensor
 
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec
-from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint, write_checkpoint
+from finlab.research.networks.checkpoint import (
+    read_checkpoint,
+    resolve_checkpoint,
+    write_checkpoint,
+)
 from finlab.research.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
-from finlab.research.paper.training.samples import N_FINS, Batch, DataSet, DataSettings, fresh_batch, generate
+from finlab.research.paper.training.samples import (
+    N_FINS,
+    Batch,
+    DataSet,
+    DataSettings,
+    fresh_batch,
+    generate,
+)
 from finlab.research.training.device import Workplace, workplace
 from finlab.research.training.loop import Terms, Training, Weights, first_weights, seeded_generator
 
@@ -59,19 +70,26 @@ class Bench:
     def batch(self, step: int) -> Batch:
         """The share of batch number `step`."""
         settings = self.settings
-        return self.samples.batch(step, settings.batch_size, self.seed, settings.one_layout, self.rows)
+        return self.samples.batch(
+            step, settings.batch_size, self.seed, settings.one_layout, self.rows
+        )
 
     def noise(self, step: int) -> tuple[Tensor, Tensor]:
-        """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1, 3)."""
+        """The share of the noise of `guidance` in a step: uniform (B, n, 1) and normal (B, n, 1,
+        3)."""
         device = self.place.device
         shape = (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
-        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[self.rows]
+        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[
+            self.rows
+        ]
 
     def tensors(self, *values: Any) -> list[Tensor]:
         """Arrays on the device."""
-        return [torch.tensor(value, dtype=torch.float32, device=self.place.device) for value in values]
+        return [
+            torch.tensor(value, dtype=torch.float32, device=self.place.device) for value in values
+        ]
 
 
 def train_surrogate(options: Options) -> TrainedWeights:
@@ -109,10 +127,12 @@ def train_surrogate(options: Options) -> TrainedWeights:
 
 
 def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
-    """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole checkpoint folder.
+    """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole
+    checkpoint folder.
 
     Without other data that in the surrogate's folder is learned from, if there is any. Raises
-    CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in `train_surrogate`."""
+    CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in
+    `train_surrogate`."""
     made = recipe(options.preset)
     base = read_checkpoint(resolve_checkpoint(surrogate))
     settings = made.allocator_training
@@ -123,7 +143,9 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
     def terms_of(weights: Weights, bench: Bench) -> Terms:
         if bench.samples.settings["fin_model"] != base.fin_model:
-            raise DataError(f"{options.data}: its wrenches are of another fin model than the surrogate's")
+            raise DataError(
+                f"{options.data}: its wrenches are of another fin model than the surrogate's"
+            )
         mean, std = bench.tensors(*base.normalization)
         frozen = surrogate_of(base, device=bench.place.device)
         ramp = replace(settings, steps=bench.settings.steps)

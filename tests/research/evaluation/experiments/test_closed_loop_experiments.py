@@ -15,7 +15,11 @@ from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.research.evaluation.document import to_text
 from finlab.research.evaluation.experiment import load_experiment
-from finlab.research.evaluation.experiments.closed_loop import absolute_error, depth_error, relative_error
+from finlab.research.evaluation.experiments.closed_loop import (
+    absolute_error,
+    depth_error,
+    relative_error,
+)
 from finlab.research.evaluation.experiments.faults import all_faults
 from tests.terminal import refused
 
@@ -36,7 +40,10 @@ def test_trajectory(line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
     rows = json.loads(file.read_text())["rows"]
     laws = "tracking", "waypoint"
     cases = [
-        (name, lost, law) for name, most in (("A", 2), ("D", 1)) for lost in range(most + 1) for law in laws
+        (name, lost, law)
+        for name, most in (("A", 2), ("D", 1))
+        for lost in range(most + 1)
+        for law in laws
     ]
     cases += [("D", 2, None), *(("all", lost, law) for lost in range(3) for law in laws)]
     assert [(row["layout"], row["lost"], row.get("controller")) for row in rows] == cases
@@ -64,7 +71,9 @@ def test_faults(layout_a: Layout, line: str) -> None:
 
 
 def test_velocity() -> None:
-    rows = load_experiment("velocity").rows(layouts=("A",), methods=("analytic",), lost=(0, 1), duration=12.0)
+    rows = load_experiment("velocity").rows(
+        layouts=("A",), methods=("analytic",), lost=(0, 1), duration=12.0
+    )
     assert [(row["lost"], row["speed"], row["controller"]) for row in rows] == [
         (lost, speed, law)
         for lost in (0, 1)
@@ -110,7 +119,9 @@ def test_a_drift_shows_in_the_relative_error() -> None:
 
 def evo_rmse(verb: str, folder: Path, *options: str) -> float:
     """Root mean square error that evo prints; positions only, nothing aligned."""
-    command = shutil.which(verb, path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    command = shutil.which(
+        verb, path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    )
     if command is None:
         pytest.skip(f"{verb} is not installed")
     files = [str(folder / f"{name}.txt") for name in ("reference", "robot")]
@@ -123,7 +134,9 @@ def evo_rmse(verb: str, folder: Path, *options: str) -> float:
     )
     assert done.returncode == 0, done.stderr
     return next(
-        float(line.split()[1]) for line in done.stdout.splitlines() if line.strip().startswith("rmse")
+        float(line.split()[1])
+        for line in done.stdout.splitlines()
+        if line.strip().startswith("rmse")
     )
 
 
@@ -133,8 +146,12 @@ def test_evo_finds_the_same_errors(tmp_path: Path) -> None:
     reference = np.stack([np.cos(0.1 * time), np.sin(0.1 * time), 0.1 * np.sin(0.3 * time)], axis=1)
     robot = reference + 0.02 * np.cumsum(rng.standard_normal((300, 3)), axis=0)
     for name, path in (("reference", reference), ("robot", robot)):
-        level = np.tile([0.0, 0.0, 0.0, 1.0], (300, 1))  # evo wants attitudes; the reference has none
+        level = np.tile(
+            [0.0, 0.0, 0.0, 1.0], (300, 1)
+        )  # evo wants attitudes; the reference has none
         np.savetxt(tmp_path / f"{name}.txt", np.column_stack([time, path, level]))
-    assert evo_rmse("evo_ape", tmp_path) == pytest.approx(absolute_error(robot, reference), abs=2e-6)
+    assert evo_rmse("evo_ape", tmp_path) == pytest.approx(
+        absolute_error(robot, reference), abs=2e-6
+    )
     relative = evo_rmse("evo_rpe", tmp_path, "--delta", "50", "--delta_unit", "f", "--all_pairs")
     assert relative == pytest.approx(relative_error(robot, reference, 50), abs=2e-6)

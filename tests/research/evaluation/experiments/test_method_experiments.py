@@ -18,7 +18,13 @@ from finlab.research.evaluation.experiment import Row, load_experiment
 from finlab.research.evaluation.experiments.temperature import diversity
 from finlab.research.evaluation.experiments.thrusters import METHODS, misses_more, missing_by_group
 from finlab.research.evaluation.method_specs import MethodSpec, load_method_spec
-from finlab.research.evaluation.scoring import joined, mean_interval, paper_sigma, ratio_interval, run_method
+from finlab.research.evaluation.scoring import (
+    joined,
+    mean_interval,
+    paper_sigma,
+    ratio_interval,
+    run_method,
+)
 from finlab.research.evaluation.splits import make_split
 from tools import cost
 
@@ -78,14 +84,19 @@ def test_an_answer_outside_its_limits_is_none(monkeypatch: pytest.MonkeyPatch) -
     pytest.importorskip("casadi")
     cheat = MethodSpec("cheat", MethodChoice(Cheat, Cheat.settings_class()))
     monkeypatch.setattr(method_specs, "load_method_spec", lambda *_: cheat)
-    (row,) = cost.experiment.rows(methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2)
+    (row,) = cost.experiment.rows(
+        methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2
+    )
     assert row["tracked"] == 0.0 and "cost_ratio" not in row
 
 
 def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout, float]:
     """Two fins abeam that push along x and z, and the thrust of one [N]."""
     limits = Limits(zero_direction=arc)
-    fins = [Fin(name, (0.0, y, 0.0), -math.pi / 2, limits) for name, y in (("port", 0.2), ("star", -0.2))]
+    fins = [
+        Fin(name, (0.0, y, 0.0), -math.pi / 2, limits)
+        for name, y in (("port", 0.2), ("star", -0.2))
+    ]
     layout = Layout("pair", tuple(fins))
     full = np.array([[*limits.upper[:2], 0.5 * sum(arc)]] * 2)
     return layout, float(np.linalg.norm(Plant(layout).body_forces(full)[0]))
@@ -131,7 +142,9 @@ def test_more_temperature_more_diversity_and_none_between_equals() -> None:
     cold, hot = load_experiment("temperature").rows(
         temperatures=(1e-3, 1.0), layouts=2, targets=2, candidates=16
     )
-    assert (cold["temperature"], cold["n"]) == (1e-3, 4) and hot["diversity"] > 1.5 * cold["diversity"]
+    assert (cold["temperature"], cold["n"]) == (1e-3, 4) and hot["diversity"] > 1.5 * cold[
+        "diversity"
+    ]
     low, high = cold["best_j_mean_interval"]
     assert low <= cold["best_j_mean"] <= high
     layout, _ = surge_robot()
@@ -228,12 +241,16 @@ def test_beside_the_autopilots_dual_misses_no_more_and_takes_the_least() -> None
             assert row["not_delivered"] == (0.0 if row["of_reach"] < 100.0 else 1.0)
             assert row["of_reach"] > 100.0 or row["watts_max"] < 1.001
     near = {(row["lost"], row["method"]): row for row in rows if row["of_reach"] == 80.0}
-    assert near[0, "pseudo-inverse"]["not_delivered"] > 0.05 and near[0, "pseudo-inverse"]["watts"] > 1.01
+    assert (
+        near[0, "pseudo-inverse"]["not_delivered"] > 0.05
+        and near[0, "pseudo-inverse"]["watts"] > 1.01
+    )
     assert near[0, "ardusub"]["not_delivered"] > near[0, "pseudo-inverse"]["not_delivered"]
 
 
 def test_a_surveyed_frame_shows_the_axis_that_a_drawing_hides() -> None:
-    """Nothing drives pitch alone; thrusters a little out of place seem to, and the pseudo-inverse clips."""
+    """Nothing drives pitch alone; thrusters a little out of place seem to, and the pseudo-inverse
+    clips."""
     rows = load_experiment("thrusters").rows(
         robots=("surveyed",), lost=(0,), reach=(0.8,), layouts=2, targets=6
     )

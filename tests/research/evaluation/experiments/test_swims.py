@@ -58,13 +58,16 @@ def test_fins_of_a_day_are_known_and_drawn_by_the_seed() -> None:
 def test_each_fin_in_turn_but_no_hopeless_pair() -> None:
     assert [case.fins[0] for case in DAYS["weak"].cases()] == list(DAYS["weak"].robot("A", 0).names)
     assert len(DAYS["lost-two"].cases()) == 6
-    hopeless = [case.fins for case in DAYS["lost-two"].cases() if DAYS["lost-two"].is_hopeless(case)]
+    hopeless = [
+        case.fins for case in DAYS["lost-two"].cases() if DAYS["lost-two"].is_hopeless(case)
+    ]
     assert len(hopeless) == 2 and hopeless[0] == ("front_right", "back_right")
     assert not any(DAYS["lost-one"].is_hopeless(case) for case in DAYS["lost-one"].cases())
 
 
 def _log(command: list[list[list[float]]], missing: list[float]) -> RunLog:
-    """A log of one fin or more that stands at its reference; `missing` is what each tick lacks along x."""
+    """A log of one fin or more that stands at its reference; `missing` is what each tick lacks
+    along x."""
     n = len(command)
     n_fins = len(command[0])
     asked = np.zeros((n, 6))

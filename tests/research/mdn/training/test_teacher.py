@@ -1,4 +1,5 @@
-"""What the teacher tells: exact ways, told apart, the cheapest first, with weights by their cost."""
+"""What the teacher tells: exact ways, told apart, the cheapest first, with weights by their
+cost."""
 
 import numpy as np
 import pytest
@@ -86,7 +87,9 @@ def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
         place = robot.position
         for mirror in ([1, -1, 1], [1, 1, -1]):
             twins = np.abs(place[:, None] - place * mirror).max(-1) < 1e-9
-            symmetric += bool((twins.any(1) & (np.abs(place * mirror - place).max(-1) > 1e-9)).any())
+            symmetric += bool(
+                (twins.any(1) & (np.abs(place * mirror - place).max(-1) > 1e-9)).any()
+            )
     assert symmetric >= 5
 
 

@@ -1,4 +1,5 @@
-"""Training of the network of method `mdn`: repeatable answers, batches as seen, a likelihood that is one."""
+"""Training of the network of method `mdn`: repeatable answers, batches as seen, a likelihood that
+is one."""
 
 import csv
 import shutil
@@ -40,7 +41,9 @@ def test_a_file_of_answers_depends_on_its_seed_and_number(shard: Path, tmp_path:
 
 def test_batches_say_what_a_robot_and_its_mirror_image_are_asked_for(shard: Path) -> None:
     answers = Answers([shard])
-    known = sum(int((group["weight"].sum(-1) > 0.5).sum()) for group in read_answers(shard).values())
+    known = sum(
+        int((group["weight"].sum(-1) > 0.5).sum()) for group in read_answers(shard).values()
+    )
     assert len(answers) == known > 0
     batch = answers.draw(np.random.default_rng(0), 64)
     assert batch.weight.sum(1) == pytest.approx(torch.ones(64), abs=1e-5)

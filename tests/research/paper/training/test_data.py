@@ -12,7 +12,13 @@ from finlab.errors import DataError
 from finlab.layout import Fin, Layout
 from finlab.physics import Plant
 from finlab.research.paper.training import samples as parts_of
-from finlab.research.paper.training.samples import DataSet, DataSettings, drawn_part, generate, part_file
+from finlab.research.paper.training.samples import (
+    DataSet,
+    DataSettings,
+    drawn_part,
+    generate,
+    part_file,
+)
 
 SETTINGS = DataSettings(layouts=30, commands=40, seed=3)
 CPU = torch.device("cpu")
@@ -53,7 +59,11 @@ def test_samples_are_what_the_paper_draws(folder: Path) -> None:
         assert (command >= low - 1e-6).all() and (command <= high + 1e-6).all()
         assert np.ptp(command, axis=0) == pytest.approx(high - low, rel=0.4)
         fins = [
-            Fin(f"fin_{i}", tuple(whole["position"][row, i].tolist()), float(whole["mounting_angle"][row, i]))
+            Fin(
+                f"fin_{i}",
+                tuple(whole["position"][row, i].tolist()),
+                float(whole["mounting_angle"][row, i]),
+            )
             for i in range(n)
         ]
         expected = Plant(Layout("one", tuple(fins))).wrench(command)

@@ -1,4 +1,5 @@
-"""The networks in torch: robots of 2 to 5 fins in one batch, against each alone in numpy; the losses."""
+"""The networks in torch: robots of 2 to 5 fins in one batch, against each alone in numpy; the
+losses."""
 
 import math
 
@@ -42,18 +43,25 @@ def padded(robots: list[Layout], fill: float) -> Batch:
         parts["mask"].append(np.arange(N_FINS) < layout.n)
         parts["wrench"].append(rng.normal(size=6))
     arrays = [np.stack(part) for part in parts.values()]
-    return Batch(*(torch.from_numpy(a if a.dtype == bool else a.astype(np.float32)) for a in arrays))
+    return Batch(
+        *(torch.from_numpy(a if a.dtype == bool else a.astype(np.float32)) for a in arrays)
+    )
 
 
 def weights_of(sizes: NetworkConfig | SurrogateConfig) -> dict[str, torch.Tensor]:
     """Weights of which none is zero or one, which would hide one that is misplaced."""
     draw = torch.Generator().manual_seed(2)
     first = first_weights(sizes.shapes(), 0)
-    return {name: value + 0.1 * torch.randn(value.shape, generator=draw) for name, value in first.items()}
+    return {
+        name: value + 0.1 * torch.randn(value.shape, generator=draw)
+        for name, value in first.items()
+    }
 
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
-def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
+def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(
+    robots: list[Layout], fill: float
+) -> None:
     weights = weights_of(SIZES)
     batch = padded(robots, fill)
     together = SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
@@ -65,7 +73,9 @@ def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[L
 
 
 @pytest.mark.parametrize("fill", [0.0, 7.0])
-def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(robots: list[Layout], fill: float) -> None:
+def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
+    robots: list[Layout], fill: float
+) -> None:
     tensors = weights_of(HIDDEN)
     batch = padded(robots, fill)
     weights = TrainedWeights(
@@ -88,7 +98,8 @@ def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> 
     x = modules.features(batch).requires_grad_()
     mixture = SIZES(weights, x, batch.wrench, batch.mask)
     sum(
-        (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum() for part in mixture
+        (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum()
+        for part in mixture
     ).backward()
     assert x.grad is not None and x.grad.isfinite().all()
     assert (x.grad[~batch.mask] == 0.0).all() and (x.grad[batch.mask].abs().sum(-1) > 0.0).all()
@@ -120,7 +131,9 @@ def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(batch: 
             high = batch.upper[row, i].numpy()
             x = (2.0 * batch.command[row, i].numpy() - low - high) / (high - low)
             # All components are alike, so their weights cancel.
-            expected -= float(np.sum(-0.5 * (x / math.exp(-0.5)) ** 2 + 0.5 - 0.5 * math.log(2 * math.pi)))
+            expected -= float(
+                np.sum(-0.5 * (x / math.exp(-0.5)) ** 2 + 0.5 - 0.5 * math.log(2 * math.pi))
+            )
         assert found[row] == pytest.approx(expected, rel=1e-4)
 
 
@@ -146,7 +159,9 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batc
     found.sum().backward()
     assert mixture.mean.grad is not None
     clamped = (command == batch.upper) & batch.mask[..., None]
-    assert (mixture.mean.grad.sum(2)[clamped] != 0.0).all()  # a sample outside its limits teaches, too
+    assert (
+        mixture.mean.grad.sum(2)[clamped] != 0.0
+    ).all()  # a sample outside its limits teaches, too
 
 
 def test_entropy_is_that_of_the_weights_over_the_fins_that_exist(batch: Batch) -> None:

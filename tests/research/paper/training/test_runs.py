@@ -50,13 +50,27 @@ def losses(folder: Path) -> list[float]:
 def test_what_is_trained_allocates_and_is_described(
     trained: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--method", "paper", "--json"]
+    command = [
+        "allocate",
+        "A",
+        "--wrench",
+        "1",
+        "0",
+        "0",
+        "0",
+        "0",
+        "0",
+        "--method",
+        "paper",
+        "--json",
+    ]
     assert main([*command, "--checkpoint", str(trained / "allocator")]) == 0
     assert json.loads(capsys.readouterr().out)["checkpoint"] == "allocator"
     surrogate, whole = (read_checkpoint(trained / name) for name in ("surrogate", "allocator"))
     assert whole.training["allocator"]["surrogate_sha256"] == surrogate.sha256
     assert all(
-        np.array_equal(whole.surrogate[name], surrogate.surrogate[name]) for name in surrogate.surrogate
+        np.array_equal(whole.surrogate[name], surrogate.surrogate[name])
+        for name in surrogate.surrogate
     )
     assert surrogate.metrics["surrogate"]["wrench_error_norm"] > 0.0
     for name, made in (("surrogate", surrogate), ("allocator", whole)):
@@ -67,10 +81,23 @@ def test_what_is_trained_allocates_and_is_described(
         assert losses(trained / name)[-1] < losses(trained / name)[0]
 
 
-def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(trained: Path, tmp_path: Path) -> None:
+def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(
+    trained: Path, tmp_path: Path
+) -> None:
     out = str(tmp_path / "killed")
     options = ["--surrogate", str(trained / "surrogate"), "--data", str(trained / "data")]
-    verb = ["train", "allocator", "-o", out, *options, "--preset", "smoke", "--steps", "30", "--resume"]
+    verb = [
+        "train",
+        "allocator",
+        "-o",
+        out,
+        *options,
+        "--preset",
+        "smoke",
+        "--steps",
+        "30",
+        "--resume",
+    ]
     code = PATIENT + "sys.exit(main(sys.argv[1:]))"
     for _ in range(2):
         process = subprocess.Popen([sys.executable, "-c", code, *verb])
@@ -113,10 +140,26 @@ def test_a_killed_generation_leaves_whole_parts_and_no_processes(tmp_path: Path)
 
 
 def test_two_processes_have_the_losses_of_one(trained: Path, tmp_path: Path) -> None:
-    command = ["-m", "finlab", "train", "allocator", "-o", str(tmp_path), "--data", str(trained / "data")]
+    command = [
+        "-m",
+        "finlab",
+        "train",
+        "allocator",
+        "-o",
+        str(tmp_path),
+        "--data",
+        str(trained / "data"),
+    ]
     command += ["--preset", "smoke", "--steps", "30", "--device", "cpu"]
     command += ["--surrogate", str(trained / "surrogate")]
-    launch = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
+    launch = [
+        sys.executable,
+        "-m",
+        "torch.distributed.run",
+        "--nproc-per-node",
+        "2",
+        "--standalone",
+    ]
     done = subprocess.run([*launch, *command], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     np.testing.assert_allclose(losses(tmp_path), losses(trained / "allocator"), rtol=1e-3)
