@@ -1,6 +1,7 @@
-# %% [markdown] # What jets take, from twenty samples Jets that meet other actuators or the hull
-# weaken them. You will see what the laws alone miss, and what the fitted jets leave of it. The tank
-# here is a robot whose jets spread and weaken otherwise than usual.
+# %% [markdown]
+# # What jets take, from twenty samples
+# Jets that meet other actuators or the hull weaken them. You will see what the laws alone miss, and what the
+# fitted jets leave of it. The tank here is a robot whose jets spread and weaken otherwise than usual.
 
 # %%
 from dataclasses import replace
