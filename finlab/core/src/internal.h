@@ -42,6 +42,7 @@ typedef fl_wide wide;
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
+#define LARGEST_NUMBER R(1e30) /* of a block or an answer */
 #define NOTHING R(1e-9)
 #define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
 #define NEARLY R(1e-6)
@@ -50,9 +51,6 @@ typedef fl_wide wide;
 #define ROUNDS 12
 #define TICK_PARTS 60 /* the usual fl_settings.tick_parts */
 #define LAST_STEPS 36 /* the usual fl_settings.command_steps */
-#define MIN(a, b) ((a) < (b) ? (a) : (b))
-#define MAX(a, b) ((a) > (b) ? (a) : (b))
-#define CLIP(x, low, high) MIN(MAX(x, low), high)
 
 #define HEAD(block) ((const fl_head *)(block))
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
@@ -94,6 +92,7 @@ void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
 int fl_factor(real A[6][6]);
 void fl_solve(real factor[6][6], const real *right, real *x);
+int fl_are_within(const real *values, int count, real most);
 
 /* force_table.c: tables of force over price, gauges of directions */
 typedef struct { real force, slope, conjugate; } line_response;
