@@ -104,8 +104,8 @@ def _served(policy: Any) -> _Served:
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
     record["policy"] = ("closest", "direction", "priority").index(policy.kind)
-    record["groups"] = len(policy.groups)
-    record["weight"] = weights / weights.max()
+    record["group_count"] = len(policy.groups)
+    record["axis_weight"] = weights / weights.max()
     for place, axes in enumerate(policy.groups):
         record["group"][:, place] = axes
     return _Served(record, record.ctypes.data)
@@ -139,23 +139,23 @@ class Core:
         self._to = question.ctypes.data
         self._wrench = question["wrench"]
         self._policy_at = question["policy"]
-        self._price_at = question["price"]
+        self._price_at = question["prices"]
         self._previous_at = question["previous"]
         self._lost_at = question["lost"]
         self._free_at = question["free"]
         self._calm = question["calm"]
         self._ticks = question["ticks"]
-        self._toward_at = question["toward"]
+        self._toward_at = question["angles_wanted"]
         answer = np.zeros(1, struct("fl_answer"))
         self._from = answer.ctypes.data
         self._force = answer["force"][:, :count]
-        self._answer_price = answer["price"]
-        self._aim = answer["aim"]
-        self._value = answer["value"]
+        self._answer_price = answer["prices"]
+        self._aim = answer["wrench_served"]
+        self._value = answer["gap_power_bound"]
         self._error = answer["error"]
         self._command = answer["command"][:, :count]
-        self._within = answer["within"]
-        self._ended = answer["ended"]
+        self._within = answer["is_attainable"]
+        self._ended = answer["is_truncated"]
 
         # What the question points at, and where it lies.
         self._price = np.zeros(6)
@@ -299,11 +299,11 @@ class Core:
         if error:
             raise CommandError(_REFUSED.format(CODES[error]))
         return Worth(
-            worth["price"],
-            worth["price_back"],
+            worth["price_ahead"],
+            worth["price_reverse"],
             worth["conjugate"],
-            worth["low"][:1],
-            worth["high"][:1],
+            worth["force_min"][:1],
+            worth["force_max"][:1],
         )
 
 

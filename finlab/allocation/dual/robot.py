@@ -147,27 +147,29 @@ class DualRobot:
         head["magic"] = MAGIC
         head["version"] = VERSION
         head["n"] = len(self.responses)
-        head["range"] = rank
-        head["scale"] = self.scale
-        head["yard"] = self.yardstick
-        head["counts"] = self._counts
-        head["beside"] = self.beside
+        head["rank"] = rank
+        head["axis_scale"] = self.scale
+        head["wrench_scale"] = self.yardstick
+        head["is_commanded"] = self._counts
+        head["wrench_offset"] = self.beside
         head["basis"][:, :rank] = self.basis
 
         actuators = np.zeros(len(self.responses), struct("fl_actuator"))
-        actuators["low"] = self.ends[:, 0]
-        actuators["high"] = self.ends[:, 1]
-        actuators["speed"] = self.speed
-        actuators["gain"] = self._gain
-        actuators["most"] = self.most
-        actuators["matrix"][..., :rank] = (self.effectiveness / self.scale) @ self.basis
-        actuators["own"] = self._own
-        actuators["doubt"] = self._doubt
+        actuators["force_min"] = self.ends[:, 0]
+        actuators["force_max"] = self.ends[:, 1]
+        actuators["flow_speed"] = self.speed
+        actuators["secant"] = self._gain
+        actuators["row_force_max"] = self.most
+        actuators["effectiveness_reduced"][..., :rank] = (
+            self.effectiveness / self.scale
+        ) @ self.basis
+        actuators["effectiveness_normalized"] = self._own
+        actuators["uncertainty_cost"] = self._doubt
         lower, upper, step, turns = self._limits
-        actuators["lower"] = lower
-        actuators["upper"] = upper
-        actuators["step"] = np.minimum(step, 1e30)  # C reads no infinity
-        actuators["turns"] = np.any(turns, axis=1)
+        actuators["command_min"] = lower
+        actuators["command_max"] = upper
+        actuators["max_change"] = np.minimum(step, 1e30)  # C reads no infinity
+        actuators["is_free_angle"] = np.any(turns, axis=1)
         described = zip(actuators, self.responses, self._forms, self._offsets, strict=True)
         for actuator, response, form, offsets in described:
             _describe(actuator, response, form, offsets)
@@ -179,39 +181,39 @@ class DualRobot:
 def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffsets") -> None:
     """Writes what one actuator offers, and how its forces become commands, into its fields."""
     _, share, worth = response.table.origin
-    actuator["share"] = share
-    actuator["worth"] = worth
-    actuator["band"] = response.band
+    actuator["force_scale"] = share
+    actuator["power_scale"] = worth
+    actuator["dead_band"] = response.band
     # A foil has two rows: lift, and the drag of that lift.
-    actuator["rows"] = 1.0 if actuator["speed"] == 0.0 else 2.0
-    actuator["least"] = actuator["low"]
+    actuator["rows"] = 1.0 if actuator["flow_speed"] == 0.0 else 2.0
+    actuator["force_min_needed"] = actuator["force_min"]
     if isinstance(response, Plane):
         actuator["rows"] = 2.0
-        actuator["middle"] = response.middle
-        actuator["half"] = response.half
+        actuator["sector_center"] = response.middle
+        actuator["sector_half_angle"] = response.half
         if _needs_no_reverse(response):
-            actuator["least"] = 0.0
+            actuator["force_min_needed"] = 0.0
 
-    actuator["form"] = _KINDS.index(form.kind)
+    actuator["command_kind"] = _KINDS.index(form.kind)
     for field, offset in offsets._asdict().items():
         actuator[field] = offset
-    actuator["sign"] = form.sign
-    actuator["lean"] = form.lean
-    actuator["uneven"] = form.uneven
-    actuator["uneven_at"] = form.uneven_at
-    actuator["pressure"] = form.pressure
-    actuator["turned"] = form.zero_lift_angle
-    actuator["rest"] = form.zero_lift_drag
+    actuator["command_sign"] = form.sign
+    actuator["lean_angle"] = form.lean
+    actuator["unevenness"] = form.uneven
+    actuator["unevenness_angle"] = form.uneven_at
+    actuator["pressure_area"] = form.pressure
+    actuator["zero_lift_angle"] = form.zero_lift_angle
+    actuator["zero_lift_drag"] = form.zero_lift_drag
 
 
 class TableOffsets(NamedTuple):
     """Offsets of one actuator's tables in the block, by the fields that hold them; 0 for none."""
 
-    ahead: int
-    back: int
-    gauge: int
-    law: int
-    beat: int
+    force_table: int
+    force_table_reverse: int
+    gauge_table: int
+    law_grid: int
+    command_table: int
 
 
 _KINDS = "thruster", "pod", "fin", "foil"
@@ -251,13 +253,13 @@ class _Tables:
         law = form.law
         beat = form.beat
         return TableOffsets(
-            ahead=self.radial(response.table),
-            back=self.radial(response.reverse),
-            gauge=self.offset(
+            force_table=self.radial(response.table),
+            force_table_reverse=self.radial(response.reverse),
+            gauge_table=self.offset(
                 gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))
             ),
-            law=self.offset(law, lambda: cast(Array, law)),
-            beat=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
+            law_grid=self.offset(law, lambda: cast(Array, law)),
+            command_table=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
 
     @property

@@ -25,7 +25,7 @@ typedef struct {
 } push_direction;
 
 static const real *gauge_of(const real *block, const fl_actuator *a) {
-  if (a->gauge > 0) return block + (int)a->gauge;
+  if (a->gauge_table > 0) return block + (int)a->gauge_table;
   return 0;
 }
 
@@ -60,17 +60,18 @@ static push_direction direction_of(const fl_set *set, const real *gauge, const r
     turning *= fl_larger(sigma.value + sigma.bend, 0);
     g.v *= sigma.value;
   }
-  if (set->half < PI) {
-    const real along_middle = g.x * set->cos_middle + g.y * set->sin_middle;
-    const real across_middle = g.y * set->cos_middle - g.x * set->sin_middle;
-    if (FABS(across_middle) * set->cos_half > along_middle * set->sin_half) {
+  if (set->sector_half_angle < PI) {
+    const real along_middle = g.x * set->cos_center + g.y * set->sin_center;
+    const real across_middle = g.y * set->cos_center - g.x * set->sin_center;
+    if (FABS(across_middle) * set->cos_half_angle > along_middle * set->sin_half_angle) {
       /* The nearer end by the price itself: by the force, both are alike where the arc has no
          width. */
       real nearer = 1;
-      if (price[1] * set->cos_middle - price[0] * set->sin_middle < 0) nearer = -1;
-      push_direction end = end_of_arc(gauge, set->middle + nearer * set->half, price);
+      if (price[1] * set->cos_center - price[0] * set->sin_center < 0) nearer = -1;
+      push_direction end =
+          end_of_arc(gauge, set->sector_center + nearer * set->sector_half_angle, price);
       end.is_beyond = 1;
-      end.other_end = set->middle - nearer * set->half;
+      end.other_end = set->sector_center - nearer * set->sector_half_angle;
       g = end;
       turning = 0;
     }
@@ -119,12 +120,12 @@ static response along_direction(line_response T, const push_direction *g) {
 /* The response of a plane that pushes ahead alone. */
 static response sector_response(const real *block, const fl_actuator *a, const fl_set *set,
                                 const real *gauge, const real *price) {
-  const push_direction g = direction_of(set, gauge, price, set->gap2);
+  const push_direction g = direction_of(set, gauge, price, set->price_floor_squared);
   response own = along_direction(fl_limited_response(block, a, set, 0, g.v), &g);
-  if (set->forked && g.is_beyond) {
+  if (set->is_forked && g.is_beyond) {
     const push_direction end = end_of_arc(gauge, g.other_end, price);
     const response other = along_direction(fl_limited_response(block, a, set, 0, end.v), &end);
-    blend(&own, &other, blend_width(set->high_cost));
+    blend(&own, &other, blend_width(set->cost_at_max));
   }
   return own;
 }
@@ -133,18 +134,18 @@ static response sector_response(const real *block, const fl_actuator *a, const f
 static response plane_response(const real *block, const fl_actuator *a, const fl_set *set,
                                const real *price) {
   response own = sector_response(block, a, set, gauge_of(block, a), price);
-  if (set->reverse > 0) {
+  if (set->force_max_reverse > 0) {
     const fl_set reversed = fl_reversed_set(set);
     const response other = sector_response(block, a, &reversed, 0, price);
-    blend(&own, &other, blend_width(reversed.high_cost));
+    blend(&own, &other, blend_width(reversed.cost_at_max));
   }
   return own;
 }
 
 /* Power [W] of a foil without lift: its drag is there all the same. */
 static real power_at_rest(const real *block, const fl_actuator *a) {
-  const real *table = block + (int)a->ahead;
-  return a->worth * table[2];
+  const real *table = block + (int)a->force_table;
+  return a->power_scale * table[2];
 }
 
 /* r = 1 - a/U of a foil, and q(r): r above SOFT, and e^(r/SOFT - 1) SOFT below, at least CLOSE of
@@ -180,29 +181,29 @@ static soft_ratio soft_ratio_of(real r) {
    its drag is the derivative of c* by the price of drag, where dr/ds = -1/U. */
 static response foil_response(const real *block, const fl_actuator *a, const fl_set *set,
                               const real *price) {
-  const soft_ratio ratio = soft_ratio_of(1 - price[1] / a->speed);
+  const soft_ratio ratio = soft_ratio_of(1 - price[1] / a->flow_speed);
   const real q = ratio.q;
   const real excess = q - ratio.r;
   const real rest = power_at_rest(block, a);
-  const real range = fl_larger(set->high - set->low, TINY);
-  const real chord_slope = (set->high_cost - set->low_cost) / range; /* [W/N] */
+  const real range = fl_larger(set->force_max - set->force_min, TINY);
+  const real chord_slope = (set->cost_at_max - set->cost_at_min) / range; /* [W/N] */
   const real v = (price[0] + excess * chord_slope) / q;
 
   const line_response lift = fl_limited_response(block, a, set, 1, v);
   const real power = v * lift.force - lift.conjugate - rest;
-  const real chord = set->low_cost - rest + chord_slope * (lift.force - set->low);
-  const real chord_at_zero = set->low_cost - rest - chord_slope * set->low;
+  const real chord = set->cost_at_min - rest + chord_slope * (lift.force - set->force_min);
+  const real chord_at_zero = set->cost_at_min - rest - chord_slope * set->force_min;
   const real dlift = lift.slope / q;
   /* Drag per lift along the curve of responses: marginal power over speed, P' = v or the chord's. */
-  const real drag_slope = (ratio.slope * v + (1 - ratio.slope) * chord_slope) / a->speed;
+  const real drag_slope = (ratio.slope * v + (1 - ratio.slope) * chord_slope) / a->flow_speed;
 
   response y;
   y.force[0] = lift.force;
-  y.force[1] = (ratio.slope * power + (1 - ratio.slope) * chord) / a->speed;
+  y.force[1] = (ratio.slope * power + (1 - ratio.slope) * chord) / a->flow_speed;
   y.xx = dlift;
   y.xy = dlift * drag_slope;
   y.yy = dlift * drag_slope * drag_slope +
-         (chord - power) * ratio.bend / (a->speed * a->speed);
+         (chord - power) * ratio.bend / (a->flow_speed * a->flow_speed);
   y.conjugate = q * (lift.conjugate + rest) + excess * chord_at_zero - rest;
   y.angle = 0;
   return y;
@@ -212,19 +213,19 @@ static response foil_response(const real *block, const fl_actuator *a, const fl_
    y = y_0 + d y' and a cost c_0 + pay d + bend / 2 d^2, d = (s.y' - pay) / bend within its limits. */
 static response tangent_response(const fl_set *set, const real *price) {
   const fl_tangent *t = set->tangent;
-  const real gain = dot(price, t->slope, 2) - t->pay; /* [W/rad] */
-  const real d = fl_clipped(gain / t->bend, set->low, set->high);
-  const real x = t->slope[0];
-  const real y = t->slope[1];
+  const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* [W/rad] */
+  const real d = fl_clipped(gain / t->curvature, set->force_min, set->force_max);
+  const real x = t->force_slope[0];
+  const real y = t->force_slope[1];
   real dd = 0; /* derivative of d by the gain */
-  if (d > set->low && d < set->high) dd = 1 / t->bend;
+  if (d > set->force_min && d < set->force_max) dd = 1 / t->curvature;
   response o;
   o.force[0] = t->force[0] + d * x;
   o.force[1] = t->force[1] + d * y;
   o.xx = dd * x * x;
   o.xy = dd * x * y;
   o.yy = dd * y * y;
-  o.conjugate = dot(price, t->force, 2) + d * (gain - d * t->bend / 2) - t->cost;
+  o.conjugate = dot(price, t->force, 2) + d * (gain - d * t->curvature / 2) - t->cost;
   o.angle = 0;
   return o;
 }
@@ -237,16 +238,16 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
     return (response){{line.force, 0}, line.slope, 0, 0, line.conjugate, 0};
   }
   if (set->tangent) return tangent_response(set, price);
-  if (a->speed > 0) return foil_response(block, a, set, price);
-  if (set->turn > 0) return fl_response_with_turning(block, i, set, price);
+  if (a->flow_speed > 0) return foil_response(block, a, set, price);
+  if (set->turn_cost > 0) return fl_response_with_turning(block, i, set, price);
   return plane_response(block, a, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */
 real fl_drag_of_lift(const real *block, int i, real force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (!(a->speed > 0)) return 0;
-  return (fl_power_of_force(block, i, force) - power_at_rest(block, a)) / a->speed;
+  if (!(a->flow_speed > 0)) return 0;
+  return (fl_power_of_force(block, i, force) - power_at_rest(block, a)) / a->flow_speed;
 }
 
 /* Lift and drag of a foil that are worth most at a price, whatever their power. Where drag is dear
@@ -257,14 +258,14 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
   const real drag_cost = -price[1];
   real lift;
   if (drag_cost > 0) {
-    lift = fl_limited_response(block, a, set, 1, price[0] * a->speed / drag_cost).force;
+    lift = fl_limited_response(block, a, set, 1, price[0] * a->flow_speed / drag_cost).force;
   } else {
-    const real drag_low = fl_drag_of_lift(block, i, set->low);
-    const real drag_high = fl_drag_of_lift(block, i, set->high);
-    const real worth_low = price[0] * set->low - drag_cost * drag_low;
-    const real worth_high = price[0] * set->high - drag_cost * drag_high;
-    lift = set->low;
-    if (worth_high > worth_low) lift = set->high;
+    const real drag_low = fl_drag_of_lift(block, i, set->force_min);
+    const real drag_high = fl_drag_of_lift(block, i, set->force_max);
+    const real worth_low = price[0] * set->force_min - drag_cost * drag_low;
+    const real worth_high = price[0] * set->force_max - drag_cost * drag_high;
+    lift = set->force_min;
+    if (worth_high > worth_low) lift = set->force_max;
   }
   force[0] = lift;
   force[1] = fl_drag_of_lift(block, i, lift);
@@ -276,7 +277,7 @@ static push_direction farthest_direction(const fl_set *set, const real *gauge,
                                          const real *price) {
   const int is_unpriced = size_of(price) * size_of(price) <= TINY;
   if (is_unpriced) { /* any force will do, but it must be one of the set */
-    const real middle[2] = {set->cos_middle, set->sin_middle};
+    const real middle[2] = {set->cos_center, set->sin_center};
     push_direction any = direction_of(set, gauge, middle, TINY);
     any.v = 0;
     return any;
@@ -297,31 +298,31 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
   const fl_actuator *a = ACTUATOR(block, i);
   force[1] = 0;
   if (a->rows == 1) {
-    force[0] = set->low;
-    if (price[0] > 0) force[0] = set->high;
+    force[0] = set->force_min;
+    if (price[0] > 0) force[0] = set->force_max;
     return price[0];
   }
-  if (a->speed > 0) {
+  if (a->flow_speed > 0) {
     farthest_foil(block, i, set, price, force);
     return price[0];
   }
   const push_direction g = farthest_direction(set, gauge_of(block, a), price);
-  real size = set->low;
-  if (g.v > 0) size = set->high;
+  real size = set->force_min;
+  if (g.v > 0) size = set->force_max;
   force[0] = g.x;
   force[1] = g.y;
   /* Without a gauge its length is 1 but for rounding, which would be that of the set: a step of
      Newton's method for the inverse root takes it off. */
   wide length_squared = 1;
-  if (!(a->gauge > 0)) length_squared = product(force, force, 2);
+  if (!(a->gauge_table > 0)) length_squared = product(force, force, 2);
   const wide times = size / 2 * (3 - length_squared);
   force[0] *= times;
   force[1] *= times;
-  if (set->reverse > 0) {
+  if (set->force_max_reverse > 0) {
     const fl_set reversed = fl_reversed_set(set);
     wide other[2];
     const real v = fl_support_of_set(block, i, &reversed, price, other);
-    if (v > 0 && reversed.high * v > size * g.v) {
+    if (v > 0 && reversed.force_max * v > size * g.v) {
       force[0] = other[0];
       force[1] = other[1];
     }
@@ -337,7 +338,7 @@ int fl_undecided(const real *block, int i, const fl_set *set, const real *price,
   const response ahead = sector_response(block, a, set, 0, price);
   const response reverse = sector_response(block, a, &reversed, 0, price);
   const real lead = ahead.conjugate - reverse.conjugate;
-  const real width = blend_width(reversed.high_cost);
+  const real width = blend_width(reversed.cost_at_max);
   const real p = (1 + lead / SQRT(lead * lead + width * width)) / 2;
   const real dx = ahead.force[0] - reverse.force[0];
   const real dy = ahead.force[1] - reverse.force[1];

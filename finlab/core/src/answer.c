@@ -24,21 +24,21 @@ static void copy_commands(const real *block, real command[][3], real to[][3]) {
 
 /* An answer before anything is known: no forces. */
 static void begin_answer(const real *block, const real *wrench, fl_answer *out) {
-  out->value = 0;
-  out->status = FL_MET;
-  out->placed = 0;
-  memset(out->inner, 0, sizeof out->inner);
-  memset(out->price, 0, sizeof out->price);
+  out->gap_power_bound = 0;
+  out->newton_status = FL_MET;
+  out->has_foil_commands = 0;
+  memset(out->lambda_reduced, 0, sizeof out->lambda_reduced);
+  memset(out->prices, 0, sizeof out->prices);
   memset(out->force, 0, (size_t)COUNT(block) * sizeof out->force[0]);
-  memcpy(out->aim, wrench, sizeof out->aim);
+  memcpy(out->wrench_served, wrench, sizeof out->wrench_served);
 }
 
 /* Where nothing pushes, such as foils at rest: only no wrench is within reach. */
 static void answer_without_forces(const real *wrench, fl_answer *out) {
-  out->within = 1;
+  out->is_attainable = 1;
   for (int k = 0; k < 6; k++) {
-    if (wrench[k] != 0) out->within = 0;
-    out->aim[k] = 0;
+    if (wrench[k] != 0) out->is_attainable = 0;
+    out->wrench_served[k] = 0;
   }
 }
 
@@ -46,13 +46,14 @@ static void answer_without_forces(const real *wrench, fl_answer *out) {
    of the convex hulls; returns whether it is within reach of the sets. */
 static int leave_gaps(const real *block, fl_work *work, const real *target, int status, int within,
                       fl_answer *out) {
-  const int is_in_gap = fl_worst_gap(block, work, out->force, out->inner) >= 0;
+  const int is_in_gap = fl_worst_gap(block, work, out->force, out->lambda_reduced) >= 0;
   if (!within || !is_in_gap) return within && status == FL_MET;
   real bound;
-  out->value = 0;
+  out->gap_power_bound = 0;
   if (!fl_search_gaps(block, work, target, status, &bound)) return 0;
-  copy_forces(block, work->best, out->force);
-  if (!work->turns) out->value = bound * (1 - FINE); /* with turning it is more than power */
+  copy_forces(block, work->best_force, out->force);
+  if (!work->has_turn_cost)
+    out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
   return 1;
 }
 
@@ -65,45 +66,45 @@ static void find_forces(const real *block, fl_work *work, const real *wrench,
   real target[6];
   begin_answer(block, wrench, out);
   fl_reduce_wrench(work, wrench, target);
-  if (span->range == 0) {
+  if (span->rank == 0) {
     answer_without_forces(wrench, out);
     return;
   }
-  const int has_kinks = work->torn || work->drags || work->turns;
+  const int has_kinks = work->has_forks || work->has_drag || work->has_turn_cost;
   const int is_in_range = fl_is_in_range(work, wrench, target);
   int most_steps = MOST_STEPS;
   if (has_kinks) most_steps = STEPS_AT_KINK;
   const int status = fl_dual_newton(block, work, target, lambda, most_steps);
   const int may_be_met = status == FL_MET || (status == FL_STUCK && has_kinks);
   int within = may_be_met && is_in_range;
-  out->status = status;
-  memcpy(out->inner, work->now->price, sizeof out->inner);
-  copy_forces(block, work->now->force, out->force);
-  if (work->drags) {
+  out->newton_status = status;
+  memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
+  copy_forces(block, work->state_found->force, out->force);
+  if (work->has_drag) {
     within = is_in_range && fl_answer_with_drag(block, work, target, status, out);
-    if (within) copy_forces(block, work->best, out->force);
+    if (within) copy_forces(block, work->best_force, out->force);
   } else if (fl_may_have_gaps(block, work, out->force)) {
     within = leave_gaps(block, work, target, status, within, out);
   }
-  out->within = within;
+  out->is_attainable = within;
   if (!within && policy) {
-    out->placed = 0;
+    out->has_foil_commands = 0;
     fl_out_of_reach(block, work, wrench, policy, out);
   }
   for (int k = 0; k < 6; k++) {
-    out->price[k] = dot(span->basis[k], out->inner, span->range) / span->scale[k];
+    out->prices[k] = dot(span->basis[k], out->lambda_reduced, span->rank) / span->axis_scale[k];
   }
 }
 
 /* Reduced multipliers to begin with [W]: those of a question, which go to `lambda`, or those of the
    commands before in a tick; 0 where there are none, or none of use. */
 static const real *first_multipliers(const fl_work *work, const fl_question *q, real *lambda) {
-  if (q->price) {
-    fl_reduce_lambda(work, q->price, lambda);
+  if (q->prices) {
+    fl_reduce_lambda(work, q->prices, lambda);
     if (fl_are_within(lambda, 6, LARGEST)) return lambda;
     return 0;
   }
-  if (work->begins) return work->begin;
+  if (work->has_lambda_begin) return work->lambda_begin;
   return 0;
 }
 
@@ -113,9 +114,9 @@ static int may_pass_bands(const real *block, const fl_work *work, real command[]
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
-    if (work->span.lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
-    const int is_limited_below = work->box.low[i][k] > a->lower[k];
-    const int is_limited_above = work->box.high[i][k] < a->upper[k];
+    if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
+    const int is_limited_below = work->box.command_min[i][k] > a->command_min[k];
+    const int is_limited_above = work->box.command_max[i][k] < a->command_max[k];
     if (is_limited_below || is_limited_above) return 1;
   }
   return 0;
@@ -125,13 +126,13 @@ static int may_pass_bands(const real *block, const fl_work *work, real command[]
 static void wrench_that_counts(const fl_span *span, const fl_question *q, real *wrench) {
   for (int k = 0; k < 6; k++) {
     wrench[k] = 0;
-    if (span->counts[k]) wrench[k] = q->wrench[k];
+    if (span->axis_counts[k]) wrench[k] = q->wrench[k];
   }
 }
 
 /* What of a wrench the forces have to give: all but the wrench beside them. */
 static void take_off_offset(const fl_span *span, const real *wrench, real *of_forces) {
-  for (int k = 0; k < 6; k++) of_forces[k] = wrench[k] - span->beside[k];
+  for (int k = 0; k < 6; k++) of_forces[k] = wrench[k] - span->wrench_offset[k];
 }
 
 /* Has drives that give nothing in a tick pass through their dead bands: each goes, within its band,
@@ -145,13 +146,13 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q,
   fl_limits_without_tick(block, work);
   wrench_that_counts(&work->span, q, wrench);
   take_off_offset(&work->span, wrench, of_forces);
-  memcpy(work->aim, q->wrench, sizeof work->aim);
+  memcpy(work->wrench_target, q->wrench, sizeof work->wrench_target);
   find_forces(block, work, of_forces, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
-    const real most = a->band * INSIDE_BAND;
-    if (work->span.lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
+    const real most = a->dead_band * INSIDE_BAND;
+    if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     if (size_of(later.force[i]) < most) continue;
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
@@ -166,19 +167,19 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q,
    force has no price that a table could hold. */
 static void meet_by_laws(const real *block, fl_work *work, const real *wrench_desired,
                          fl_answer *out) {
-  const real *yard = HEAD(block)->yard;
+  const real *yard = HEAD(block)->wrench_scale;
   real missing[6];
-  for (int k = 0; k < 6; k++) missing[k] = (out->aim[k] - wrench_desired[k]) / yard[k];
-  if (out->within || SQRT(dot(missing, missing, 6)) > BEYOND_TABLES) return;
+  for (int k = 0; k < 6; k++) missing[k] = (out->wrench_served[k] - wrench_desired[k]) / yard[k];
+  if (out->is_attainable || SQRT(dot(missing, missing, 6)) > BEYOND_TABLES) return;
   real command[FL_MOST][3];
   copy_commands(block, out->command, command);
   const real error =
       fl_refine_commands(block, work, &work->box, wrench_desired, command, ROUNDS);
   if (error > NEARLY) return;
   copy_commands(block, command, out->command);
-  memcpy(out->aim, wrench_desired, sizeof out->aim);
-  out->within = 1;
-  out->value = 0;
+  memcpy(out->wrench_served, wrench_desired, sizeof out->wrench_served);
+  out->is_attainable = 1;
+  out->gap_power_bound = 0;
   out->error = error;
 }
 
@@ -190,40 +191,40 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   real of_forces[6];
   wrench_that_counts(span, q, wrench_desired);
   take_off_offset(span, wrench_desired, of_forces);
-  memcpy(work->aim, wrench_desired, sizeof work->aim);
-  work->steps = 0;
-  work->ended = 0;
-  work->previous = q->previous;
+  memcpy(work->wrench_target, wrench_desired, sizeof work->wrench_target);
+  work->newton_steps = 0;
+  work->is_truncated = 0;
+  work->command_previous = q->previous;
 
   real lambda[6];
   find_forces(block, work, of_forces, q->policy, first_multipliers(work, q, lambda), out);
   for (int k = 0; k < 6; k++) {
-    if (out->within) {
-      out->aim[k] = wrench_desired[k];
+    if (out->is_attainable) {
+      out->wrench_served[k] = wrench_desired[k];
     } else {
-      out->aim[k] += span->beside[k];
+      out->wrench_served[k] += span->wrench_offset[k];
     }
   }
-  if (!out->placed) {
+  if (!out->has_foil_commands) {
     fl_commands_for_forces(block, &work->box, out->force, q->previous, out->command);
     fl_leave_dead_bands(block, out->force, out->command);
   }
   const int steps = work->settings.command_steps;
-  out->error = fl_refine_commands(block, work, &work->box, out->aim, out->command, steps);
+  out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
   if (q->previous && may_pass_bands(block, work, out->command)) {
     pass_bands(block, work, q, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
-  out->steps = work->steps;
-  out->ended = work->ended;
+  out->newton_steps = work->newton_steps;
+  out->is_truncated = work->is_truncated;
 }
 
 static int is_valid_policy(const fl_policy *p) {
   if (p->policy < FL_CLOSEST || p->policy > FL_PRIORITY) return 0;
-  if (p->policy == FL_PRIORITY && (p->groups < 0 || p->groups > 6)) return 0;
-  if (p->policy == FL_CLOSEST && !fl_are_within(p->weight, 6, 1)) return 0;
+  if (p->policy == FL_PRIORITY && (p->group_count < 0 || p->group_count > 6)) return 0;
+  if (p->policy == FL_CLOSEST && !fl_are_within(p->axis_weight, 6, 1)) return 0;
   return 1;
 }
 
@@ -242,7 +243,7 @@ static int is_valid_question(const real *block, const fl_question *q) {
   if (q->ticks < 0) return 0;
   if (q->policy && !is_valid_policy(q->policy)) return 0;
   if (q->previous && !are_small_or_unknown(q->previous, 3 * n)) return 0;
-  if (q->toward && !are_small_or_unknown(q->toward, n)) return 0;
+  if (q->angles_wanted && !are_small_or_unknown(q->angles_wanted, n)) return 0;
   return 1;
 }
 
@@ -250,7 +251,7 @@ int fl_answer_one(const real *block, fl_work *work, const fl_question *q, fl_ans
   if (!is_valid_question(block, q)) return FL_BAD_ARGUMENT;
   if (!fl_prepare_question(block, work, q)) return FL_BAD_NUMBER;
   answer_question(block, work, q, out);
-  if (!fl_are_within(out->aim, 6, LARGEST_NUMBER)) return FL_BAD_NUMBER;
+  if (!fl_are_within(out->wrench_served, 6, LARGEST_NUMBER)) return FL_BAD_NUMBER;
   if (!fl_are_within(&out->error, 1, LARGEST_NUMBER)) return FL_BAD_NUMBER;
   return FL_OK;
 }

@@ -9,10 +9,11 @@
 static void take_set(const real *block, fl_work *work, int i, const real *numbers) {
   const real corners = numbers[0];
   const real *columns = numbers + 4;
-  work->set[i] = (fl_set){.high = numbers[1], .middle = numbers[2], .half = numbers[3]};
-  work->corners[i] = (int)corners;
+  work->set[i] = (fl_set){
+      .force_max = numbers[1], .sector_center = numbers[2], .sector_half_angle = numbers[3]};
+  work->polygon_offset[i] = (int)corners;
   fl_prepare_set(block, i, work->set + i);
-  memcpy(work->column[i], columns, sizeof work->column[i]);
+  memcpy(work->effectiveness_weighted[i], columns, sizeof work->effectiveness_weighted[i]);
 }
 
 /* Of `count` robots of n actuators in planes, which a block counts and no more, how far

@@ -87,11 +87,11 @@ static int used_numbers(real form) {
 }
 
 static int are_command_limits(const fl_actuator *a) {
-  const int used = used_numbers(a->form);
+  const int used = used_numbers(a->command_kind);
   for (int k = 0; k < 3; k++) {
-    if (!(a->step[k] >= 0)) return 0;
-    if (k < used && !(a->lower[k] <= a->upper[k])) return 0;
-    const int is_zero = a->lower[k] == 0 && a->upper[k] == 0;
+    if (!(a->max_change[k] >= 0)) return 0;
+    if (k < used && !(a->command_min[k] <= a->command_max[k])) return 0;
+    const int is_zero = a->command_min[k] == 0 && a->command_max[k] == 0;
     if (k >= used && !is_zero) return 0;
   }
   return 1;
@@ -99,30 +99,31 @@ static int are_command_limits(const fl_actuator *a) {
 
 /* Whether all offsets of an actuator are those of tables that it needs. */
 static int has_tables(const real *block, const fl_actuator *a) {
-  if (!is_table(block, a->ahead, FORCE_TABLE)) return 0;
-  if (!is_table_or_none(block, a->back, FORCE_TABLE)) return 0;
-  if (!is_table_or_none(block, a->gauge, GAUGE)) return 0;
-  if (a->form == FL_FIN && !is_table(block, a->beat, BEAT)) return 0;
-  if (a->form == FL_FOIL && !is_table(block, a->beat, CURVE)) return 0;
-  if (a->form >= FL_FIN) return is_grid(block, a->law);
-  return a->law == 0;
+  if (!is_table(block, a->force_table, FORCE_TABLE)) return 0;
+  if (!is_table_or_none(block, a->force_table_reverse, FORCE_TABLE)) return 0;
+  if (!is_table_or_none(block, a->gauge_table, GAUGE)) return 0;
+  if (a->command_kind == FL_FIN && !is_table(block, a->command_table, BEAT)) return 0;
+  if (a->command_kind == FL_FOIL && !is_table(block, a->command_table, CURVE)) return 0;
+  if (a->command_kind >= FL_FIN) return is_grid(block, a->law_grid);
+  return a->law_grid == 0;
 }
 
 /* An error code of one actuator. */
 static int check_actuator(const real *block, const fl_actuator *a) {
   if (a->rows != 1 && a->rows != 2) return FL_BAD_BLOCK;
-  if (!is_whole_number(a->form, FL_THRUSTER, FL_FOIL)) return FL_BAD_BLOCK;
+  if (!is_whole_number(a->command_kind, FL_THRUSTER, FL_FOIL)) return FL_BAD_BLOCK;
   if (!has_tables(block, a)) return FL_BAD_BLOCK;
   if (!are_command_limits(a)) return FL_BAD_NUMBER;
-  const real largest_price = block[(int)a->ahead];
+  const real largest_price = block[(int)a->force_table];
   if (!(largest_price > 0)) return FL_BAD_NUMBER;
-  if (a->back != 0 && !(block[(int)a->back] > 0)) return FL_BAD_NUMBER;
-  if (!(a->share > 0 && a->worth > 0 && a->most[0] > 0)) return FL_BAD_NUMBER;
-  if (!(a->low <= a->high && a->half >= 0)) return FL_BAD_NUMBER;
-  if (!(a->band >= 0 && a->speed >= 0 && a->doubt >= 0)) return FL_BAD_NUMBER;
-  if (!(a->gain[0] >= 0 && a->gain[1] >= 0)) return FL_BAD_NUMBER;
-  const int drags = a->form == FL_FOIL && a->rows == 2;
-  if (a->speed > 0 && !drags) return FL_BAD_BLOCK;
+  if (a->force_table_reverse != 0 && !(block[(int)a->force_table_reverse] > 0))
+    return FL_BAD_NUMBER;
+  if (!(a->force_scale > 0 && a->power_scale > 0 && a->row_force_max[0] > 0)) return FL_BAD_NUMBER;
+  if (!(a->force_min <= a->force_max && a->sector_half_angle >= 0)) return FL_BAD_NUMBER;
+  if (!(a->dead_band >= 0 && a->flow_speed >= 0 && a->uncertainty_cost >= 0)) return FL_BAD_NUMBER;
+  if (!(a->secant[0] >= 0 && a->secant[1] >= 0)) return FL_BAD_NUMBER;
+  const int drags = a->command_kind == FL_FOIL && a->rows == 2;
+  if (a->flow_speed > 0 && !drags) return FL_BAD_BLOCK;
   return FL_OK;
 }
 
@@ -136,10 +137,10 @@ int fl_check(const real *block, int length) {
   if (!fl_are_within(block, length, LARGEST_NUMBER)) return FL_BAD_NUMBER;
   if (!is_whole_number(head->n, 1, FL_MOST)) return FL_BAD_BLOCK;
   if (length < head_length + actuator_length * (int)head->n) return FL_BAD_BLOCK;
-  if (!is_whole_number(head->range, 0, 6)) return FL_BAD_BLOCK;
+  if (!is_whole_number(head->rank, 0, 6)) return FL_BAD_BLOCK;
   for (int k = 0; k < 6; k++) {
-    if (!(head->scale[k] > 0 && head->yard[k] > 0)) return FL_BAD_NUMBER;
-    if (head->counts[k] != 0 && head->counts[k] != 1) return FL_BAD_NUMBER;
+    if (!(head->axis_scale[k] > 0 && head->wrench_scale[k] > 0)) return FL_BAD_NUMBER;
+    if (head->is_commanded[k] != 0 && head->is_commanded[k] != 1) return FL_BAD_NUMBER;
   }
   for (int i = 0; i < COUNT(block); i++) {
     const int code = check_actuator(block, ACTUATOR(block, i));

@@ -16,9 +16,9 @@
 /* Makes a box of the limits of all commands of an actuator. */
 static void whole_box(const real *block, fl_box *box, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
-  memcpy(box->low[i], a->lower, sizeof a->lower);
-  memcpy(box->high[i], a->upper, sizeof a->upper);
-  box->free[i] = a->turns != 0;
+  memcpy(box->command_min[i], a->command_min, sizeof a->command_min);
+  memcpy(box->command_max[i], a->command_max, sizeof a->command_max);
+  box->is_free_angle[i] = a->is_free_angle != 0;
 }
 
 /* Narrows a box to the commands (3,) of an actuator that may follow one before after so many ticks;
@@ -27,21 +27,21 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
   const fl_actuator *a = ACTUATOR(block, i);
   for (int k = 0; k < 3; k++) {
     const int is_angle = k == fl_angle_number(a);
-    const real step = a->step[k] * ticks;
-    if (is_angle && a->turns != 0) {
+    const real step = a->max_change[k] * ticks;
+    if (is_angle && a->is_free_angle != 0) {
       if (!(step < PI)) continue; /* any angle is near enough */
-      box->low[i][k] = before[k] - step;
-      box->high[i][k] = before[k] + step;
-      box->free[i] = 0;
+      box->command_min[i][k] = before[k] - step;
+      box->command_max[i][k] = before[k] + step;
+      box->is_free_angle[i] = 0;
       continue;
     }
-    const real middle = (a->lower[k] + a->upper[k]) / 2;
+    const real middle = (a->command_min[k] + a->command_max[k]) / 2;
     real center = before[k];
     /* an angle of an arc may be told a whole turn off */
     if (is_angle) center = middle + fl_wrap_angle(center - middle);
-    center = fl_clipped(center, a->lower[k], a->upper[k]);
-    box->low[i][k] = fl_larger(center - step, a->lower[k]);
-    box->high[i][k] = fl_smaller(center + step, a->upper[k]);
+    center = fl_clipped(center, a->command_min[k], a->command_max[k]);
+    box->command_min[i][k] = fl_larger(center - step, a->command_min[k]);
+    box->command_max[i][k] = fl_smaller(center + step, a->command_max[k]);
   }
 }
 
@@ -51,14 +51,14 @@ static real power_at(const real *block, int i, const real *command, real *price)
   const fl_actuator *a = ACTUATOR(block, i);
   real force[3];
   fl_force_of_command(block, i, command, force, 0);
-  real size = a->sign * force[0];
+  real size = a->command_sign * force[0];
   if (is_plane(a)) size = size_of(force + 1);
-  if (a->form == FL_POD && command[1] < 0) size = -size;
-  if (a->gauge > 0) {
+  if (a->command_kind == FL_POD && command[1] < 0) size = -size;
+  if (a->gauge_table > 0) {
     const real direction = ATAN2(force[2], force[1]);
-    size /= fl_gauge_radius(block + (int)a->gauge, direction);
+    size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   }
-  const real within = fl_clipped(size, a->low, a->high);
+  const real within = fl_clipped(size, a->force_min, a->force_max);
   const real power = fl_power_and_price(block, i, within, price);
   if (size < 0) *price = -*price;
   return power;
@@ -73,9 +73,9 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
   int count = 0;
   for (int i = 0; i < COUNT(block); i++) {
     price[i] = 0;
-    if (work->span.lost[i]) continue;
+    if (work->span.is_lost[i]) continue;
     count++;
-    full += work->full_power[i];
+    full += work->power_max[i];
     const real *before = previous + 3 * i;
     if (fl_is_known_command(before)) power += power_at(block, i, before, price + i);
   }
@@ -101,11 +101,11 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
   real right[6] = {0};
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const real(*B)[6] = span->matrix[i];
+    const real(*B)[6] = span->effectiveness_reduced[i];
     const real *before = previous + 3 * i;
-    if (span->lost[i] || !fl_is_known_command(before) || fl_force_number(a) < 0) continue;
+    if (span->is_lost[i] || !fl_is_known_command(before) || fl_force_number(a) < 0) continue;
     real alpha = 0; /* a thruster has no second row */
-    if (a->form == FL_POD) alpha = before[0];
+    if (a->command_kind == FL_POD) alpha = before[0];
     const real c = COS(alpha);
     const real s = SIN(alpha);
     real ahead[6];
@@ -114,22 +114,22 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
       ahead[j] = c * B[0][j] + s * B[1][j];
       across[j] = c * B[1][j] - s * B[0][j];
     }
-    add_price(H, right, ahead, a->gain[0], price[i]);
-    add_price(H, right, across, ACROSS * a->gain[0], 0);
+    add_price(H, right, ahead, a->secant[0], price[i]);
+    add_price(H, right, across, ACROSS * a->secant[0], 0);
   }
   const int is_at_rest = !(dot(right, right, 6) > 0);
   if (is_at_rest) return; /* multipliers of 0 tell Newton's method nothing */
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace + TINY;
   if (!fl_factor(H)) return;
-  fl_solve(H, right, work->begin);
-  work->begins = 1;
+  fl_solve(H, right, work->lambda_begin);
+  work->has_lambda_begin = 1;
 }
 
 /* Whether rates leave a number of a command all of its range. */
 static int has_full_range(const real *block, const fl_box *box, int i, int k) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return box->low[i][k] <= a->lower[k] && box->high[i][k] >= a->upper[k];
+  return box->command_min[i][k] <= a->command_min[k] && box->command_max[i][k] >= a->command_max[k];
 }
 
 /* The forces that an actuator's box gives, within its limits. Where rates leave it all of its
@@ -140,13 +140,14 @@ static force_range range_of_tick(const real *block, const fl_work *work, int i, 
   const int all_sizes = has_full_range(block, box, i, 0) && has_full_range(block, box, i, 1);
   const int all_angles = has_full_range(block, box, i, 2);
   if (all_sizes && all_angles && !is_costly) {
-    const force_range whole = {a->least, a->high, a->middle, a->half};
+    const force_range whole = {a->force_min_needed, a->force_max, a->sector_center,
+                               a->sector_half_angle};
     return whole;
   }
   force_range range = fl_force_range(block, i, box);
-  if (a->form == FL_FIN && all_sizes) {
-    range.low = a->low;
-    range.high = a->high;
+  if (a->command_kind == FL_FIN && all_sizes) {
+    range.low = a->force_min;
+    range.high = a->force_max;
   }
   return range;
 }
@@ -158,24 +159,25 @@ static void tick_set(const real *block, fl_work *work, int i, real angle, real k
   fl_set *set = work->set + i;
   const int is_costly = kappa > 0;
   const force_range range = range_of_tick(block, work, i, is_costly);
-  const real low = fl_clipped(range.low, a->low, a->high);
-  const real high = fl_clipped(range.high, a->low, a->high);
+  const real low = fl_clipped(range.low, a->force_min, a->force_max);
+  const real high = fl_clipped(range.high, a->force_min, a->force_max);
   fl_limit_set(block, i, set, low, high, range.middle, range.half);
   if (!is_costly) return;
   real at = angle;
-  if (set->flipped) at += PI;
-  set->turn = kappa;
-  set->steepest = work->steepest[i];
-  set->at = set->middle + fl_wrap_angle(at - set->middle);
+  if (set->is_flipped) at += PI;
+  set->turn_cost = kappa;
+  set->slope_max = work->slope_max[i];
+  set->turn_origin = set->sector_center + fl_wrap_angle(at - set->sector_center);
 }
 
 /* Makes the set of an actuator outside of ticks. */
 static void whole_set(const real *block, fl_work *work, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (work->span.lost[i]) {
+  if (work->span.is_lost[i]) {
     fl_empty_set(block, i, work->set + i);
   } else {
-    fl_limit_set(block, i, work->set + i, a->least, a->high, a->middle, a->half);
+    fl_limit_set(block, i, work->set + i, a->force_min_needed, a->force_max, a->sector_center,
+                 a->sector_half_angle);
   }
 }
 
@@ -195,9 +197,9 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
    little. With such a cost it would stay for ever, and leave its work to others at a fifth more
    power. */
 static real turning_cost_of(const fl_actuator *a, real calm, real power, real ticks) {
-  const int has_rate = a->step[0] > 0 && a->step[0] < QUICK;
-  if (a->form != FL_POD || !has_rate) return 0;
-  return calm * power / (a->step[0] * ticks);
+  const int has_rate = a->max_change[0] > 0 && a->max_change[0] < QUICK;
+  if (a->command_kind != FL_POD || !has_rate) return 0;
+  return calm * power / (a->max_change[0] * ticks);
 }
 
 /* The same in a tick after the previous commands (n, 3) of a question, of which rows may be NaN.
@@ -211,27 +213,28 @@ void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
   for (int i = 0; i < COUNT(block); i++) {
     const real *before = q->previous + 3 * i;
     whole_box(block, &work->box, i);
-    if (work->span.lost[i] || !fl_is_known_command(before)) {
+    if (work->span.is_lost[i] || !fl_is_known_command(before)) {
       whole_set(block, work, i);
       continue;
     }
     real angle = before[0];
-    const int is_wanted = q->toward && q->toward[i] == q->toward[i]; /* not NaN */
-    if (is_wanted) angle = q->toward[i];
+    const int is_wanted =
+        q->angles_wanted && q->angles_wanted[i] == q->angles_wanted[i]; /* not NaN */
+    if (is_wanted) angle = q->angles_wanted[i];
     box_after(block, &work->box, i, before, ticks);
     const real kappa = turning_cost_of(ACTUATOR(block, i), q->calm, power, ticks);
     tick_set(block, work, i, angle, kappa);
   }
   work->is_whole = 0;
   fl_prepare_sets(block, work);
-  if (work->turns) begin_as_before(block, work, q->previous, price);
+  if (work->has_turn_cost) begin_as_before(block, work, q->previous, price);
 }
 
 /* Prepares the work area for what a question says that holds now; 0 where its numbers are out of
    range. */
 int fl_prepare_question(const real *block, fl_work *work, const fl_question *q) {
   if (!fl_span_of_question(block, work, q->lost, q->free)) return 0;
-  work->begins = 0;
+  work->has_lambda_begin = 0;
   if (q->previous) {
     fl_limits_of_tick(block, work, q);
   } else if (!work->is_whole) {
@@ -243,18 +246,18 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q) 
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
   work->ray = 0;
-  work->refined = 0;
-  work->begins = 0;
+  work->refine_steps = 0;
+  work->has_lambda_begin = 0;
   fl_usual_settings(&work->settings);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    work->steepest[i] = 0;
-    if (a->form == FL_POD) work->steepest[i] = fl_largest_slope(block, i);
-    const real power_high = fl_power_of_force(block, i, a->high);
-    const real power_low = fl_power_of_force(block, i, a->low);
-    work->full_power[i] = fl_larger(power_high, power_low);
+    work->slope_max[i] = 0;
+    if (a->command_kind == FL_POD) work->slope_max[i] = fl_largest_slope(block, i);
+    const real power_high = fl_power_of_force(block, i, a->force_max);
+    const real power_low = fl_power_of_force(block, i, a->force_min);
+    work->power_max[i] = fl_larger(power_high, power_low);
   }
-  for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
+  for (int k = 0; k < 6; k++) work->span.axis_counts[k] = HEAD(block)->is_commanded[k] != 0;
   if (!fl_prepare_span(block, work, 1)) return FL_BAD_NUMBER;
   fl_limits_without_tick(block, work);
   return FL_OK;

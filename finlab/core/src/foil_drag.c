@@ -23,7 +23,7 @@
 #define STALLED_MORE R(0.1)
 
 /* Whether an actuator is a foil in a flow, whose drag counts. */
-static int is_foil(const fl_actuator *a) { return a->speed > 0; }
+static int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
 
 /* A foil at an angle: force, cost and their slopes; all of the tangent but its curvature. */
 static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
@@ -34,12 +34,13 @@ static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   fl_force_of_command(block, i, command, force, by);
   const real lift = force[0];
   const real d_lift = by[0][0];
-  const real drag = force[1] + a->pressure * a->rest;
+  const real drag = force[1] + a->pressure_area * a->zero_lift_drag;
   const real d_drag = by[0][1];
   memcpy(tangent->force, force, sizeof tangent->force);
-  memcpy(tangent->slope, by[0], sizeof tangent->slope);
-  tangent->cost = a->speed * drag + a->doubt * (lift * lift + drag * drag);
-  tangent->pay = a->speed * d_drag + 2 * a->doubt * (lift * d_lift + drag * d_drag);
+  memcpy(tangent->force_slope, by[0], sizeof tangent->force_slope);
+  tangent->cost = a->flow_speed * drag + a->uncertainty_cost * (lift * lift + drag * drag);
+  tangent->cost_slope =
+      a->flow_speed * d_drag + 2 * a->uncertainty_cost * (lift * d_lift + drag * d_drag);
 }
 
 /* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less
@@ -47,23 +48,25 @@ static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
 static void draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
                          fl_tangent *tangent, fl_set *set) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real low = box->low[i][0];
-  const real high = box->high[i][0];
+  const real low = box->command_min[i][0];
+  const real high = box->command_max[i][0];
   const real most_turn = TRUST * (high - low);
   const real apart = CLOSE * (high - low) + TINY;
   fl_tangent other;
   foil_at(block, i, angle + apart, &other);
   foil_at(block, i, angle, tangent);
   /* Change of the slope of cost - s.force over `apart`. */
-  const real change = other.pay - tangent->pay - dot(s, other.slope, 2) + dot(s, tangent->slope, 2);
-  tangent->bend = fl_larger(FABS(change) / apart, CLOSE * a->speed * a->pressure + TINY);
-  const real most_cost =
-      tangent->cost + FABS(tangent->pay) * most_turn + tangent->bend * most_turn * most_turn;
-  set->low = fl_larger(low - angle, -most_turn);
-  set->high = fl_smaller(high - angle, most_turn);
+  const real change = other.cost_slope - tangent->cost_slope - dot(s, other.force_slope, 2) +
+                      dot(s, tangent->force_slope, 2);
+  tangent->curvature =
+      fl_larger(FABS(change) / apart, CLOSE * a->flow_speed * a->pressure_area + TINY);
+  const real most_cost = tangent->cost + FABS(tangent->cost_slope) * most_turn +
+                         tangent->curvature * most_turn * most_turn;
+  set->force_min = fl_larger(low - angle, -most_turn);
+  set->force_max = fl_smaller(high - angle, most_turn);
   set->tangent = tangent;
-  set->low_cost = most_cost;
-  set->high_cost = most_cost;
+  set->cost_at_min = most_cost;
+  set->cost_at_max = most_cost;
 }
 
 /* Forces along the rows of commands, and their cost [W]. */
@@ -74,7 +77,7 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
     const fl_actuator *a = ACTUATOR(block, i);
     force[i][0] = 0;
     force[i][1] = 0;
-    if (work->span.lost[i]) continue;
+    if (work->span.is_lost[i]) continue;
     real along[3];
     fl_force_of_command(block, i, command[i], along, 0);
     real size;
@@ -83,10 +86,11 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
       force[i][1] = along[2];
       size = size_of(force[i]);
     } else {
-      force[i][0] = a->sign * along[0];
+      force[i][0] = a->command_sign * along[0];
       size = force[i][0];
     }
-    if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(along[2], along[1]));
+    if (a->gauge_table > 0)
+      size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
     if (is_foil(a)) {
       fl_tangent tangent;
       foil_at(block, i, command[i][0], &tangent);
@@ -94,15 +98,15 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
       cost += tangent.cost;
       continue;
     }
-    if (a->form == FL_POD && command[i][1] < 0) size = -size;
+    if (a->command_kind == FL_POD && command[i][1] < 0) size = -size;
     cost += fl_power_of_force(block, i, size);
   }
   return cost;
 }
 
 static int has_gap(const fl_actuator *a, const fl_set *set) {
-  if (is_plane(a)) return set->forked || set->reverse > 0;
-  return a->band > 0;
+  if (is_plane(a)) return set->is_forked || set->force_max_reverse > 0;
+  return a->dead_band > 0;
 }
 
 /* Narrows sets and limits of other actuators to the side of a gap on which their forces are. */
@@ -114,15 +118,15 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
     if (has_gap(a, set)) {
       fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
     }
-    if (a->form != FL_THRUSTER || !(a->band > 0)) continue;
-    real low = set->low;
-    real high = set->high;
-    if (!(a->sign > 0)) {
-      low = -set->high;
-      high = -set->low;
+    if (a->command_kind != FL_THRUSTER || !(a->dead_band > 0)) continue;
+    real low = set->force_min;
+    real high = set->force_max;
+    if (!(a->command_sign > 0)) {
+      low = -set->force_max;
+      high = -set->force_min;
     }
-    box->low[i][0] = fl_larger(box->low[i][0], low);
-    box->high[i][0] = fl_smaller(box->high[i][0], high);
+    box->command_min[i][0] = fl_larger(box->command_min[i][0], low);
+    box->command_max[i][0] = fl_smaller(box->command_max[i][0], high);
     command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
   }
 }
@@ -131,11 +135,11 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
 static void take_step(const real *block, const fl_work *work, const fl_box *box, real force[][2],
                       real share, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.lost[i]) continue;
-    const real *answer = work->now->force[i];
+    if (work->span.is_lost[i]) continue;
+    const real *answer = work->state_found->force[i];
     const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
     if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
-      const real *slope = work->tangent[i].slope;
+      const real *slope = work->tangent[i].force_slope;
       const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
       command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
       continue;
@@ -151,10 +155,10 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
 static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   int free = 0;
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.lost[i]) continue;
-    for (int c = 0; c < 3; c++) free += box->high[i][c] > box->low[i][c];
+    if (work->span.is_lost[i]) continue;
+    for (int c = 0; c < 3; c++) free += box->command_max[i][c] > box->command_min[i][c];
   }
-  return free < work->span.range;
+  return free < work->span.rank;
 }
 
 /* Steps towards work->aim, of which so many in a row have to halve the error: most starts
@@ -164,7 +168,7 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
   real error = NONE;
   for (int k = 0; k < 2 * ROUNDS; k += steps) {
     const real before = error;
-    error = fl_refine_commands(block, work, box, work->aim, command, steps);
+    error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
     if (error <= EXACT || error > before / 2) return;
   }
 }
@@ -175,12 +179,12 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
   real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
+  for (int k = 0; k < 6; k++) size += FABS(work->wrench_target[k]) / HEAD(block)->wrench_scale[k];
   if (most_error > EXACT) {
     approach(block, work, box, command, ROUNDS / 2);
     steps = 0;
   }
-  const real error = fl_refine_commands(block, work, box, work->aim, command, steps);
+  const real error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
   return error <= most_error + ROUNDING * size;
 }
 
@@ -195,9 +199,9 @@ static real error_allowed(const real *block, const fl_work *work, const fl_box *
 static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
+    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     real s[2];
-    own_price(work, i, lambda, s);
+    actuator_price(work, i, lambda, s);
     draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
   }
 }
@@ -214,7 +218,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     if (has_moved) draw_tangents(block, work, box, lambda, command);
     fl_prepare_sets(block, work);
     if (has_moved && fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK) == FL_MET) {
-      memcpy(lambda, work->now->price, sizeof work->now->price);
+      memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
     }
     real stepped[FL_MOST][3];
     real force_stepped[FL_MOST][2];
@@ -266,33 +270,34 @@ static void improve_from(const real *block, fl_work *work, const real *target, c
   const real cost = settle(block, work, target, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
-  memcpy(work->placed, command, sizeof work->placed);
-  memcpy(work->best, force, sizeof force);
-  memcpy(work->near, lambda_near, sizeof lambda_near);
+  memcpy(work->best_command, command, sizeof work->best_command);
+  memcpy(work->best_force, force, sizeof force);
+  memcpy(work->best_lambda, lambda_near, sizeof lambda_near);
 }
 
 /* The same of the forces and multipliers that Newton's method came to. */
 void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best_cost) {
   real command[FL_MOST][3];
-  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, command);
-  improve_from(block, work, target, work->now->price, command, best_cost);
+  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                         command);
+  improve_from(block, work, target, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* The last lift coefficient of a foil's table and its angle [rad]: beyond, it stalls and
    drags more. */
 static const real *end_of(const real *block, const fl_actuator *a) {
-  const real *curve = block + (int)a->beat;
+  const real *curve = block + (int)a->command_table;
   return curve + 2 * (int)curve[0] - 1;
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
 static int may_stall(const real *block, const fl_work *work, int i, int end, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  *command = work->box.low[i][0];
-  if (end) *command = work->box.high[i][0];
-  if (!is_foil(a) || work->span.lost[i]) return 0;
+  *command = work->box.command_min[i][0];
+  if (end) *command = work->box.command_max[i][0];
+  if (!is_foil(a) || work->span.is_lost[i]) return 0;
   const real stall_angle = end_of(block, a)[1];
-  return FABS(*command - a->turned) > stall_angle;
+  return FABS(*command - a->zero_lift_angle) > stall_angle;
 }
 
 /* How much more than its conjugate in the dual a foil is worth, at the multipliers so far,
@@ -301,11 +306,11 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
 static real worth_of_stall(const real *block, const fl_work *work, int i, int end, real limit) {
   const fl_actuator *a = ACTUATOR(block, i);
   real s[2];
-  own_price(work, i, work->now->price, s);
+  actuator_price(work, i, work->state_found->lambda_reduced, s);
   const response known = fl_response(block, i, work->set + i, s);
   real stall_angle = end_of(block, a)[1];
   if (!end) stall_angle = -stall_angle;
-  const real begin = a->turned + stall_angle;
+  const real begin = a->zero_lift_angle + stall_angle;
   real more = 0;
   for (int k = 1; k <= ROUNDS; k++) {
     fl_tangent tangent;
@@ -320,8 +325,8 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
    stall, which its sets leave out: no commands give the target for less. `most_cost` is what
    none cost more than. */
 static real proved_value(const real *block, const fl_work *work, real *most_cost) {
-  real value = work->now->value;
-  *most_cost = work->most_cost * (1 + CLOSE) + NOTHING;
+  real value = work->state_found->dual_value;
+  *most_cost = work->power_cost_max * (1 + CLOSE) + NOTHING;
   for (int i = 0; i < COUNT(block); i++) {
     for (int end = 0; end < 2; end++) {
       real limit;
@@ -365,10 +370,11 @@ typedef struct {
 /* Ends of the branches of a foil's lift within its limits; how many branches there are. */
 static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real low = work->box.low[i][0];
-  const real high = work->box.high[i][0];
+  const real low = work->box.command_min[i][0];
+  const real high = work->box.command_max[i][0];
   const real stall_angle = end_of(block, a)[1];
-  const real turn[BRANCHES - 1] = {a->turned - stall_angle, a->turned, a->turned + stall_angle};
+  const real turn[BRANCHES - 1] = {a->zero_lift_angle - stall_angle, a->zero_lift_angle,
+                                   a->zero_lift_angle + stall_angle};
   int branches = 0;
   edge[0] = low;
   for (int k = 0; k < BRANCHES - 1; k++) {
@@ -401,7 +407,7 @@ static int nodes_of_branch(const lattice *grid) {
 static void find_branches(const real *block, const fl_work *work, lattice *grid) {
   grid->foils = 0;
   for (int i = 0; i < COUNT(block) && grid->foils < LAID; i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
+    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     const int f = grid->foils;
     grid->branches[f] = edges_of(block, work, i, grid->edge[f]);
     grid->foil[f] = i;
@@ -414,7 +420,7 @@ static void find_branches(const real *block, const fl_work *work, lattice *grid)
 static void lay_nodes(const real *block, const fl_work *work, lattice *grid) {
   int node = 0;
   for (int f = 0; f < grid->foils; f++) {
-    const real(*B)[6] = work->span.matrix[grid->foil[f]];
+    const real(*B)[6] = work->span.effectiveness_reduced[grid->foil[f]];
     grid->first[f] = node;
     for (int k = 0; k < grid->branches[f] * grid->each; k++) {
       const real *edge = grid->edge[f] + k / grid->each;
@@ -438,7 +444,8 @@ static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) fl_add_square(H, work->span.matrix[i][q], a->gain[q]);
+    for (int q = 0; q < (int)a->rows; q++)
+      fl_add_square(H, work->span.effectiveness_reduced[i][q], a->secant[q]);
   }
   const real ridge = fl_larger(NOTHING, ROUNDING) * fl_trace(H) + TINY;
   for (int j = 0; j < 6; j++) H[j][j] += ridge;
@@ -447,8 +454,8 @@ static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (is_foil(a)) continue;
     for (int q = 0; q < (int)a->rows; q++) {
-      fl_solve(H, work->span.matrix[i][q], grid->row[i][q]);
-      for (int j = 0; j < 6; j++) grid->row[i][q][j] *= a->gain[q];
+      fl_solve(H, work->span.effectiveness_reduced[i][q], grid->row[i][q]);
+      for (int j = 0; j < 6; j++) grid->row[i][q][j] *= a->secant[q];
     }
   }
 }
@@ -456,11 +463,11 @@ static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
 /* Holds a force within the limits of a set but for its direction; its size. */
 static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
   if (!is_plane(a)) {
-    force[0] = fl_clipped(force[0], set->low, set->high);
+    force[0] = fl_clipped(force[0], set->force_min, set->force_max);
     return FABS(force[0]);
   }
   const real wanted = size_of(force);
-  const real size = fl_smaller(wanted, fl_larger(set->high, set->reverse));
+  const real size = fl_smaller(wanted, fl_larger(set->force_max, set->force_max_reverse));
   for (int q = 0; q < 2; q++) force[q] *= size / fl_larger(wanted, TINY);
   return size;
 }
@@ -488,13 +495,13 @@ static real cost_at_point(const real *block, const fl_work *work, const lattice 
     if (is_foil(a)) continue;
     for (int q = 0; q < (int)a->rows; q++) y[q] = dot(grid->row[i][q], left, 6);
     const real size = held_force(a, set, y);
-    const real share = size / a->most[0];
-    cost += fl_larger(set->high_cost, set->low_cost) * share * SQRT(share);
+    const real share = size / a->row_force_max[0];
+    cost += fl_larger(set->cost_at_max, set->cost_at_min) * share * SQRT(share);
     for (int q = 0; q < (int)a->rows; q++) {
-      for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.matrix[i][q][j];
+      for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.effectiveness_reduced[i][q][j];
     }
   }
-  return cost + ROUNDS * work->most_cost * SQRT(dot(residual, residual, 6));
+  return cost + ROUNDS * work->power_cost_max * SQRT(dot(residual, residual, 6));
 }
 
 /* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there
@@ -563,14 +570,14 @@ static void begin_at(const real *block, fl_work *work, const lattice *grid, cons
   real force[FL_MOST][2];
   fl_box box = work->box;
   cost_at_point(block, work, grid, target, begin->node, force);
-  fl_commands_for_forces(block, &work->box, force, work->previous, command);
+  fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
   for (int f = 0; f < grid->foils; f++) {
     const int node = begin->node[f];
     const int branch = (node - grid->first[f]) / grid->each;
     const int i = grid->foil[f];
     command[i][0] = grid->angle[node];
-    box.low[i][0] = grid->edge[f][branch];
-    box.high[i][0] = grid->edge[f][branch + 1];
+    box.command_min[i][0] = grid->edge[f][branch];
+    box.command_max[i][0] = grid->edge[f][branch + 1];
   }
   approach(block, work, &box, command, ROUNDS / 2);
   approach(block, work, &work->box, command, ROUNDS / 2);
@@ -627,7 +634,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
       if (*best_cost < NONE)
-        memcpy(command, work->placed, sizeof command);
+        memcpy(command, work->best_command, sizeof command);
       else
         memcpy(command, start, sizeof command);
       command[i][0] = angle;
@@ -645,8 +652,9 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   const real enough = proved * (1 + CLOSE);
   real start[FL_MOST][3];
   real lambda[6];
-  memcpy(lambda, work->now->price, sizeof lambda);
-  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, start);
+  memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
+  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                         start);
   fl_improve_commands(block, work, target, best_cost);
   if (*best_cost <= enough) return;
   improve_from_stalls(block, work, target, lambda, start, best_cost);
@@ -663,19 +671,20 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
 /* Commands for forces that the dual is sure of: no foil drags more than its lift does, and
    none is in doubt. */
 int fl_are_forces_sure(const real *block, fl_work *work) {
-  fl_state *state = work->now;
+  fl_state *state = work->state_found;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    if (a->doubt > 0) return 0;
+    if (a->uncertainty_cost > 0) return 0;
     if (!is_foil(a)) continue;
-    const real largest_lift = a->pressure * (1 - NOTHING) * end_of(block, a)[0];
+    const real largest_lift = a->pressure_area * (1 - NOTHING) * end_of(block, a)[0];
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
-  if (fl_worst_gap(block, work, state->force, state->price) >= 0) return 0;
-  memcpy(work->best, state->force, sizeof work->best);
-  fl_commands_for_forces(block, &work->box, work->best, work->previous, work->placed);
+  if (fl_worst_gap(block, work, state->force, state->lambda_reduced) >= 0) return 0;
+  memcpy(work->best_force, state->force, sizeof work->best_force);
+  fl_commands_for_forces(block, &work->box, work->best_force, work->command_previous,
+                         work->best_command);
   const real most_error = error_allowed(block, work, &work->box);
-  return come_to_give(block, work, &work->box, work->placed, ROUNDS, most_error);
+  return come_to_give(block, work, &work->box, work->best_command, ROUNDS, most_error);
 }
 
 /* Whether some foil may stall within its limits: it then gives more than its table. */
@@ -697,7 +706,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   real below_most = NEARLY;
   real start[FL_MOST][3];
   if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
-  fl_commands_for_forces(block, &work->box, out->force, work->previous, start);
+  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < 2 * ROUNDS; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
     const int has_found = found > 0;
@@ -706,8 +715,8 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     real wrench_served[6]; /* by forces */
     real target[6];
     for (int j = 0; j < 6; j++) {
-      work->aim[j] = ray_share * (wrench[j] + work->span.beside[j]);
-      wrench_served[j] = work->aim[j] - work->span.beside[j];
+      work->wrench_target[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
+      wrench_served[j] = work->wrench_target[j] - work->span.wrench_offset[j];
     }
     fl_reduce_wrench(work, wrench_served, target);
     real command[FL_MOST][3];
@@ -720,7 +729,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, out->command, sizeof command);
       else
         memcpy(command, start, sizeof command);
-      memcpy(lambda, out->inner, sizeof lambda);
+      memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
       is_met = settle(block, work, target, EXACT, lambda, command, force) < NONE;
     }
@@ -730,9 +739,9 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
       continue;
     }
     found = ray_share;
-    out->placed = 1;
+    out->has_foil_commands = 1;
     memcpy(out->command, command, sizeof command);
-    memcpy(out->inner, lambda, sizeof lambda);
-    memcpy(out->aim, wrench_served, sizeof wrench_served);
+    memcpy(out->lambda_reduced, lambda, sizeof lambda);
+    memcpy(out->wrench_served, wrench_served, sizeof wrench_served);
   }
 }

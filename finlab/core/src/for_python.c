@@ -38,18 +38,18 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
     memcpy(force, out.force, 2 * n * sizeof *force);
-    memcpy(price, out.price, sizeof out.price);
-    memcpy(aim, out.aim, sizeof out.aim);
+    memcpy(price, out.prices, sizeof out.prices);
+    memcpy(aim, out.wrench_served, sizeof out.wrench_served);
     memcpy(command, out.command, 3 * n * sizeof *command);
     wrench += 6;
     force += 2 * n;
     price += 6;
     aim += 6;
     command += 3 * n;
-    value[k] = out.value;
-    within[k] = (unsigned char)out.within;
+    value[k] = out.gap_power_bound;
+    within[k] = (unsigned char)out.is_attainable;
     error[k] = out.error;
-    ended |= out.ended;
+    ended |= out.is_truncated;
   }
   if (ended) return -1;
   return FL_OK;
@@ -63,7 +63,7 @@ real fl_look(const real *block, fl_work *work, const real *wrench, const real *i
   fl_reduce_wrench(work, wrench, target);
   fl_dual_at(block, work, target, inner, state);
   memcpy(force, state->force, (size_t)COUNT(block) * sizeof state->force[0]);
-  return state->value;
+  return state->dual_value;
 }
 
 /* What one actuator's force is worth at its prices s, of all that it may give now. */
@@ -71,19 +71,19 @@ static fl_actuator_worth worth_at(const real *block, int i, const fl_set *set, c
   wide unused[2];
   const real along_force = fl_support_of_set(block, i, set, s, unused);
   fl_actuator_worth worth = {0};
-  if (set->flipped) {
-    worth.price_back = along_force;
-    worth.low = -set->high;
-    worth.high = -set->low;
+  if (set->is_flipped) {
+    worth.price_reverse = along_force;
+    worth.force_min = -set->force_max;
+    worth.force_max = -set->force_min;
   } else {
-    worth.price = along_force;
-    worth.low = set->low;
-    worth.high = set->high;
+    worth.price_ahead = along_force;
+    worth.force_min = set->force_min;
+    worth.force_max = set->force_max;
   }
-  if (set->reverse > 0) {
+  if (set->force_max_reverse > 0) {
     const fl_set back = fl_reversed_set(set);
-    worth.price_back = fl_support_of_set(block, i, &back, s, unused);
-    worth.low = -set->reverse;
+    worth.price_reverse = fl_support_of_set(block, i, &back, s, unused);
+    worth.force_min = -set->force_max_reverse;
   }
   worth.conjugate = fl_response(block, i, set, s).conjugate;
   return worth;
@@ -99,7 +99,7 @@ int fl_worth(const real *block, fl_work *work, const fl_question *question, cons
     fl_reduce_lambda(work, price + 6 * k, lambda);
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
-      own_price(work, i, lambda, s);
+      actuator_price(work, i, lambda, s);
       *worth = worth_at(block, i, work->set + i, s);
       worth++;
     }

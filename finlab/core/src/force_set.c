@@ -12,20 +12,20 @@
 
 /* The table of force over price of an actuator, or that in reverse where it has one. */
 static const real *table_of(const real *block, const fl_actuator *a, int is_reverse) {
-  if (is_reverse && a->back > 0) return block + (int)a->back;
-  return block + (int)a->ahead;
+  if (is_reverse && a->force_table_reverse > 0) return block + (int)a->force_table_reverse;
+  return block + (int)a->force_table;
 }
 
 /* T(v), T'(v) and C(v) of an actuator without limits, Eq. 16, at a price v [W/N]. Its force is
    k_T times that of the table, its power k_P times: so the table is asked at v k_T / k_P. */
 static line_response at_price(const real *block, const fl_actuator *a, int is_reverse, real v) {
   real ratio = 1; /* k_T / k_P */
-  if (a->share != a->worth) ratio = a->share / a->worth;
+  if (a->force_scale != a->power_scale) ratio = a->force_scale / a->power_scale;
   const line_response table = fl_force_of_price(table_of(block, a, is_reverse), v * ratio);
   line_response scaled;
-  scaled.force = table.force * a->share;
-  scaled.slope = table.slope * a->share * ratio;
-  scaled.conjugate = table.conjugate * a->worth;
+  scaled.force = table.force * a->force_scale;
+  scaled.slope = table.slope * a->force_scale * ratio;
+  scaled.conjugate = table.conjugate * a->power_scale;
   return scaled;
 }
 
@@ -38,8 +38,8 @@ real fl_power_of_force(const real *block, int i, real force) {
 real fl_power_and_price(const real *block, int i, real force, real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *table = table_of(block, a, force < 0);
-  const real power = a->worth * fl_marginal_cost(table, FABS(force) / a->share, price);
-  if (price) *price *= a->worth / a->share;
+  const real power = a->power_scale * fl_marginal_cost(table, FABS(force) / a->force_scale, price);
+  if (price) *price *= a->power_scale / a->force_scale;
   return power;
 }
 
@@ -47,27 +47,27 @@ real fl_power_and_price(const real *block, int i, real force, real *price) {
    direction is rounding, and whether its arc has two ends that may be worth the same. */
 static void set_ends(int plane, fl_set *set) {
   real least = 0;
-  if (set->high > 0) least = NOTHING * set->high_cost / set->high;
-  if (set->low > 0) {
+  if (set->force_max > 0) least = NOTHING * set->cost_at_max / set->force_max;
+  if (set->force_min > 0) {
     real turning = TURNING;
-    if (set->half <= NARROW) turning = CLOSE;
-    least = fl_larger(least, turning * set->low_cost / set->low);
+    if (set->sector_half_angle <= NARROW) turning = CLOSE;
+    least = fl_larger(least, turning * set->cost_at_min / set->force_min);
   }
-  set->gap2 = least * least + TINY;
+  set->price_floor_squared = least * least + TINY;
 
-  const int is_arc = set->half < PI;
-  const int is_wide = set->half > PI / 2;
-  const int has_hole = set->low > 0 && set->half > 0;
-  set->forked = plane && is_arc && (is_wide || has_hole);
+  const int is_arc = set->sector_half_angle < PI;
+  const int is_wide = set->sector_half_angle > PI / 2;
+  const int has_hole = set->force_min > 0 && set->sector_half_angle > 0;
+  set->is_forked = plane && is_arc && (is_wide || has_hole);
 }
 
 /* Sets what follows from the limits and the arc of a set. */
 void fl_prepare_set(const real *block, int i, fl_set *set) {
   set_ends(is_plane(ACTUATOR(block, i)), set);
-  set->cos_middle = COS(set->middle);
-  set->sin_middle = SIN(set->middle);
-  set->cos_half = COS(set->half);
-  set->sin_half = SIN(set->half);
+  set->cos_center = COS(set->sector_center);
+  set->sin_center = SIN(set->sector_center);
+  set->cos_half_angle = COS(set->sector_half_angle);
+  set->sin_half_angle = SIN(set->sector_half_angle);
 }
 
 /* Leaves of an interval of forces what is outside of a dead band, and rest: commands within the
@@ -85,49 +85,49 @@ static void without_band(real band, real *low, real *high) {
    interval, and the largest size in reverse beside it. */
 void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, real middle,
                   real half) {
-  without_band(ACTUATOR(block, i)->band, &low, &high);
+  without_band(ACTUATOR(block, i)->dead_band, &low, &high);
   const int plane = is_plane(ACTUATOR(block, i));
   const int has_reverse = plane && low < 0;
-  set->flipped = has_reverse && high <= 0;
+  set->is_flipped = has_reverse && high <= 0;
   set->tangent = 0;
-  set->turn = 0;
-  set->at = 0;
-  set->cut = 0;
-  set->steepest = 0;
-  set->jumps = 0;
+  set->turn_cost = 0;
+  set->turn_origin = 0;
+  set->jump_angle = 0;
+  set->slope_max = 0;
+  set->has_jumped = 0;
 
   real near = low; /* to rest */
   real far = high;
-  if (set->flipped) {
+  if (set->is_flipped) {
     near = high;
     far = low;
   } else if (has_reverse) {
     near = 0;
   }
-  set->low_cost = fl_power_of_force(block, i, near);
-  set->high_cost = fl_power_of_force(block, i, far);
-  set->low = near;
-  set->high = far;
+  set->cost_at_min = fl_power_of_force(block, i, near);
+  set->cost_at_max = fl_power_of_force(block, i, far);
+  set->force_min = near;
+  set->force_max = far;
   if (plane) {
-    set->low = FABS(near);
-    set->high = FABS(far);
+    set->force_min = FABS(near);
+    set->force_max = FABS(far);
   }
 
-  set->reverse = 0;
-  set->reverse_cost = set->low_cost;
-  if (has_reverse) set->reverse_cost = fl_power_of_force(block, i, low);
-  if (has_reverse && !set->flipped) set->reverse = -low;
+  set->force_max_reverse = 0;
+  set->cost_at_max_reverse = set->cost_at_min;
+  if (has_reverse) set->cost_at_max_reverse = fl_power_of_force(block, i, low);
+  if (has_reverse && !set->is_flipped) set->force_max_reverse = -low;
 
-  set->middle = middle;
-  if (set->flipped) set->middle = middle + PI;
-  set->half = half;
+  set->sector_center = middle;
+  if (set->is_flipped) set->sector_center = middle + PI;
+  set->sector_half_angle = half;
   fl_prepare_set(block, i, set);
 }
 
 /* Makes the set of an actuator that is lost: rest, at no power. */
 void fl_empty_set(const real *block, int i, fl_set *set) {
   memset(set, 0, sizeof *set);
-  if (is_plane(ACTUATOR(block, i))) set->half = PI;
+  if (is_plane(ACTUATOR(block, i))) set->sector_half_angle = PI;
   fl_prepare_set(block, i, set);
 }
 
@@ -136,17 +136,17 @@ void fl_fix_force(const real *block, int i, fl_set *set, const real *force) {
   const int plane = is_plane(ACTUATOR(block, i));
   real size = force[0];
   if (plane) size = size_of(force);
-  real signed_size = fl_clipped(size, set->low, set->high);
-  if (set->flipped) signed_size = -signed_size;
+  real signed_size = fl_clipped(size, set->force_min, set->force_max);
+  if (set->is_flipped) signed_size = -signed_size;
   const real cost = fl_power_of_force(block, i, signed_size);
-  set->low_cost = cost;
-  set->high_cost = cost;
-  set->low = size;
-  set->high = size;
+  set->cost_at_min = cost;
+  set->cost_at_max = cost;
+  set->force_min = size;
+  set->force_max = size;
   if (plane) {
-    set->middle = ATAN2(force[1], force[0]);
-    set->half = 0;
-    set->reverse = 0;
+    set->sector_center = ATAN2(force[1], force[0]);
+    set->sector_half_angle = 0;
+    set->force_max_reverse = 0;
   }
   fl_prepare_set(block, i, set);
 }
@@ -165,35 +165,35 @@ static line_response at_limit(real v, real force, real cost) {
    plane has sizes from 0 on, and in an arc a price may be against all of its directions. */
 line_response fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set,
                                   int line, real price) {
-  int is_reverse = set->flipped;
+  int is_reverse = set->is_flipped;
   real sign = 1;
   if (line) is_reverse = price < 0;
   if (line && price < 0) sign = -1;
   const real v = sign * price;
-  const int is_arc = !line && set->half < PI;
+  const int is_arc = !line && set->sector_half_angle < PI;
   real v_asked = v;
   if (is_arc) v_asked = fl_larger(v, 0);
 
   line_response y = at_price(block, a, is_reverse, v_asked);
   y.force *= sign;
   if (is_arc && !(v > 0)) y.slope = 0;
-  if (y.force <= set->low) return at_limit(price, set->low, set->low_cost);
-  if (y.force >= set->high) return at_limit(price, set->high, set->high_cost);
+  if (y.force <= set->force_min) return at_limit(price, set->force_min, set->cost_at_min);
+  if (y.force >= set->force_max) return at_limit(price, set->force_max, set->cost_at_max);
   return y;
 }
 
 /* What a plane that pushes either way gives in reverse. */
 fl_set fl_reversed_set(const fl_set *set) {
   fl_set reversed = *set;
-  reversed.low = 0;
-  reversed.high = set->reverse;
-  reversed.high_cost = set->reverse_cost;
-  reversed.reverse = 0;
-  reversed.flipped = 1;
-  reversed.at = set->at + PI;
-  reversed.middle = set->middle + PI;
-  reversed.cos_middle = -set->cos_middle;
-  reversed.sin_middle = -set->sin_middle;
+  reversed.force_min = 0;
+  reversed.force_max = set->force_max_reverse;
+  reversed.cost_at_max = set->cost_at_max_reverse;
+  reversed.force_max_reverse = 0;
+  reversed.is_flipped = 1;
+  reversed.turn_origin = set->turn_origin + PI;
+  reversed.sector_center = set->sector_center + PI;
+  reversed.cos_center = -set->cos_center;
+  reversed.sin_center = -set->sin_center;
   set_ends(1, &reversed);
   return reversed;
 }
@@ -225,5 +225,5 @@ real fl_largest_slope(const real *block, int i) {
   const real ahead = steepest_in(table_of(block, a, 0));
   const real reverse = steepest_in(table_of(block, a, 1));
   const real most = fl_larger(ahead, reverse);
-  return most * a->share * a->share / a->worth;
+  return most * a->force_scale * a->force_scale / a->power_scale;
 }

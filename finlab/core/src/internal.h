@@ -81,11 +81,11 @@ static inline real size_of(const real *force) {
 }
 
 /* Whether an actuator pushes in a plane. */
-static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
+static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->flow_speed == 0; }
 /* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
-static inline void own_price(const fl_work *work, int i, const real *lambda, real *s) {
-  s[0] = dot(work->span.matrix[i][0], lambda, 6);
-  s[1] = dot(work->span.matrix[i][1], lambda, 6);
+static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
+  s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
+  s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
 }
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);

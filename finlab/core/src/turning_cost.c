@@ -50,9 +50,9 @@ typedef struct {
    there. */
 static line_response best_along(const pod_at_price *x, real v) {
   const fl_set *set = x->set;
-  const int is_line = set->reverse > 0;
+  const int is_line = set->force_max_reverse > 0;
   if (is_line || v >= 0) return fl_limited_response(x->block, x->a, set, is_line, v);
-  return (line_response){set->low, 0, v * set->low - set->low_cost};
+  return (line_response){set->force_min, 0, v * set->force_min - set->cost_at_min};
 }
 
 /* What the pod gives at an angle whose cosine and sine are c and s. */
@@ -64,8 +64,8 @@ static void look_towards(const pod_at_price *x, real alpha, real c, real s, at_a
   const real dv = x->price[1] * c - x->price[0] * s;
   const real ddv = -v;
   const line_response best = best_along(x, v);
-  const real kappa = x->set->turn;
-  const real d = alpha - x->set->at;
+  const real kappa = x->set->turn_cost;
+  const real d = alpha - x->set->turn_origin;
   o->v = v;
   o->dv = dv;
   o->T = best.force;
@@ -123,11 +123,11 @@ static void go_to_root(const pod_at_price *x, at_angle *o, real low, real high, 
 
 /* The least and largest angles [rad] of the window: its arc, or a turn around the angle before. */
 static void window_of(const fl_set *set, real *low, real *high) {
-  *low = set->middle - set->half;
-  *high = set->middle + set->half;
-  if (set->half >= PI) {
-    *low = set->at - PI;
-    *high = set->at + PI;
+  *low = set->sector_center - set->sector_half_angle;
+  *high = set->sector_center + set->sector_half_angle;
+  if (set->sector_half_angle >= PI) {
+    *low = set->turn_origin - PI;
+    *high = set->turn_origin + PI;
   }
 }
 
@@ -140,16 +140,16 @@ static int is_concave(const pod_at_price *x, const at_angle *start, real farthes
   const real most_dv = fl_smaller(FABS(start->dv) + p * farthest, p);
   const real least_v = fl_larger(start->v - p * farthest, -p);
   real held = 0; /* T v'' of the least force */
-  if (set->low > 0) held = set->low * fl_larger(-least_v, 0);
-  const real kappa = set->turn;
-  return set->steepest * most_dv * most_dv + held < kappa;
+  if (set->force_min > 0) held = set->force_min * fl_larger(-least_v, 0);
+  const real kappa = set->turn_cost;
+  return set->slope_max * most_dv * most_dv + held < kappa;
 }
 
 /* Goes to the largest h of any window: the best of its ends, of the angle from which the pod turns,
    and of the roots of h' that cells show by a change of its sign. */
 static void go_to_best_cell(const pod_at_price *x, at_angle *best, real low, real high) {
   at_angle before;
-  look_at(x, fl_clipped(x->set->at, low, high), best);
+  look_at(x, fl_clipped(x->set->turn_origin, low, high), best);
   look_at(x, low, &before);
   if (before.slope <= 0 && before.value > best->value) *best = before;
   const int cells = (int)fl_clipped((high - low) / CELL + 2, 2, MOST_CELLS);
@@ -173,12 +173,12 @@ static void go_to_best_cell(const pod_at_price *x, at_angle *best, real low, rea
 static at_angle best_angle(const pod_at_price *x, real low, real high) {
   const fl_set *set = x->set;
   at_angle best;
-  if (set->half < PI) {
-    look_towards(x, set->middle, set->cos_middle, set->sin_middle, &best);
+  if (set->sector_half_angle < PI) {
+    look_towards(x, set->sector_center, set->cos_center, set->sin_center, &best);
   } else {
-    look_at(x, set->at, &best);
+    look_at(x, set->turn_origin, &best);
   }
-  if (is_concave(x, &best, fl_smaller(set->half, PI))) {
+  if (is_concave(x, &best, fl_smaller(set->sector_half_angle, PI))) {
     go_to_root(x, &best, low, high, 1);
   } else {
     go_to_best_cell(x, &best, low, high);
@@ -189,9 +189,9 @@ static at_angle best_angle(const pod_at_price *x, real low, real high) {
 /* The response of a pod within a set to the price (2,) of its force [W/N], where turning costs. */
 response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price) {
   fl_set signed_set = *set; /* its least force is the largest one in reverse */
-  if (set->reverse > 0) {
-    signed_set.low = -set->reverse;
-    signed_set.low_cost = set->reverse_cost;
+  if (set->force_max_reverse > 0) {
+    signed_set.force_min = -set->force_max_reverse;
+    signed_set.cost_at_min = set->cost_at_max_reverse;
   }
   const pod_at_price x = {block, ACTUATOR(block, i), &signed_set, {price[0], price[1]}};
   real low;
@@ -209,7 +209,7 @@ response fl_response_with_turning(const real *block, int i, const fl_set *set, c
   const int is_inside = best.alpha > low + edge && best.alpha < high - edge;
   real over_bend = 0; /* 1 / -h'' */
   if (is_inside && best.bend < 0) {
-    const real least = NOTHING * (set->turn + FABS(best.T) * size_of(price)) + TINY;
+    const real least = NOTHING * (set->turn_cost + FABS(best.T) * size_of(price)) + TINY;
     over_bend = 1 / fl_larger(-best.bend, least);
   }
   response y;
@@ -226,13 +226,13 @@ response fl_response_with_turning(const real *block, int i, const fl_set *set, c
 /* The size of what a pod gives in a state, below 0 in reverse [N]. */
 static real signed_size(const fl_state *state, int i) {
   const real *y = state->force[i];
-  return y[0] * COS(state->angle[i]) + y[1] * SIN(state->angle[i]);
+  return y[0] * COS(state->push_angle[i]) + y[1] * SIN(state->push_angle[i]);
 }
 
 /* How far [N] a force moved beyond what its derivatives (xx, xy, yy) say of a step of its price. */
-static real moved_beyond(const real *moved, const real *slope, const real *step) {
-  const real beyond[2] = {moved[0] - slope[0] * step[0] - slope[1] * step[1],
-                          moved[1] - slope[1] * step[0] - slope[2] * step[1]};
+static real moved_beyond(const real *moved, const real *dy_ds, const real *step) {
+  const real beyond[2] = {moved[0] - dy_ds[0] * step[0] - dy_ds[1] * step[1],
+                          moved[1] - dy_ds[1] * step[0] - dy_ds[2] * step[1]};
   return size_of(beyond);
 }
 
@@ -241,20 +241,20 @@ static real moved_beyond(const real *moved, const real *slope, const real *step)
    price [W/N], `is_short` whether that is very short. */
 int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,
                   const fl_state *other, const real *step, int is_short) {
-  const real largest_force = ACTUATOR(block, i)->most[0];
+  const real largest_force = ACTUATOR(block, i)->row_force_max[0];
   const real *y = one->force[i];
   const real *z = other->force[i];
   const real moved[2] = {z[0] - y[0], z[1] - y[1]};
   const real distance = size_of(moved);
   const real size_y = signed_size(one, i);
   const real size_z = signed_size(other, i);
-  const int is_two_sided = set->reverse > 0;
+  const int is_two_sided = set->force_max_reverse > 0;
   const int begins_or_ends_at_rest = (size_y == 0) != (size_z == 0);
   const int changes_sides = size_y * size_z < 0 || (begins_or_ends_at_rest && is_two_sided);
   if (distance > SIDE * largest_force && changes_sides) return 1;
   if (!is_short || !(distance > FINE * largest_force)) return 0;
-  const real beyond_one = moved_beyond(moved, one->slope[i], step);
-  const real beyond_other = moved_beyond(moved, other->slope[i], step);
+  const real beyond_one = moved_beyond(moved, one->dy_ds[i], step);
+  const real beyond_other = moved_beyond(moved, other->dy_ds[i], step);
   return beyond_one > distance / 2 && beyond_other > distance / 2;
 }
 
@@ -264,7 +264,7 @@ void fl_mark_jump(fl_set *set, real one, real other) {
   real low;
   real high;
   window_of(set, &low, &high);
-  set->jumps = 1;
-  set->cut = (one + other) / 2;
-  if (FABS(one - other) < NEARLY * (high - low)) set->cut = (low + high) / 2;
+  set->has_jumped = 1;
+  set->jump_angle = (one + other) / 2;
+  if (FABS(one - other) < NEARLY * (high - low)) set->jump_angle = (low + high) / 2;
 }
