@@ -285,7 +285,7 @@ class Core:
         inner = np.ascontiguousarray(inner)
         force = np.empty((self._count, 2))
         data = (wrench.ctypes.data, inner.ctypes.data, force.ctypes.data)
-        return force, self._core.fl_look(self._at, self._area, *data)
+        return force, self._core.fl_dual_value(self._at, self._area, *data)
 
     def worth(self, price: Array, now: Now = STILL) -> Worth:
         """Returns what forces are worth at prices (N, 6) of the wrench [W/N, W/(N m)], of all that

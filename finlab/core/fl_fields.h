@@ -90,11 +90,13 @@ FL_END(fl_question)
 FL_BEGIN(fl_answer)
 FL_FIELD(fl_real, force, [FL_MOST][2], "N", "of each actuator's rows")
 FL_FIELD(fl_real, prices, [6], "W/N, W/(N m)", "multipliers lambda of the wrench")
-FL_FIELD(fl_real, lambda_reduced, [6], "W", "the same in reduced coordinates, of what actuators span now")
-FL_FIELD(fl_real, wrench_served, [6], "N, N m", "wrench that the forces give, out of reach by the policy")
+FL_FIELD(fl_real, lambda_reduced, [6], "W",
+         "the same in reduced coordinates, of what actuators span now")
+FL_FIELD(fl_real, wrench_served, [6], "N, N m",
+         "wrench that the forces give, out of reach by the policy")
 FL_FIELD(fl_real, gap_power_bound, , "W", "power that gaps are proved to need")
 FL_FIELD(fl_real, error, , "1",
-         "distance of the commands' wrench from wrench_served, on the yardstick, by the laws' tables")
+         "distance of the commands' wrench from wrench_served, on the yardstick, by law grids")
 FL_FIELD(fl_real, command, [FL_MOST][3], "command", "of each actuator")
 FL_FIELD(int, newton_status, , "1", "how Newton's method ended: FL_MET ...")
 FL_FIELD(int, is_attainable, , "1", "1 where the target is within reach")

@@ -22,8 +22,8 @@ CELLS = 128
 POINTS = 64
 """Directions of a gauge at most."""
 TABLES = ("force_table", "force_table_reverse", "gauge_table", "law_grid", "command_table")
-"""Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a fin's
-beat or a foil's curve."""
+"""Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
+fin's beat or a foil's curve."""
 FIN = 2
 """`command_kind` of a fin, FL_FIN."""
 

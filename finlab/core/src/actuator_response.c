@@ -194,7 +194,8 @@ static response foil_response(const real *block, const fl_actuator *a, const fl_
   const real chord = set->cost_at_min - rest + chord_slope * (lift.force - set->force_min);
   const real chord_at_zero = set->cost_at_min - rest - chord_slope * set->force_min;
   const real dlift = lift.slope / q;
-  /* Drag per lift along the curve of responses: marginal power over speed, P' = v or the chord's. */
+  /* Drag per lift along the curve of responses: marginal power over speed, P' = v or that of the
+     chord. */
   const real drag_slope = (ratio.slope * v + (1 - ratio.slope) * chord_slope) / a->flow_speed;
 
   response y;
@@ -210,7 +211,8 @@ static response foil_response(const real *block, const fl_actuator *a, const fl_
 }
 
 /* The response of a foil near to a command, in a step d [rad] of its angle from there: with
-   y = y_0 + d y' and a cost c_0 + pay d + bend / 2 d^2, d = (s.y' - pay) / bend within its limits. */
+   y = y_0 + d y' and a cost c_0 + c' d + c'' / 2 d^2, it is d = (s.y' - c') / c'' within its
+   limits. */
 static response tangent_response(const fl_set *set, const real *price) {
   const fl_tangent *t = set->tangent;
   const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* [W/rad] */

@@ -167,9 +167,9 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q,
    force has no price that a table could hold. */
 static void meet_by_laws(const real *block, fl_work *work, const real *wrench_desired,
                          fl_answer *out) {
-  const real *yard = HEAD(block)->wrench_scale;
+  const real *sigma = HEAD(block)->wrench_scale;
   real missing[6];
-  for (int k = 0; k < 6; k++) missing[k] = (out->wrench_served[k] - wrench_desired[k]) / yard[k];
+  for (int k = 0; k < 6; k++) missing[k] = (out->wrench_served[k] - wrench_desired[k]) / sigma[k];
   if (out->is_attainable || SQRT(dot(missing, missing, 6)) > BEYOND_TABLES) return;
   real command[FL_MOST][3];
   copy_commands(block, out->command, command);

@@ -319,7 +319,7 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none;
-   work->now is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
+   work->state_found is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */

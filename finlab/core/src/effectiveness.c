@@ -7,8 +7,9 @@
    a few microseconds, and is kept until the next question asks for another one. */
 #include "internal.h"
 
-/* Length of a column, over that of the longest one, below which nothing is left of the columns: ten times their rounding
-   in single precision, where a lost actuator would else leave a direction that is rounding. */
+/* Length of a column, over that of the longest one, below which nothing is left of the columns: ten
+   times their rounding in single precision, where a lost actuator would else leave a direction
+   that is rounding. */
 #define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
 #define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
@@ -22,7 +23,7 @@ static const real *law_axis(const fl_actuator *a, int row) {
 /* Wrench [N, N m] per newton of a row of an actuator, 0 in axes that do not count. */
 static void column_of(const real *block, const fl_span *span, int i, int row, real *column) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *yard = HEAD(block)->wrench_scale;
+  const real *sigma = HEAD(block)->wrench_scale;
   const real *axis = law_axis(a, row);
   real sign = 1;
   if (a->command_kind == FL_THRUSTER) sign = a->command_sign;
@@ -30,7 +31,7 @@ static void column_of(const real *block, const fl_span *span, int i, int row, re
   if (span->is_lost[i]) sign = 0;
   for (int k = 0; k < 6; k++) {
     column[k] = 0;
-    if (span->axis_counts[k]) column[k] = sign * yard[k] * axis[k];
+    if (span->axis_counts[k]) column[k] = sign * sigma[k] * axis[k];
   }
 }
 

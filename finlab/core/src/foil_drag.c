@@ -161,7 +161,7 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   return free < work->span.rank;
 }
 
-/* Steps towards work->aim, of which so many in a row have to halve the error: most starts
+/* Steps towards work->wrench_target, of which so many in a row have to halve the error: most starts
    end soon. */
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
@@ -173,7 +173,7 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->aim, to an
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target, to an
    error on the yardstick and to rounding. Where that is what tables leave, steps on their
    error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
@@ -207,7 +207,7 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
 }
 
 /* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential
-   quadratic programming that keep giving work->aim; `lambda` becomes that of the last step.
+   quadratic programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
    Their cost. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
                     real most_error, real cost, real *lambda, real command[][3],
@@ -241,7 +241,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
   return cost;
 }
 
-/* Makes commands give work->aim, in the basis `target`, to an error on the yardstick, and
+/* Makes commands give work->wrench_target, in the basis `target`, to an error on the yardstick, and
    then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
    their cost [W]; NONE where they do not come to give it. */
 static real settle(const real *block, fl_work *work, const real *target, real most_error,
@@ -563,7 +563,7 @@ static int cheapest_points(const real *block, const fl_work *work, const lattice
   return count;
 }
 
-/* Commands at a point, after steps towards work->aim: first some that leave the foils on
+/* Commands at a point, after steps towards work->wrench_target: first some that leave the foils on
    their branches. */
 static void begin_at(const real *block, fl_work *work, const lattice *grid, const real *target,
                      const lattice_point *begin, real command[][3]) {

@@ -251,7 +251,7 @@ typedef struct {
   fl_effect effect;
   const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
   const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
-  real counts[6];     /* 1 of axes that count, else 0 */
+  real axis_counts[6]; /* 1 of axes that count, else 0 */
 } fl_whole;
 int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns,
               real *forces, fl_answer *out, real *end);

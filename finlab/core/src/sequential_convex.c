@@ -45,7 +45,7 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
   forces_of_commands(w, block, span, command, force, body);
   w->effect(w->known, *body, 1, w->inflow, *unused, offset, **slope);
   for (int k = 0; k < 6; k++) {
-    head->wrench_offset[k] = HEAD(w->plain)->wrench_offset[k] + w->counts[k] * offset[k];
+    head->wrench_offset[k] = HEAD(w->plain)->wrench_offset[k] + w->axis_counts[k] * offset[k];
     residual[k] = (wrench[k] - head->wrench_offset[k]) / head->wrench_scale[k];
   }
   for (int i = 0; i < n; i++) {
@@ -56,7 +56,7 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
       for (int k = 0; k < 6; k++) {
         const real along =
             axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] + axis[2] * slope[i][2][k];
-        const real more = w->counts[k] * along;
+        const real more = w->axis_counts[k] * along;
         linear->effectiveness_normalized[c][k] =
             plain->effectiveness_normalized[c][k] + more / head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;

@@ -50,7 +50,7 @@ static void test_within_reach(const golden_robot *robot, int k) {
   /* The dual value proves a bound of the power, and the parts of sets with gaps a higher one. */
   fl_real force[FL_MOST][2];
   const double dual_value =
-      (double)fl_look(robot->block, &work, golden->within, answer.lambda_reduced, *force);
+      (double)fl_dual_value(robot->block, &work, golden->within, answer.lambda_reduced, *force);
   const double bound = fmax(dual_value, (double)answer.gap_power_bound);
   double slack = optimal_with_gaps * golden->power;
   if (robot->has_no_gaps) slack = optimal * golden->power;

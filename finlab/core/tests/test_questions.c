@@ -132,7 +132,7 @@ static void test_free_axes_cost_no_more(const golden_robot *robot) {
     CHECK(ask(robot, &question) == FL_OK && answer.is_attainable, robot->name, k);
     CHECK((double)answer.error <= met, robot->name, k);
     const double bound =
-        (double)fl_look(robot->block, &work, question.wrench, answer.lambda_reduced, *force);
+        (double)fl_dual_value(robot->block, &work, question.wrench, answer.lambda_reduced, *force);
     CHECK(bound <= robot->questions[k].power * (1 + optimal), robot->name, k);
   }
 }
