@@ -193,9 +193,9 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
 
 /* kappa of an actuator [W/rad^2], Eq. 16: calm P / step, with `power` the mean power P of the
    commands before and `step` the largest turn until the commands asked for: of one tick, or of
-   several. Of pods alone: fins turn through a right angle in a few ticks, and one that points away gives
-   little. With such a cost it would stay for ever, and leave its work to others at a fifth more
-   power. */
+   several. Of pods alone: fins turn through a right angle in a few ticks, and one that points away
+   gives little. With such a cost it would stay for ever, and leave its work to others at a fifth
+   more power. */
 static real turning_cost_of(const fl_actuator *a, real calm, real power, real ticks) {
   const int has_rate = a->max_change[0] > 0 && a->max_change[0] < QUICK;
   if (a->command_kind != FL_POD || !has_rate) return 0;

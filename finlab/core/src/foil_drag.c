@@ -8,12 +8,11 @@
    Steps lead to what is near. With few actuators what foils give is a curved sheet, which
    turns back where they stall: a wrench on it is met at few commands, far from each other,
    and from elsewhere steps end at a least miss. Where the starts that the dual has come to
-   no cost that it proves, others are taken from a lattice over the angles of all foils, each
-   kept within the branches of the lifts on which it lies. */
+   no cost that it proves, others are taken from a lattice over the angles of all foils
+   (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
 #include "internal.h"
 
-/* of its range that a foil turns in a step: in all thrice, if need be */
-#define TRUST (R(3.0) / ROUNDS)
+#define FOLLOWED (ROUNDS / 2)     /* points of a lattice made cheaper; FL_STARTS counts them */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
@@ -21,88 +20,6 @@
 #define WITHIN_BEST R(1.5)
 /* share of a ray that stalled foils may add to what tables give */
 #define STALLED_MORE R(0.1)
-
-/* Whether an actuator is a foil in a flow, whose drag counts. */
-static int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
-
-/* A foil at an angle: force, cost and their slopes; all of the tangent but its curvature. */
-static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real command[3] = {angle, 0, 0};
-  real force[3];
-  real by[3][3];
-  fl_force_of_command(block, i, command, force, by);
-  const real lift = force[0];
-  const real d_lift = by[0][0];
-  const real drag = force[1] + a->pressure_area * a->zero_lift_drag;
-  const real d_drag = by[0][1];
-  memcpy(tangent->force, force, sizeof tangent->force);
-  memcpy(tangent->force_slope, by[0], sizeof tangent->force_slope);
-  tangent->cost = a->flow_speed * drag + a->uncertainty_cost * (lift * lift + drag * drag);
-  tangent->cost_slope =
-      a->flow_speed * d_drag + 2 * a->uncertainty_cost * (lift * d_lift + drag * d_drag);
-}
-
-/* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less
-   the worth of its force at prices s of lift and drag. */
-static void draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
-                         fl_tangent *tangent, fl_set *set) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real low = box->command_min[i][0];
-  const real high = box->command_max[i][0];
-  const real most_turn = TRUST * (high - low);
-  const real apart = CLOSE * (high - low) + TINY;
-  fl_tangent other;
-  foil_at(block, i, angle + apart, &other);
-  foil_at(block, i, angle, tangent);
-  /* Change of the slope of cost - s.force over `apart`. */
-  const real change = other.cost_slope - tangent->cost_slope - dot(s, other.force_slope, 2) +
-                      dot(s, tangent->force_slope, 2);
-  tangent->curvature =
-      fl_larger(FABS(change) / apart, CLOSE * a->flow_speed * a->pressure_area + TINY);
-  const real most_cost = tangent->cost + FABS(tangent->cost_slope) * most_turn +
-                         tangent->curvature * most_turn * most_turn;
-  set->force_min = fl_larger(low - angle, -most_turn);
-  set->force_max = fl_smaller(high - angle, most_turn);
-  set->tangent = tangent;
-  set->cost_at_min = most_cost;
-  set->cost_at_max = most_cost;
-}
-
-/* Forces along the rows of commands, and their cost [W]. */
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
-                          real force[][2]) {
-  real cost = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    force[i][0] = 0;
-    force[i][1] = 0;
-    if (work->span.is_lost[i]) continue;
-    real along[3];
-    fl_force_of_command(block, i, command[i], along, 0);
-    real size;
-    if (is_plane(a)) {
-      force[i][0] = along[1];
-      force[i][1] = along[2];
-      size = size_of(force[i]);
-    } else {
-      force[i][0] = a->command_sign * along[0];
-      size = force[i][0];
-    }
-    if (a->gauge_table > 0)
-      size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
-    if (is_foil(a)) {
-      fl_tangent tangent;
-      foil_at(block, i, command[i][0], &tangent);
-      force[i][1] = tangent.force[1];
-      cost += tangent.cost;
-      continue;
-    }
-    if (a->command_kind == FL_POD && command[i][1] < 0) size = -size;
-    cost += fl_power_of_force(block, i, size);
-  }
-  return cost;
-}
 
 static int has_gap(const fl_actuator *a, const fl_set *set) {
   if (is_plane(a)) return set->is_forked || set->force_max_reverse > 0;
@@ -138,7 +55,7 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
     if (work->span.is_lost[i]) continue;
     const real *answer = work->state_found->force[i];
     const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
-    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
+    if (fl_is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
       const real *slope = work->tangent[i].force_slope;
       const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
       command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
@@ -173,8 +90,8 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target, to an
-   error on the yardstick and to rounding. Where that is what tables leave, steps on their
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target,
+   to an error on the yardstick and to rounding. Where that is what tables leave, steps on their
    error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
@@ -199,15 +116,15 @@ static real error_allowed(const real *block, const fl_work *work, const fl_box *
 static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
+    if (!fl_is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     real s[2];
     actuator_price(work, i, lambda, s);
-    draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
+    fl_draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
   }
 }
 
-/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential
-   quadratic programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
+/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
+   programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
    Their cost. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
                     real most_error, real cost, real *lambda, real command[][3],
@@ -283,20 +200,13 @@ void fl_improve_commands(const real *block, fl_work *work, const real *target, r
   improve_from(block, work, target, work->state_found->lambda_reduced, command, best_cost);
 }
 
-/* The last lift coefficient of a foil's table and its angle [rad]: beyond, it stalls and
-   drags more. */
-static const real *end_of(const real *block, const fl_actuator *a) {
-  const real *curve = block + (int)a->command_table;
-  return curve + 2 * (int)curve[0] - 1;
-}
-
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
 static int may_stall(const real *block, const fl_work *work, int i, int end, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   *command = work->box.command_min[i][0];
   if (end) *command = work->box.command_max[i][0];
-  if (!is_foil(a) || work->span.is_lost[i]) return 0;
-  const real stall_angle = end_of(block, a)[1];
+  if (!fl_is_foil(a) || work->span.is_lost[i]) return 0;
+  const real stall_angle = fl_lift_end(block, a)[1];
   return FABS(*command - a->zero_lift_angle) > stall_angle;
 }
 
@@ -308,13 +218,13 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
   real s[2];
   actuator_price(work, i, work->state_found->lambda_reduced, s);
   const response known = fl_response(block, i, work->set + i, s);
-  real stall_angle = end_of(block, a)[1];
+  real stall_angle = fl_lift_end(block, a)[1];
   if (!end) stall_angle = -stall_angle;
   const real begin = a->zero_lift_angle + stall_angle;
   real more = 0;
   for (int k = 1; k <= ROUNDS; k++) {
     fl_tangent tangent;
-    foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
+    fl_foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
     const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
     more = fl_larger(more, conjugate - known.conjugate);
   }
@@ -333,260 +243,28 @@ static real proved_value(const real *block, const fl_work *work, real *most_cost
       if (!may_stall(block, work, i, end, &limit)) continue;
       value -= worth_of_stall(block, work, i, end, limit);
       fl_tangent stalled;
-      foil_at(block, i, limit, &stalled);
+      fl_foil_at(block, i, limit, &stalled);
       *most_cost += stalled.cost;
     }
   }
   return value;
 }
 
-/* A lattice over the angles of foils. Each has some on every branch of its lift within the
-   limits: stalled one way, lift one way, lift the other way, stalled the other way. */
-/* branches of a foil; foils on the lattice, others begin at rest */
-enum { BRANCHES = 4, LAID = 6 };
-#define LATTICE (1 << 2 * LAID)  /* points at most: one on each branch of so many foils */
-#define EACH_MOST (ROUNDS / 2)   /* angles on a branch */
-#define NODES (4 * ROUNDS)       /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
-#define SPREAD (5 * ROUNDS)      /* points at which steps on the commands begin */
-#define FOLLOWED (ROUNDS / 2)    /* how many of these are made cheaper; FL_STARTS counts them */
-
-typedef struct {
-  int foils;                                        /* how many there are */
-  int foil[LAID];                                   /* which actuators these are */
-  int branches[LAID];                               /* of each foil */
-  int first[LAID];                                  /* its first node */
-  int each;                                         /* nodes on a branch */
-  real edge[LAID][BRANCHES + 1];                    /* ends of the branches [rad] */
-  real angle[NODES], cost[NODES], wrench[NODES][6]; /* of each node; the wrench in the basis */
-  /* other actuators: force by a wrench in the basis */
-  real row[FL_MOST][2][6];
-} lattice;
-
-typedef struct {
-  unsigned char node[LAID]; /* of each foil */
-  real cost;                /* [W], with the price of a miss */
-} lattice_point;
-
-/* Ends of the branches of a foil's lift within its limits; how many branches there are. */
-static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real low = work->box.command_min[i][0];
-  const real high = work->box.command_max[i][0];
-  const real stall_angle = end_of(block, a)[1];
-  const real turn[BRANCHES - 1] = {a->zero_lift_angle - stall_angle, a->zero_lift_angle,
-                                   a->zero_lift_angle + stall_angle};
-  int branches = 0;
-  edge[0] = low;
-  for (int k = 0; k < BRANCHES - 1; k++) {
-    if (!(turn[k] > low && turn[k] < high)) continue;
-    branches++;
-    edge[branches] = turn[k];
-  }
-  branches++;
-  edge[branches] = high;
-  return branches;
-}
-
-/* How many nodes each branch has: as many as the lattice has room for. */
-static int nodes_of_branch(const lattice *grid) {
-  int choices = 1;
-  int branches = 0;
-  for (int f = 0; f < grid->foils; f++) {
-    choices *= grid->branches[f];
-    branches += grid->branches[f];
-  }
-  for (int each = EACH_MOST; each > 1; each--) {
-    int points = choices;
-    for (int f = 0; f < grid->foils; f++) points *= each;
-    if (points <= LATTICE && branches * each <= NODES) return each;
-  }
-  return 1;
-}
-
-/* Foils, their branches, and how many nodes each branch has. */
-static void find_branches(const real *block, const fl_work *work, lattice *grid) {
-  grid->foils = 0;
-  for (int i = 0; i < COUNT(block) && grid->foils < LAID; i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
-    const int f = grid->foils;
-    grid->branches[f] = edges_of(block, work, i, grid->edge[f]);
-    grid->foil[f] = i;
-    grid->foils++;
-  }
-  grid->each = nodes_of_branch(grid);
-}
-
-/* The nodes of all foils: angles in the middle of equal parts of each branch. */
-static void lay_nodes(const real *block, const fl_work *work, lattice *grid) {
-  int node = 0;
-  for (int f = 0; f < grid->foils; f++) {
-    const real(*B)[6] = work->span.effectiveness_reduced[grid->foil[f]];
-    grid->first[f] = node;
-    for (int k = 0; k < grid->branches[f] * grid->each; k++) {
-      const real *edge = grid->edge[f] + k / grid->each;
-      const real share = ((real)(k % grid->each) + R(0.5)) / (real)grid->each;
-      grid->angle[node] = edge[0] + share * (edge[1] - edge[0]);
-      fl_tangent tangent;
-      foil_at(block, grid->foil[f], grid->angle[node], &tangent);
-      const real *y = tangent.force;
-      grid->cost[node] = tangent.cost;
-      for (int j = 0; j < 6; j++) grid->wrench[node][j] = y[0] * B[0][j] + y[1] * B[1][j];
-      node++;
-    }
-  }
-}
-
-/* The other actuators by H^-1 of H = sum B g B', with their gains g: y = g B' H^-1 r are the
-   forces for a wrench r that are cheapest where power is quadratic and nothing has limits. */
-static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
-  real H[6][6] = {{0}};
-  memset(grid->row, 0, sizeof grid->row);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++)
-      fl_add_square(H, work->span.effectiveness_reduced[i][q], a->secant[q]);
-  }
-  const real ridge = fl_larger(NOTHING, ROUNDING) * fl_trace(H) + TINY;
-  for (int j = 0; j < 6; j++) H[j][j] += ridge;
-  if (!fl_factor(H)) return;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) {
-      fl_solve(H, work->span.effectiveness_reduced[i][q], grid->row[i][q]);
-      for (int j = 0; j < 6; j++) grid->row[i][q][j] *= a->secant[q];
-    }
-  }
-}
-
-/* Holds a force within the limits of a set but for its direction; its size. */
-static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
-  if (!is_plane(a)) {
-    force[0] = fl_clipped(force[0], set->force_min, set->force_max);
-    return FABS(force[0]);
-  }
-  const real wanted = size_of(force);
-  const real size = fl_smaller(wanted, fl_larger(set->force_max, set->force_max_reverse));
-  for (int q = 0; q < 2; q++) force[q] *= size / fl_larger(wanted, TINY);
-  return size;
-}
-
-/* Forces of the other actuators at a point for a target, held within their limits, and what
-   all cost there: watts as force^1.5, and ROUNDS times those of all actuators for a miss of
-   one scaled wrench. */
-static real cost_at_point(const real *block, const fl_work *work, const lattice *grid,
-                          const real *target, const unsigned char *node, real force[][2]) {
-  real cost = 0;
-  real left[6]; /* of the target, by the other actuators */
-  memcpy(left, target, sizeof left);
-  for (int f = 0; f < grid->foils; f++) {
-    cost += grid->cost[node[f]];
-    for (int j = 0; j < 6; j++) left[j] -= grid->wrench[node[f]][j];
-  }
-  real residual[6];
-  memcpy(residual, left, sizeof residual);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const fl_set *set = work->set + i;
-    real *y = force[i];
-    y[0] = 0;
-    y[1] = 0;
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) y[q] = dot(grid->row[i][q], left, 6);
-    const real size = held_force(a, set, y);
-    const real share = size / a->row_force_max[0];
-    cost += fl_larger(set->cost_at_max, set->cost_at_min) * share * SQRT(share);
-    for (int q = 0; q < (int)a->rows; q++) {
-      for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.effectiveness_reduced[i][q][j];
-    }
-  }
-  return cost + ROUNDS * work->power_cost_max * SQRT(dot(residual, residual, 6));
-}
-
-/* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there
-   are then. */
-static int put_in_order(lattice_point *points, int count, const lattice_point *added) {
-  int index = count;
-  if (count == SPREAD) {
-    index = SPREAD - 1;
-    if (!(added->cost < points[index].cost)) return count;
-  }
-  while (index > 0 && added->cost < points[index - 1].cost) {
-    points[index] = points[index - 1];
-    index--;
-  }
-  points[index] = *added;
-  if (count == SPREAD) return count;
-  return count + 1;
-}
-
-/* The cheapest point of the lattice on one choice of branches, numbered in mixed radix. */
-static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
-                                        const lattice *grid, const real *target, int choice,
-                                        int points) {
-  lattice_point best = {{0}, NONE};
-  lattice_point tried = {{0}, 0};
-  for (int k = 0; k < points; k++) {
-    int branch_digits = choice;
-    int node_digits = k;
-    for (int f = 0; f < grid->foils; f++) {
-      const int branch = branch_digits % grid->branches[f];
-      const int node = node_digits % grid->each;
-      tried.node[f] = (unsigned char)(grid->first[f] + branch * grid->each + node);
-      branch_digits /= grid->branches[f];
-      node_digits /= grid->each;
-    }
-    real unused[FL_MOST][2];
-    tried.cost = cost_at_point(block, work, grid, target, tried.node, unused);
-    if (k == 0 || tried.cost < best.cost) best = tried;
-  }
-  return best;
-}
-
-/* The cheapest point of each choice of branches, and of these the cheapest ones (SPREAD,);
-   how many there are. */
-static int cheapest_points(const real *block, const fl_work *work, const lattice *grid,
-                           const real *target, lattice_point *points) {
-  int choices = 1;
-  int points_of_choice = 1;
-  for (int f = 0; f < grid->foils; f++) {
-    choices *= grid->branches[f];
-    points_of_choice *= grid->each;
-  }
-  int count = 0;
-  for (int choice = 0; choice < choices; choice++) {
-    const lattice_point best =
-        cheapest_of_choice(block, work, grid, target, choice, points_of_choice);
-    count = put_in_order(points, count, &best);
-  }
-  return count;
-}
-
 /* Commands at a point, after steps towards work->wrench_target: first some that leave the foils on
    their branches. */
-static void begin_at(const real *block, fl_work *work, const lattice *grid, const real *target,
-                     const lattice_point *begin, real command[][3]) {
-  real force[FL_MOST][2];
-  fl_box box = work->box;
-  cost_at_point(block, work, grid, target, begin->node, force);
-  fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
-  for (int f = 0; f < grid->foils; f++) {
-    const int node = begin->node[f];
-    const int branch = (node - grid->first[f]) / grid->each;
-    const int i = grid->foil[f];
-    command[i][0] = grid->angle[node];
-    box.command_min[i][0] = grid->edge[f][branch];
-    box.command_max[i][0] = grid->edge[f][branch + 1];
-  }
-  approach(block, work, &box, command, ROUNDS / 2);
+static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice,
+                     const real *target, const fl_lattice_point *point, real command[][3]) {
+  fl_box branches = work->box;
+  fl_commands_of_point(block, work, lattice, target, point, &branches, command);
+  approach(block, work, &branches, command, ROUNDS / 2);
   approach(block, work, &work->box, command, ROUNDS / 2);
 }
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
    are the same; 0 for none. */
-static const lattice_point *next_point(const lattice_point *points, int count, real last_cost) {
-  const lattice_point *next = 0;
+static const fl_lattice_point *next_point(const fl_lattice_point *points, int count,
+                                          real last_cost) {
+  const fl_lattice_point *next = 0;
   for (int k = 0; k < count; k++) {
     const int is_new = points[k].cost > last_cost * (1 + NEARLY);
     if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
@@ -600,16 +278,14 @@ static const lattice_point *next_point(const lattice_point *points, int count, r
 static void improve_from_lattice(const real *block, fl_work *work, const real *target,
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
-  lattice grid;
-  lattice_point points[SPREAD];
+  fl_lattice lattice;
+  fl_lattice_point points[FL_SPREAD];
   real command[FL_MOST][3];
-  find_branches(block, work, &grid);
-  lay_nodes(block, work, &grid);
-  lay_rows(block, work, &grid);
-  const int count = cheapest_points(block, work, &grid, target, points);
+  fl_lay_lattice(block, work, &lattice);
+  const int count = fl_cheapest_points(block, work, &lattice, target, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &grid, target, points + k, command);
+    begin_at(block, work, &lattice, target, points + k, command);
     points[k].cost = NONE;
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
@@ -617,10 +293,10 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
   }
   real last_cost = 0;
   for (int tried = 0; tried < FOLLOWED && *best_cost > enough; tried++) {
-    const lattice_point *next = next_point(points, count, last_cost);
+    const fl_lattice_point *next = next_point(points, count, last_cost);
     if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
     last_cost = next->cost;
-    begin_at(block, work, &grid, target, next, command);
+    begin_at(block, work, &lattice, target, next, command);
     improve_from(block, work, target, lambda, command, best_cost);
   }
 }
@@ -675,8 +351,8 @@ int fl_are_forces_sure(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->uncertainty_cost > 0) return 0;
-    if (!is_foil(a)) continue;
-    const real largest_lift = a->pressure_area * (1 - NOTHING) * end_of(block, a)[0];
+    if (!fl_is_foil(a)) continue;
+    const real largest_lift = a->pressure_area * (1 - NOTHING) * fl_lift_end(block, a)[0];
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
   if (fl_worst_gap(block, work, state->force, state->lambda_reduced) >= 0) return 0;

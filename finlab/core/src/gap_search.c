@@ -188,7 +188,8 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
   return best_cost < NONE;
 }
 
-/* Commands that give work->wrench_target, from what Newton's method came to; 0 where none are found. */
+/* Commands that give work->wrench_target, from what Newton's method came to; 0 where none are
+   found. */
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
                         fl_answer *out) {
   const real dual_value = work->state_found->dual_value;

@@ -206,9 +206,47 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
                         fl_answer *out);
 
-/* foil_drag.c: commands of robots whose foils drag */
+/* foil_tangent.c: a foil near to a command */
+/* Whether an actuator is a foil in a flow, whose drag counts. */
+static inline int fl_is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
+const real *fl_lift_end(const real *block, const fl_actuator *a);
+void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
+void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
+                     fl_tangent *tangent, fl_set *set);
 real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
                           real force[][2]);
+
+/* foil_lattice.c: where searches for commands of foils may begin */
+enum {
+  FL_BRANCHES = 4,        /* of a foil's lift */
+  FL_LAID = 6,            /* foils on the lattice; others begin at rest */
+  FL_NODES = 4 * ROUNDS,  /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
+  FL_SPREAD = 5 * ROUNDS /* points at which steps on the commands begin */
+};
+typedef struct {
+  int foils;                              /* how many there are */
+  int foil[FL_LAID];                      /* which actuators these are */
+  int branches[FL_LAID];                  /* of each foil */
+  int first[FL_LAID];                     /* its first node */
+  int each;                               /* nodes on a branch */
+  real edge[FL_LAID][FL_BRANCHES + 1];    /* ends of the branches [rad] */
+  real angle[FL_NODES];                   /* of each node [rad] */
+  real cost[FL_NODES];                    /* of each node [W] */
+  real wrench[FL_NODES][6];               /* of each node, in the basis */
+  real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
+} fl_lattice;
+typedef struct {
+  unsigned char node[FL_LAID]; /* of each foil */
+  real cost;                   /* [W], with the price of a miss */
+} fl_lattice_point;
+void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
+int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
+                       const real *target, fl_lattice_point *points);
+void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
+                          const real *target, const fl_lattice_point *point, fl_box *box,
+                          real command[][3]);
+
+/* foil_drag.c: commands of robots whose foils drag */
 void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
 int fl_are_forces_sure(const real *block, fl_work *work);
