@@ -37,35 +37,35 @@ class Found(NamedTuple):
 
     force: Array
     """(N, n, 2) [N], along each actuator's directions; the second of a foil is its drag."""
-    price: Array
-    """(N, 6) of the wrench [W/N, W/(N m)]."""
-    aim: Array
+    prices: Array
+    """Multipliers (N, 6) of the wrench [W/N, W/(N m)]."""
+    wrench_served: Array
     """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
-    value: Array
+    gap_power_bound: Array
     """Power (N,) [W] that gaps in the sets are proved to need; 0 where there is none."""
-    within: NDArray[np.bool_]
+    is_attainable: NDArray[np.bool_]
     """Targets within reach (N,)."""
     command: Array
     """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
     error: Array
-    """Distance (N,) of what the commands give from the aims, on the yardstick, by the laws'
+    """Distance (N,) of what the commands give from `wrench_served`, on the yardstick, by the laws'
     tables."""
-    ended: bool
+    is_truncated: bool
     """Whether a search ended at its bound of steps."""
 
 
 class Worth(NamedTuple):
     """What the forces of n actuators are worth at N prices."""
 
-    ahead: Array
+    price_ahead: Array
     """Price along the force (N, n) [W/N]."""
-    back: Array
+    price_reverse: Array
     """The same of a force in reverse (N, n)."""
-    most: Array
+    conjugate: Array
     """Most that a force is worth (N, n), less its power [W], by the tables."""
-    low: Array
+    force_min: Array
     """Least force (1, n) [N] now, of planes below 0 in reverse."""
-    high: Array
+    force_max: Array
     """Largest force (1, n) [N] now."""
 
 
@@ -149,13 +149,13 @@ class Core:
         answer = np.zeros(1, struct("fl_answer"))
         self._from = answer.ctypes.data
         self._force = answer["force"][:, :count]
-        self._answer_price = answer["prices"]
-        self._aim = answer["wrench_served"]
-        self._value = answer["gap_power_bound"]
+        self._answer_prices = answer["prices"]
+        self._wrench_served = answer["wrench_served"]
+        self._gap_power_bound = answer["gap_power_bound"]
         self._error = answer["error"]
         self._command = answer["command"][:, :count]
-        self._within = answer["is_attainable"]
-        self._ended = answer["is_truncated"]
+        self._is_attainable = answer["is_attainable"]
+        self._is_truncated = answer["is_truncated"]
 
         # What the question points at, and where it lies.
         self._price = np.zeros(6)
@@ -234,13 +234,13 @@ class Core:
                 raise CommandError(_REFUSED.format(CODES[error]))
             return Found(
                 force=self._force.copy(),
-                price=self._answer_price.copy(),
-                aim=self._aim.copy(),
-                value=self._value.copy(),
-                within=self._within.astype(bool),
+                prices=self._answer_prices.copy(),
+                wrench_served=self._wrench_served.copy(),
+                gap_power_bound=self._gap_power_bound.copy(),
+                is_attainable=self._is_attainable.astype(bool),
                 command=self._command.copy(),
                 error=self._error.copy(),
-                ended=bool(self._ended[0]),
+                is_truncated=bool(self._is_truncated[0]),
             )
 
     def _ask(self) -> int:
@@ -250,14 +250,26 @@ class Core:
     def many(self, wrenches: Array, policy: Any, now: Now = STILL) -> Found:
         """Returns the answers to wrenches (N, 6); see `one`."""
         wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
-        force = np.empty((count, self._count, 2))
-        value = np.empty(count)
-        error = np.empty(count)
-        price = np.empty((count, 6))
-        aim = np.empty((count, 6))
-        within = np.empty(count, np.bool_)
-        command = np.empty((count, self._count, 3))
-        outs = [values.ctypes.data for values in (force, price, aim, value, command, within, error)]
+        found = Found(
+            force=np.empty((count, self._count, 2)),
+            prices=np.empty((count, 6)),
+            wrench_served=np.empty((count, 6)),
+            gap_power_bound=np.empty(count),
+            is_attainable=np.empty(count, np.bool_),
+            command=np.empty((count, self._count, 3)),
+            error=np.empty(count),
+            is_truncated=False,
+        )
+        outputs = [
+            found.force,
+            found.prices,
+            found.wrench_served,
+            found.gap_power_bound,
+            found.command,
+            found.is_attainable,
+            found.error,
+        ]
+        outs = [values.ctypes.data for values in outputs]
         with self._lock:
             served = self._ask_for(policy, None, now)
             ins = self._at, self._area, self._to, wrenches.ctypes.data, count
@@ -265,7 +277,7 @@ class Core:
             del served
         if code > 0:
             raise CommandError(_REFUSED.format(CODES[code]))
-        return Found(force, price, aim, value, within, command, error, code < 0)
+        return found._replace(is_truncated=code < 0)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Returns commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep
@@ -278,13 +290,20 @@ class Core:
             self._core.fl_commands(self._at, self._area, *data)
         return command
 
-    def look(self, wrench: Array, inner: Array) -> tuple[Array, float]:
-        """What prices (6,) in the basis give: forces (n, 2), and the dual value [W] for a wrench
-        (6,)."""
+    def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
+        """Evaluates the dual.
+
+        Args:
+            wrench: desired (6,) [N, N m].
+            lambda_reduced: multipliers (6,) in the basis [W].
+
+        Returns:
+            Responses (n, 2) [N], and the dual value [W].
+        """
         wrench = np.ascontiguousarray(wrench)
-        inner = np.ascontiguousarray(inner)
+        lambda_reduced = np.ascontiguousarray(lambda_reduced)
         force = np.empty((self._count, 2))
-        data = (wrench.ctypes.data, inner.ctypes.data, force.ctypes.data)
+        data = (wrench.ctypes.data, lambda_reduced.ctypes.data, force.ctypes.data)
         return force, self._core.fl_dual_value(self._at, self._area, *data)
 
     def worth(self, price: Array, now: Now = STILL) -> Worth:

@@ -80,7 +80,7 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
         with pytest.raises(CommandError, match="argument"):
             heavy.one(np.where(np.arange(6) == 2, bad, wrench), None)
         # Prices are where to begin: those of no use are left out.
-        assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).within[0]
+        assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).is_attainable[0]
     with pytest.raises(CommandError, match="argument"):
         heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.inf)))
     assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).within[
@@ -99,12 +99,14 @@ def test_one_and_many_are_the_same(kind: str) -> None:
     for row, target in enumerate(targets):
         single = core.one(target, policy)
         np.testing.assert_array_equal(many.command[row], single.command[0])
-        np.testing.assert_array_equal(many.aim[row], single.aim[0])
-        assert many.within[row] == single.within[0]
+        np.testing.assert_array_equal(many.wrench_served[row], single.wrench_served[0])
+        assert many.is_attainable[row] == single.is_attainable[0]
 
 
 def test_threads_share_one_robot(heavy: Core) -> None:
     targets = np.random.default_rng(0).normal(0.0, 20.0, (2000, 6))
     with ThreadPoolExecutor(4) as pool:
-        shared = list(pool.map(lambda target: heavy.one(target, Policy()).aim[0], targets))
-    np.testing.assert_array_equal(shared, heavy.many(targets, Policy()).aim)
+        shared = list(
+            pool.map(lambda target: heavy.one(target, Policy()).wrench_served[0], targets)
+        )
+    np.testing.assert_array_equal(shared, heavy.many(targets, Policy()).wrench_served)

@@ -118,9 +118,9 @@ class Compiled:
     def radial_worth(self, group: Group, places: Places, worth: Worth) -> Array | None:
         """Returns what forces are worth by the laws of a group at some places; see
         `Group.radial_worth`. Where all actuators are alike, one answers for all."""
-        ahead = worth.ahead[:, places]
-        back = worth.back[:, places]
-        ends = np.stack([worth.low[0, places], worth.high[0, places]], axis=-1)
+        ahead = worth.price_ahead[:, places]
+        back = worth.price_reverse[:, places]
+        ends = np.stack([worth.force_min[0, places], worth.force_max[0, places]], axis=-1)
         for alike, one in self._alike:
             if alike is group:
                 most = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1), None)
@@ -145,7 +145,7 @@ def proved_power(compiled: Compiled, wrench: Array, price: Array, now: Now = STI
     """Returns the power (N,) [W] that no answer undercuts which gives wrenches (N, 6) with what may
     be given now, by prices (N, 6) [W/N, W/(N m)]."""
     worth = compiled.robot.core.worth(price, now)
-    most = worth.most.copy()
+    most = worth.conjugate.copy()
     for places, group in compiled.groups:
         for own in (compiled.radial_worth(group, places, worth), group.worth(price)):
             if own is not None:

@@ -167,25 +167,37 @@ class Dual(Method):
             return settled(self, targets, policy, now, prices)
         found = self.forces(targets, policy, prices, now)
         # A search of bytes, in a third of the time of numpy's `all`.
-        beyond = np.flatnonzero(~found.within).tolist() if 0 in found.within.tobytes() else []
-        aim = found.aim if beyond else targets
-        notes = {_ENDED} if found.ended else set()
+        beyond = (
+            np.flatnonzero(~found.is_attainable).tolist()
+            if 0 in found.is_attainable.tobytes()
+            else []
+        )
+        wrench_served = found.wrench_served if beyond else targets
+        notes = {_ENDED} if found.is_truncated else set()
         command = self.exact(found, now)
         if policy.kind == "direction":
             for row in beyond:
                 notes.add(self._kept_on_the_ray(targets[row], row, found, command, now))
         if beyond:
             notes |= self.not_held(targets[beyond], now)
-        return self.solution(command, aim, found.price, found.value, notes, now)
+        return self.solution(
+            command, wrench_served, found.prices, found.gap_power_bound, notes, now
+        )
 
     def solution(
-        self, command: Array, aim: Array, price: Array, value: Array, notes: set[str], now: Now
+        self,
+        command: Array,
+        wrench_served: Array,
+        price: Array,
+        value: Array,
+        notes: set[str],
+        now: Now,
     ) -> Solution:
         """Returns commands (N, n, 3) for wrenches (N, 6) as a solution, with the bound that prices
         (N, 6) and values (N,) [W] prove, and sentences."""
         if now.lost is not None:
             command[:, now.lost] = np.nan
-        bound: Callable[[Array], Array] = partial(self.bound, aim, price, value, now)
+        bound: Callable[[Array], Array] = partial(self.bound, wrench_served, price, value, now)
         return Solution(
             command,
             bound=None if self.unproved else bound,
@@ -236,11 +248,11 @@ class Dual(Method):
             The sentence where no share can be given; else none.
         """
         ray = target / self.scale
-        aim = found.aim
+        wrench_served = found.wrench_served
         size_squared = max(float(ray @ ray), 1e-300)
-        projection = float(aim[row] / self.scale @ ray)
-        error = self.error(command[row : row + 1], aim[row : row + 1], now)[0]
-        off_ray = aim[row] / self.scale - projection / size_squared * ray
+        projection = float(wrench_served[row] / self.scale @ ray)
+        error = self.error(command[row : row + 1], wrench_served[row : row + 1], now)[0]
+        off_ray = wrench_served[row] / self.scale - projection / size_squared * ray
         if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
             return ""
         if now.previous is not None:
@@ -260,18 +272,18 @@ class Dual(Method):
             low = middle
             is_kept = True
             command[row] = answer_command[0]
-            aim[row] = tried[0]
-            found.price[row] = answer.price[0]
-            found.value[row] = answer.value[0]
+            wrench_served[row] = tried[0]
+            found.prices[row] = answer.prices[0]
+            found.gap_power_bound[row] = answer.gap_power_bound[0]
         if is_kept:
             return ""
         cancelled = self._cancelled(now)
         if cancelled is None:
             return "no share of the target was found that the actuators can give alone"
         command[row] = cancelled
-        aim[row] = 0.0
-        found.price[row] = 0.0
-        found.value[row] = 0.0
+        wrench_served[row] = 0.0
+        found.prices[row] = 0.0
+        found.gap_power_bound[row] = 0.0
         return ""
 
     def _cancelled(self, now: Now) -> Array | None:
@@ -340,11 +352,13 @@ class Dual(Method):
         driven = size > NOTHING * size.max()
         return np.asarray(driven if now.free is None else driven & ~now.free)
 
-    def bound(self, aim: Array, price: Array, value: Array, now: Now, command: Array) -> Array:
+    def bound(
+        self, wrench_served: Array, price: Array, value: Array, now: Now, command: Array
+    ) -> Array:
         """Proves a lower bound of the power by weak duality (Eq. 3).
 
         Args:
-            aim: wrenches (N, 6) that were found [N, N m].
+            wrench_served: wrenches (N, 6) that were found [N, N m].
             price: multipliers (N, 6) of them [W/N, W/(N m)].
             value: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
             now: what may be given.
@@ -372,7 +386,7 @@ class Dual(Method):
             # forces by more.
             value_by_laws = (1.0 - 10.0 * CLOSE) * value - NEARLY * largest_power
             value_by_laws = np.minimum(value_by_laws, power)
-            is_of_aim = _sizes((wrench - aim) / self.scale) <= NEARLY
+            is_of_aim = _sizes((wrench - wrench_served) / self.scale) <= NEARLY
             bound = np.where(is_of_aim, np.maximum(bound, value_by_laws), bound)
         elif works.all():
             # The prices are those of the smooth shapes that stand for tables.
@@ -427,7 +441,7 @@ class Dual(Method):
         given now; or as near to it as they come."""
         command = found.command
         problem = self.problem_now(now)
-        missing = problem.wrench(command) - found.aim / self.scale
+        missing = problem.wrench(command) - found.wrench_served / self.scale
         if problem.counts is not None:
             missing = np.where(problem.counts, missing, 0.0)
         if (each := missing.ravel()).dot(each) <= EXACT**2:
@@ -435,26 +449,30 @@ class Dual(Method):
         # Where the core's tables say what the laws say, it has done all that steps on commands can
         # do.
         error = _sizes(missing)
-        rough = np.flatnonzero((error > found.error + EXACT) | (found.within & (error > NEARLY)))
+        rough = np.flatnonzero(
+            (error > found.error + EXACT) | (found.is_attainable & (error > NEARLY))
+        )
         if not len(rough):
             return command
-        ends = refine(problem, found.aim[rough] / self.scale, command[rough], ROUNDS, EXACT)
+        ends = refine(
+            problem, found.wrench_served[rough] / self.scale, command[rough], ROUNDS, EXACT
+        )
         command[rough] = ends.command
         if now.previous is not None:
             return self.rates.box(now.previous).held(command, self.plant)
-        for row in rough[(ends.error > NEARLY) & found.within[rough]].tolist():
+        for row in rough[(ends.error > NEARLY) & found.is_attainable[rough]].tolist():
             # Such as idle fins in line, or a least force: no small change of these commands helps.
             draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
             shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
             starts = command[row] + shares * draw * self.problem.width
-            other = self._meeting(problem, found.aim[row] / self.scale, starts)
+            other = self._meeting(problem, found.wrench_served[row] / self.scale, starts)
             command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
-    def error(self, command: Array, aim: Array, now: Now = STILL) -> Array:
+    def error(self, command: Array, wrench_served: Array, now: Now = STILL) -> Array:
         """Distance (N,), on the yardstick, of what commands (N, n, 3) give now from wrenches (N,
         6)."""
-        missing = self.problem_now(now).wrench(command) - aim / self.scale
+        missing = self.problem_now(now).wrench(command) - wrench_served / self.scale
         return _sizes(missing if now.free is None else np.where(now.free, 0.0, missing))
 
 

@@ -57,14 +57,14 @@ def settled(dual: Any, targets: Array, policy: Policy, now: Now, prices: Array |
     for target in targets:
         found = _settled(dual, target, policy, now, prices)
         command = dual.exact(found, now)
-        aim = found.aim
-        if policy.kind == "direction" and not found.within.all():
-            command, aim = _on_the_ray(dual, target[None], command, now)
+        served = found.wrench_served
+        if policy.kind == "direction" and not found.is_attainable.all():
+            command, served = _on_the_ray(dual, target[None], command, now)
         if dual.error(command, target[None], now)[0] > NEARLY:
             notes |= dual.not_held(target[None], now)
-        parts.append((command, aim, found.price))
-    command, aim, price = map(np.concatenate, zip(*parts, strict=True))
-    solution: Solution = dual.solution(command, aim, price, np.zeros(len(aim)), notes, now)
+        parts.append((command, served, found.prices))
+    command, served, price = map(np.concatenate, zip(*parts, strict=True))
+    solution: Solution = dual.solution(command, served, price, np.zeros(len(served)), notes, now)
     return solution
 
 
@@ -76,7 +76,9 @@ def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array |
         return whole.settled(target, None, IN_A_TICK, policy, prices, now).found
     laws: Found = dual.forces(target[None], policy, prices, now)
     left = WORK / len(laws.force[0])
-    best = whole.settled(target, laws.force[0], ROUNDS, policy, laws.price[0], now, most_steps=left)
+    best = whole.settled(
+        target, laws.force[0], ROUNDS, policy, laws.prices[0], now, most_steps=left
+    )
     left -= best.steps
 
     def better(starts: Array, followed: int) -> bool:
@@ -90,7 +92,7 @@ def _settled(dual: Any, target: Array, policy: Policy, now: Now, prices: Array |
                 break
             force = tried[k].found.force[0]
             other = whole.settled(
-                target, force, ROUNDS, policy, laws.price[0], now, most_steps=left
+                target, force, ROUNDS, policy, laws.prices[0], now, most_steps=left
             )
             left -= other.steps
             best = other if _beats(other, best) else best

@@ -111,9 +111,11 @@ def test_costly_reverse_is_within_reach() -> None:
     robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
     found = robot.core.one(wrench, None)
-    inner = np.append(robot.basis.T @ (robot.scale * found.price[0]), np.zeros(3))
-    assert found.within[0]
-    np.testing.assert_allclose(robot.core.look(wrench, inner)[1], 3 * 5.0 * 9.0**1.5, rtol=1e-9)
+    inner = np.append(robot.basis.T @ (robot.scale * found.prices[0]), np.zeros(3))
+    assert found.is_attainable[0]
+    np.testing.assert_allclose(
+        robot.core.dual_value(wrench, inner)[1], 3 * 5.0 * 9.0**1.5, rtol=1e-9
+    )
     np.testing.assert_allclose(found.command[0, :, 0], -9.0, atol=1e-9)
 
 
