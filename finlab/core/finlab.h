@@ -39,8 +39,8 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #endif
 
 /* Most steps of Newton's method in one answer by the usual settings: two searches of two parts,
-   each a dive and two for each cut. Where foils drag, steps of a start take FL_SETTLE more: starts of a
-   part, of the foils' ends, of a lattice of their angles (6) and of the shares of a ray. */
+   each a dive and two for each cut. Where foils drag, steps of a start take FL_SETTLE more: starts
+   of a part, of the foils' ends, of a lattice of their angles (6) and of the shares of a ray. */
 #define FL_SETTLE (12 * 60)
 #define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)

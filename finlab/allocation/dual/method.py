@@ -189,7 +189,7 @@ class Dual(Method):
         command: Array,
         wrench_served: Array,
         price: Array,
-        value: Array,
+        gap_power_bound: Array,
         notes: set[str],
         now: Now,
     ) -> Solution:
@@ -197,7 +197,9 @@ class Dual(Method):
         (N, 6) and values (N,) [W] prove, and sentences."""
         if now.lost is not None:
             command[:, now.lost] = np.nan
-        bound: Callable[[Array], Array] = partial(self.bound, wrench_served, price, value, now)
+        bound: Callable[[Array], Array] = partial(
+            self.bound, wrench_served, price, gap_power_bound, now
+        )
         return Solution(
             command,
             bound=None if self.unproved else bound,
@@ -353,14 +355,14 @@ class Dual(Method):
         return np.asarray(driven if now.free is None else driven & ~now.free)
 
     def bound(
-        self, wrench_served: Array, price: Array, value: Array, now: Now, command: Array
+        self, wrench_served: Array, price: Array, gap_power_bound: Array, now: Now, command: Array
     ) -> Array:
         """Proves a lower bound of the power by weak duality (Eq. 3).
 
         Args:
             wrench_served: wrenches (N, 6) that were found [N, N m].
             price: multipliers (N, 6) of them [W/N, W/(N m)].
-            value: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
+            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
             now: what may be given.
             command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as
                 the laws come.
@@ -384,10 +386,10 @@ class Dual(Method):
         if not self._measured:
             # The value is one of tables, which are off by a share of full power, at the least
             # forces by more.
-            value_by_laws = (1.0 - 10.0 * CLOSE) * value - NEARLY * largest_power
+            value_by_laws = (1.0 - 10.0 * CLOSE) * gap_power_bound - NEARLY * largest_power
             value_by_laws = np.minimum(value_by_laws, power)
-            is_of_aim = _sizes((wrench - wrench_served) / self.scale) <= NEARLY
-            bound = np.where(is_of_aim, np.maximum(bound, value_by_laws), bound)
+            is_of_served = _sizes((wrench - wrench_served) / self.scale) <= NEARLY
+            bound = np.where(is_of_served, np.maximum(bound, value_by_laws), bound)
         elif works.all():
             # The prices are those of the smooth shapes that stand for tables.
             rows = np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)

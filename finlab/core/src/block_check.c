@@ -114,8 +114,8 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   if (!is_whole_number(a->command_kind, FL_THRUSTER, FL_FOIL)) return FL_BAD_BLOCK;
   if (!has_tables(block, a)) return FL_BAD_BLOCK;
   if (!are_command_limits(a)) return FL_BAD_NUMBER;
-  const real largest_price = block[(int)a->force_table];
-  if (!(largest_price > 0)) return FL_BAD_NUMBER;
+  const real price_max = block[(int)a->force_table];
+  if (!(price_max > 0)) return FL_BAD_NUMBER;
   if (a->force_table_reverse != 0 && !(block[(int)a->force_table_reverse] > 0))
     return FL_BAD_NUMBER;
   if (!(a->force_scale > 0 && a->power_scale > 0 && a->row_force_max[0] > 0)) return FL_BAD_NUMBER;

@@ -167,15 +167,16 @@ void fl_dual_start(const real *block, fl_work *work, const real *target, const r
   fl_dual_at(block, work, target, lambda, work->state);
 }
 
-/* Largest force [N] of a line at prices of this sign, and its force over price there [N^2/W]. */
-static void gain_of_line(const real *block, const fl_actuator *a, real s, real *most, real *gain) {
+/* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
+static void secant_of_line(const real *block, const fl_actuator *a, real s, real *most,
+                           real *secant) {
   const real *table = block + (int)a->force_table;
   if (s < 0 && a->force_table_reverse > 0) table = block + (int)a->force_table_reverse;
-  const real largest_price = table[0];
+  const real price_max = table[0];
   const int cells = (int)table[1];
-  const real largest_force = table[3 + 3 * cells];
-  *most = a->force_scale * largest_force;
-  *gain = *most * a->force_scale / (largest_price * a->power_scale);
+  const real force_max = table[3 + 3 * cells];
+  *most = a->force_scale * force_max;
+  *secant = *most * a->force_scale / (price_max * a->power_scale);
 }
 
 /* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
@@ -197,8 +198,8 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
     if (is_plane(a)) size_s = size_of(s);
     const real size_y = a->secant[0] * size_s;
     real most = a->row_force_max[0];
-    real gain[2] = {a->secant[0], a->secant[1]};
-    if (a->rows == 1) gain_of_line(block, a, s[0], &most, &gain[0]);
+    real secant[2] = {a->secant[0], a->secant[1]};
+    if (a->rows == 1) secant_of_line(block, a, s[0], &most, &secant[0]);
 
     const real share = size_y / most;
     if (share > NEAR_LIMIT) *mu = SATURATED;
@@ -206,7 +207,7 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
     real weight = SQRT(fl_clipped(share, CLOSE, 1));
     if (share > 1 && !work->has_drag) weight = 1 / share;
     for (int row = 0; row < (int)a->rows; row++) {
-      fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * gain[row]);
+      fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
     }
   }
   const real trace = fl_trace(H);

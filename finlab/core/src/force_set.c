@@ -201,6 +201,7 @@ fl_set fl_reversed_set(const fl_set *set) {
 /* The largest slope of a table of force over price, of all of its cubics: no slope is above the
    control points of its parabola, which are the slopes at both knots and one between them. */
 static real steepest_in(const real *table) {
+  const real price_max = table[0];
   const int cells = (int)table[1];
   const real *knot = table + 3;
   real most = 0;
@@ -210,7 +211,7 @@ static real steepest_in(const real *table) {
     real last = (real)(k + 1) / (real)cells;
     first *= first;
     last *= last;
-    const real width = (last * last - first * first) * table[0];
+    const real width = (last * last - first * first) * price_max;
     const real middle = 3 * (knot[3] - knot[0]) / width - knot[1] - knot[4];
     const real most_at_knots = fl_larger(knot[1], knot[4]);
     most = fl_larger(fl_larger(most, middle), most_at_knots);

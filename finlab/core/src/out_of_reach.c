@@ -11,7 +11,7 @@
 #define ROUGHLY (NEARLY / 10)
 #define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
-/* Scaled wrench by which an answer at the rim may be off: what it gives is then its aim. */
+/* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
 #define NONE R(1e30)    /* power that no answer reaches */
 
