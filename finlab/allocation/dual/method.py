@@ -362,7 +362,8 @@ class Dual(Method):
         Args:
             wrench_served: wrenches (N, 6) that were found [N, N m].
             price: multipliers (N, 6) of them [W/N, W/(N m)].
-            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for the aims.
+            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for
+                them.
             now: what may be given.
             command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as
                 the laws come.
