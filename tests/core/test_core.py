@@ -83,7 +83,7 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
         assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).is_attainable[0]
     with pytest.raises(CommandError, match="argument"):
         heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.inf)))
-    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).within[
+    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).is_attainable[
         0
     ]  # nothing is known
 
