@@ -163,7 +163,7 @@ def test_the_core_imports_no_wing_and_all_imports_go_one_way() -> None:
     for path in _sources("finlab"):
         module = _module_of(path)
         here = _room(module)
-        if here is None:  # finlab/__init__.py and __main__.py are the front door
+        if here is None:  # finlab/__init__.py and __main__.py import what the package offers
             continue
         for imported, line in _imports(path):
             there = _room(imported)

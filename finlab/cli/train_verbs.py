@@ -126,7 +126,7 @@ def interaction(
     check_positive(steps=steps, minutes=minutes)
     error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
     print(
-        f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise "
+        f"{output / WEIGHTS_FILE}: error {error:.3g} of the wrench scale on robots held out, noise "
         "included"
     )
 
