@@ -169,7 +169,10 @@ def test_the_core_imports_no_wing_and_all_imports_go_one_way() -> None:
             there = _room(imported)
             if there is not None and not _allowed(module, here, there):
                 wrong.append(f"{path.relative_to(ROOT)}:{line} imports {imported}")
-    assert not wrong, "\n".join(wrong)
+    advice = (
+        "CORE and WINGS say what a room may import; a verb that imports a wing has a line in VERBS"
+    )
+    assert not wrong, "\n".join([*wrong, advice])
 
 
 def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
