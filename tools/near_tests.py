@@ -53,7 +53,7 @@ CALLS_THE_CORE = {
     "tests/allocation/test_contract.py": 1,
     "tests/allocation/dual": 1,
     "tests/allocation": 2,
-    "tests/interaction": 2,
+    "tests/interaction": 1,
     "tests/forces": 2,
 }
 """Tests of what calls the core in C, and how many imports they are off a C file at most."""

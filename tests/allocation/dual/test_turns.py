@@ -8,13 +8,18 @@ from scipy.optimize import minimize
 
 from finlab.allocation import Allocator
 from finlab.allocation.dual.turns import ASIDE, RANDOM, WALSH, _turned_aside
-from finlab.arrays import Array
+from finlab.allocation.policy import CLOSEST
+from finlab.arrays import ROUNDS, Array
+from finlab.core.calls import STILL
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_jet_robot
 from tests.mixed_robots import bluerov2_heavy
+
+MOST_STEPS = 540.0
+"""Steps of the turns of all questions: what they took when this was written, and a tenth more."""
 
 
 def test_other_beginnings_turn_planes_and_change_sizes() -> None:
@@ -111,3 +116,21 @@ def test_a_direction_is_kept_on_its_ray_whatever_the_robot(seed: int) -> None:
         assert answer.err_norm == pytest.approx(
             (1.0 - share) * np.linalg.norm(along), rel=1e-4, abs=1e-6
         )
+
+
+def test_turns_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
+    """Each turn is exact on the model that is linear at the last answer: a fault of that model costs
+    turns, or ends elsewhere."""
+    steps = 0.0
+    for seed in range(4):
+        rng = np.random.default_rng([5, seed])
+        layout = replace(random_jet_robot(rng, "robot", (4, 7)), interaction=Jets())
+        plant = Plant(layout)
+        dual = Allocator(layout)._whole.method
+        for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
+            laws = dual.forces(target[None], CLOSEST, None, STILL)
+            ended = dual.whole.settled(
+                target, laws.force[0], ROUNDS, CLOSEST, laws.price[0], STILL, most_steps=1e6
+            )
+            steps += ended.steps
+    assert steps <= MOST_STEPS
