@@ -138,7 +138,7 @@ def functions() -> ctypes.PyDLL:
                     "fl_support_of_set",
                 ),
                 *("fl_gauge_radius", "fl_gauge_lean", "fl_largest_slope", "fl_refine_commands"),
-                *("fl_drag_of_lift", "fl_look"),
+                *("fl_drag_of_lift", "fl_dual_value"),
             ),
             REAL,
         ),
@@ -187,7 +187,7 @@ class Robot:
     def is_plane(self, i: int) -> bool:
         """Whether an actuator pushes in a plane."""
         own = self.actuators[i]
-        return bool(own["rows"] == 2.0 and own["speed"] == 0.0)
+        return bool(own["rows"] == 2.0 and own["flow_speed"] == 0.0)
 
     def work(self) -> Any:
         """A work area that is prepared."""
@@ -199,9 +199,9 @@ class Robot:
         """The limits of all commands."""
         box = Box()
         for i, own in enumerate(self.actuators):
-            box.low[i][:] = own["lower"]
-            box.high[i][:] = own["upper"]
-            box.free[i] = int(own["turns"] != 0.0)
+            box.low[i][:] = own["command_min"]
+            box.high[i][:] = own["command_max"]
+            box.free[i] = int(own["is_free_angle"] != 0.0)
         return box
 
     def set_of(self, i: int, low: float, high: float, middle: float, half: float) -> Set:
@@ -214,7 +214,9 @@ class Robot:
     def whole_set(self, i: int) -> Set:
         """All that an actuator may give."""
         own = self.actuators[i]
-        return self.set_of(i, own["low"], own["high"], own["middle"], own["half"])
+        return self.set_of(
+            i, own["force_min"], own["force_max"], own["sector_center"], own["sector_half_angle"]
+        )
 
     def power(self, i: int, force: float) -> float:
         """Power [W] of a size of force [N], of planes below 0 in reverse."""
@@ -226,7 +228,7 @@ class Robot:
 
     def radius(self, i: int, angle: float) -> float:
         """Share of the table's force in a direction [rad]."""
-        gauge = self.actuators[i]["gauge"]
+        gauge = self.actuators[i]["gauge_table"]
         if gauge == 0.0:
             return 1.0
         return float(functions().fl_gauge_radius(at(self.table(gauge)), REAL(angle)))

@@ -19,9 +19,9 @@ BLEND = 1e-5
 
 def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
     """Forces (N, 2) along the rows of an actuator that its set has, and their power (N,) [W]."""
-    ways = [(limits.low, limits.high, 0.0, -1.0 if limits.flipped else 1.0)]
-    if limits.reverse > 0.0:
-        ways.append((0.0, limits.reverse, math.pi, -1.0))
+    ways = [(limits.force_min, limits.force_max, 0.0, -1.0 if limits.is_flipped else 1.0)]
+    if limits.force_max_reverse > 0.0:
+        ways.append((0.0, limits.force_max_reverse, math.pi, -1.0))
     force = list[Array]()
     power = list[Array]()
     for low, high, turned, sign in ways:
@@ -33,7 +33,11 @@ def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
             force.append(np.stack([size, drag], axis=-1))
             power.append(cost)
             continue
-        angle = limits.middle + turned + limits.half * np.linspace(-1.0, 1.0, ANGLES)
+        angle = (
+            limits.sector_center
+            + turned
+            + limits.sector_half_angle * np.linspace(-1.0, 1.0, ANGLES)
+        )
         radius = np.array([robot.radius(i, one) for one in angle])
         direction = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         force.append((size[:, None, None] * direction).reshape(-1, 2))
@@ -44,7 +48,10 @@ def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
 def sets_of(robot: Robot, i: int, rng: np.random.Generator) -> list[Set]:
     """All that an actuator may give, and parts of it: some sizes, some directions, one way."""
     own = robot.actuators[i]
-    low, high, middle, half = (float(own[name]) for name in ("low", "high", "middle", "half"))
+    low, high, middle, half = (
+        float(own[name])
+        for name in ("force_min", "force_max", "sector_center", "sector_half_angle")
+    )
     ends = np.sort(low + rng.random((2, 2)) * (high - low), axis=1)
     sets = [robot.whole_set(i), robot.set_of(i, *ends[0], middle, half)]
     if robot.is_plane(i):
@@ -52,7 +59,7 @@ def sets_of(robot: Robot, i: int, rng: np.random.Generator) -> list[Set]:
             narrow = share * half
             turned = middle + (rng.uniform(-1.0, 1.0) * (half - narrow))
             sets.append(robot.set_of(i, *ends[1], turned, narrow))
-        if own["form"] == POD and low < 0.0:
+        if own["command_kind"] == POD and low < 0.0:
             sets.append(robot.set_of(i, low, 0.3 * low, middle, half))
     return sets
 
@@ -61,14 +68,14 @@ def prices_of(robot: Robot, i: int, rng: np.random.Generator, count: int) -> Arr
     """Prices (count, 2) along the rows of an actuator: of small forces, up to more than the largest
     one's."""
     own = robot.actuators[i]
-    top = robot.table(own["ahead"])[0] * own["worth"] / own["share"]
+    top = robot.table(own["force_table"])[0] * own["power_scale"] / own["force_scale"]
     size = top * 10.0 ** rng.uniform(-1.5, 0.3, count)
     angle = rng.uniform(-np.pi, np.pi, count)
     price = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
     if own["rows"] == 1.0:
         return np.asarray(price * [1.0, 0.0])
-    if own["speed"] > 0.0:  # drag is paid, a little or much, or welcome
-        price[:, 1] = own["speed"] * rng.uniform(-3.0, 0.75, count)
+    if own["flow_speed"] > 0.0:  # drag is paid, a little or much, or welcome
+        price[:, 1] = own["flow_speed"] * rng.uniform(-3.0, 0.75, count)
     return price
 
 
@@ -89,7 +96,7 @@ def test_a_response_is_worth_as_much_as_the_best_force_of_its_set(name: str) -> 
                 told = robot.response(i, limits, price).conjugate
                 # Between points of the scan there may be more; blends and soft turns add a little.
                 scale = np.abs(price).max() * np.abs(force).max() + power.max()
-                soft = math.sqrt(limits.gap2) * np.abs(force).max()
+                soft = math.sqrt(limits.price_floor_squared) * np.abs(force).max()
                 assert -1e-6 * scale <= told - best <= 5e-4 * scale + soft, (i, price)
 
 
@@ -119,7 +126,7 @@ def check_derivatives(robot: Robot, i: int, limits: Set, price: Array) -> bool:
     fine = differences(robot, i, limits, price, 1e-6 * size)
     rough = differences(robot, i, limits, price, 3e-6 * size)
     told = robot.response(i, limits, price)
-    most = robot.actuators[i]["most"].max()
+    most = robot.actuators[i]["row_force_max"].max()
     if np.abs(fine[1] - rough[1]).max() * size > 1e-3 * most:
         return False
     np.testing.assert_allclose(told.force, fine[0], atol=1e-4 * most)
@@ -148,10 +155,13 @@ def test_slopes_between_two_answers_are_those_of_their_blend() -> None:
         robot = robot_of(name, 1)
         for i in range(robot.n):
             limits = robot.whole_set(i)
-            if not limits.forked and not limits.reverse > 0.0:
+            if not limits.is_forked and not limits.force_max_reverse > 0.0:
                 continue
-            top = robot.table(robot.actuators[i]["ahead"])[0] * robot.actuators[i]["worth"]
-            found = crossing(robot, i, limits, top / robot.actuators[i]["share"])
+            top = (
+                robot.table(robot.actuators[i]["force_table"])[0]
+                * robot.actuators[i]["power_scale"]
+            )
+            found = crossing(robot, i, limits, top / robot.actuators[i]["force_scale"])
             if found is None:
                 continue
             for aside in (-3e-6, 0.0, 1e-5):
@@ -164,7 +174,7 @@ def crossing(robot: Robot, i: int, limits: Set, top: float) -> tuple[float, floa
     """Size and direction of a price at which the force changes sides; None where it does
     nowhere."""
     size = top
-    angle = limits.middle + np.linspace(-np.pi, np.pi, 73) + 0.01
+    angle = limits.sector_center + np.linspace(-np.pi, np.pi, 73) + 0.01
     force = [
         np.array(robot.response(i, limits, size * np.array([math.cos(a), math.sin(a)])).force)
         for a in angle
@@ -172,7 +182,7 @@ def crossing(robot: Robot, i: int, limits: Set, top: float) -> tuple[float, floa
     apart = [np.linalg.norm(b - a) for a, b in zip(force, force[1:], strict=False)]
     k = int(np.argmax(apart))
     low, high = angle[k], angle[k + 1]
-    if apart[k] < 0.3 * robot.actuators[i]["most"][0]:
+    if apart[k] < 0.3 * robot.actuators[i]["row_force_max"][0]:
         return None
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -192,7 +202,7 @@ def check_blend(robot: Robot, i: int, limits: Set, price: Array) -> bool:
     _, rough = differences(robot, i, limits, price, 200.0 * step)
     told = robot.response(i, limits, price)
     own = np.array([[told.xx, told.xy], [told.xy, told.yy]])
-    most = robot.actuators[i]["most"][0]
+    most = robot.actuators[i]["row_force_max"][0]
     np.testing.assert_allclose(told.force, gradient, atol=2e-3 * most)
     np.testing.assert_allclose(
         own, slope, atol=0.02 * np.abs(own).max() + np.abs(slope - rough).max()
@@ -211,17 +221,19 @@ def test_turning_costs_what_it_costs_and_is_weighed_against_the_force(number: in
             for limits in sets_of(robot, i, rng):
                 price = prices_of(robot, i, rng, 1)[0]
                 force, power = forces_of(robot, i, limits)
-                if limits.half >= np.pi:
-                    limits.at = rng.uniform(-np.pi, np.pi)
+                if limits.sector_half_angle >= np.pi:
+                    limits.turn_origin = rng.uniform(-np.pi, np.pi)
                 else:
-                    limits.at = limits.middle + limits.half * rng.uniform(-1.0, 1.0)
-                limits.turn = (
+                    limits.turn_origin = (
+                        limits.sector_center + limits.sector_half_angle * rng.uniform(-1.0, 1.0)
+                    )
+                limits.turn_cost = (
                     np.abs(price).max() * np.abs(force).max() * 10.0 ** rng.uniform(-2.0, 0.5)
                 )
-                limits.steepest = functions().fl_largest_slope(at(robot.block), i)
+                limits.slope_max = functions().fl_largest_slope(at(robot.block), i)
                 best = max(turned_worth(robot, i, limits, force, power, price))
                 told = robot.response(i, limits, price)
-                scale = np.abs(price).max() * np.abs(force).max() + power.max() + limits.turn
+                scale = np.abs(price).max() * np.abs(force).max() + power.max() + limits.turn_cost
                 assert -1e-6 * scale <= told.conjugate - best <= 1e-3 * scale
                 check_derivatives(robot, i, limits, price)
 
@@ -231,20 +243,24 @@ def turned_worth(
 ) -> list[float]:
     """What forces of both ways are worth at angles around the one before, less the cost of turning
     there."""
-    low, high = limits.middle - limits.half, limits.middle + limits.half
-    if limits.half >= np.pi:
-        low, high = limits.at - np.pi, limits.at + np.pi
+    low, high = (
+        limits.sector_center - limits.sector_half_angle,
+        limits.sector_center + limits.sector_half_angle,
+    )
+    if limits.sector_half_angle >= np.pi:
+        low, high = limits.turn_origin - np.pi, limits.turn_origin + np.pi
     found = list[float]()
-    ways = [(limits.low, limits.high, -1.0 if limits.flipped else 1.0, 1.0)]
-    if limits.reverse > 0.0:
-        ways.append((0.0, limits.reverse, -1.0, -1.0))
+    ways = [(limits.force_min, limits.force_max, -1.0 if limits.is_flipped else 1.0, 1.0)]
+    if limits.force_max_reverse > 0.0:
+        ways.append((0.0, limits.force_max_reverse, -1.0, -1.0))
     for least, most, sign, way in ways:
         size = np.linspace(least, most, 121)
         cost = np.array([robot.power(i, sign * one) for one in size])
         for angle in np.linspace(low, high, ANGLES):
             along = way * (price[0] * math.cos(angle) + price[1] * math.sin(angle))
             found.append(
-                float((along * size - cost).max()) - limits.turn / 2.0 * (angle - limits.at) ** 2
+                float((along * size - cost).max())
+                - limits.turn_cost / 2.0 * (angle - limits.turn_origin) ** 2
             )
     return found
 
@@ -271,15 +287,19 @@ def test_a_foil_on_its_tangent_answers_with_the_best_step() -> None:
     robot = robot_of("rudders")
     for _ in range(40):
         tangent = Tangent()
-        tangent.force[:], tangent.slope[:] = rng.normal(size=2), rng.normal(size=2)
-        tangent.cost, tangent.pay, tangent.bend = rng.random(), rng.normal(), rng.uniform(0.5, 4.0)
+        tangent.force[:], tangent.force_slope[:] = rng.normal(size=2), rng.normal(size=2)
+        tangent.cost, tangent.cost_slope, tangent.curvature = (
+            rng.random(),
+            rng.normal(),
+            rng.uniform(0.5, 4.0),
+        )
         limits = robot.whole_set(0)
-        limits.low, limits.high = -rng.uniform(0.1, 1.0), rng.uniform(0.1, 1.0)
+        limits.force_min, limits.force_max = -rng.uniform(0.1, 1.0), rng.uniform(0.1, 1.0)
         limits.tangent = ctypes.addressof(tangent)
         price = rng.normal(size=2)
-        step = np.linspace(limits.low, limits.high, 20_001)
-        force = np.array(tangent.force) + step[:, None] * np.array(tangent.slope)
-        cost = tangent.cost + tangent.pay * step + 0.5 * tangent.bend * step**2
+        step = np.linspace(limits.force_min, limits.force_max, 20_001)
+        force = np.array(tangent.force) + step[:, None] * np.array(tangent.force_slope)
+        cost = tangent.cost + tangent.cost_slope * step + 0.5 * tangent.curvature * step**2
         value = force @ price - cost
         told = robot.response(0, limits, price)
         assert told.conjugate == pytest.approx(value.max(), abs=1e-7)
@@ -296,7 +316,7 @@ def test_a_table_s_force_power_and_price_belong_together(name: str) -> None:
     robot = robot_of(name, 1)
     for i in range(robot.n):
         own = robot.actuators[i]
-        for place in {own["ahead"], own["back"] or own["ahead"]}:
+        for place in {own["force_table"], own["force_table_reverse"] or own["force_table"]}:
             table = robot.table(place).copy()
             top, largest = table[0], table[3 + 3 * int(table[1])]
             for price in top * rng.random(20) ** 3:

@@ -20,16 +20,16 @@ STEP = 1e-6
 def commands_of(robot: Robot, i: int, rng: np.random.Generator, count: int) -> Array:
     """Commands (count, 3) of an actuator within its limits."""
     own = robot.actuators[i]
-    lower: Array = own["lower"]
-    return np.asarray(lower + rng.random((count, 3)) * (own["upper"] - lower))
+    lower: Array = own["command_min"]
+    return np.asarray(lower + rng.random((count, 3)) * (own["command_max"] - lower))
 
 
 def own_axes(robot: Robot, i: int, force: Array) -> Array:
     """A force (3,) of the core in the actuator's own axes, with what a foil drags at rest."""
     own = robot.actuators[i]
     told = force.copy()
-    if own["speed"] > 0.0:
-        told[1] += own["pressure"] * own["rest"]
+    if own["flow_speed"] > 0.0:
+        told[1] += own["pressure_area"] * own["zero_lift_drag"]
     return np.asarray(told @ robot.axes[i])
 
 
@@ -45,7 +45,7 @@ def test_forces_are_those_of_the_plant(name: str) -> None:
             )
             # Where the law is below a dead band it gives nothing; the core asks for that elsewhere.
             held = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
-            most = robot.actuators["most"].max(axis=1)[:, None]
+            most = robot.actuators["row_force_max"].max(axis=1)[:, None]
             off = np.abs(told - robot.plant.force(command)) / most
             assert off[held].max(initial=0.0) <= 1e-4
 
@@ -55,7 +55,7 @@ def test_slopes_of_forces_are_those_of_differences(name: str) -> None:
     rng = np.random.default_rng(1)
     robot = robot_of(name)
     for i in range(robot.n):
-        most = robot.actuators[i]["most"].max()
+        most = robot.actuators[i]["row_force_max"].max()
         for command in commands_of(robot, i, rng, 30):
             _, slope = robot.force(i, command)
             for c in range(3):
@@ -77,22 +77,24 @@ def test_slopes_of_uneven_fins_that_are_commanded_by_force() -> None:
     rng = np.random.default_rng(2)
     for i in range(robot.n):
         own = robot.actuators[i]
-        assert own["gauge"] > 0.0
-        own["form"] = POD
+        assert own["gauge_table"] > 0.0
+        own["command_kind"] = POD
         for _ in range(20):
-            command = np.array([rng.uniform(-3.0, 3.0), own["most"][0] * rng.random(), 0.0])
+            command = np.array(
+                [rng.uniform(-3.0, 3.0), own["row_force_max"][0] * rng.random(), 0.0]
+            )
             force, slope = robot.force(i, command)
             radius = robot.radius(i, command[0])
             direction = np.array([0.0, math.cos(command[0]), math.sin(command[0])])
             np.testing.assert_allclose(force, command[1] * radius * direction, rtol=1e-12)
-            for c, change in enumerate((step, 1e-6 * own["most"][0])):
+            for c, change in enumerate((step, 1e-6 * own["row_force_max"][0])):
                 near = change * np.eye(3)[c]
                 ahead, back = robot.force(i, command + near)[0], robot.force(i, command - near)[0]
-                atol = 1e-5 * own["most"][0]
+                atol = 1e-5 * own["row_force_max"][0]
                 np.testing.assert_allclose(
                     slope[c] * change, (ahead - back) / 2.0, atol=atol * change
                 )
-        own["form"] = FIN
+        own["command_kind"] = FIN
 
 
 @pytest.mark.parametrize("period", [0.0, 5.0])
@@ -111,9 +113,9 @@ def test_a_grid_of_uneven_knots_is_a_cubic_of_each_axis(
         [np.zeros(tables_begin(1)), grid_numbers(knots, values, period, is_product, is_root)]
     )
     block[3] = 1.0  # one actuator
-    assert actuators_of(block)[0]["form"] == 0.0
-    actuators_of(block)[0]["form"] = FIN
-    actuators_of(block)[0]["law"] = tables_begin(1)
+    assert actuators_of(block)[0]["command_kind"] == 0.0
+    actuators_of(block)[0]["command_kind"] = FIN
+    actuators_of(block)[0]["law_grid"] = tables_begin(1)
     assert len(numbers_of(np.zeros(1, struct("fl_actuator")))) == tables_begin(1) - tables_begin(0)
 
     def along(axis: Array, points: Array, x: float, turn: float) -> Array:
@@ -163,16 +165,22 @@ def test_a_command_gives_back_the_force_that_it_is_for(name: str) -> None:
             for asked in commands_of(robot, i, rng, 12):
                 wanted = np.zeros(2)
                 given = robot.force(i, asked)[0][rows]
-                wanted[: len(given)] = given * (own["sign"] if own["form"] == 0.0 else 1.0)
-                if own["speed"] > 0.0 and not own["low"] < wanted[0] < own["high"]:
+                wanted[: len(given)] = given * (
+                    own["command_sign"] if own["command_kind"] == 0.0 else 1.0
+                )
+                if own["flow_speed"] > 0.0 and not own["force_min"] < wanted[0] < own["force_max"]:
                     continue  # stalled: others give as much lift, by less drag
                 command = np.zeros(3)
                 places = ctypes.byref(box), at(wanted), None, at(command)
                 functions().fl_command_for_force(at(robot.block), i, *places)
-                assert (command >= own["lower"]).all() and (command <= own["upper"]).all()
+                assert (command >= own["command_min"]).all() and (
+                    command <= own["command_max"]
+                ).all()
                 back = robot.force(i, command)[0][rows]
-                np.testing.assert_allclose(back, given, atol=2e-3 * own["most"][0])
-                if own["form"] == POD and np.hypot(*given) > 1e-3:  # the cheaper way of both
+                np.testing.assert_allclose(back, given, atol=2e-3 * own["row_force_max"][0])
+                if (
+                    own["command_kind"] == POD and np.hypot(*given) > 1e-3
+                ):  # the cheaper way of both
                     assert (
                         robot.power(i, command[1]) <= robot.power(i, asked[1]) * (1.0 + 1e-6) + 1e-9
                     )
@@ -183,8 +191,8 @@ def boxes_of(robot: Robot, rng: np.random.Generator) -> Box:
     box = robot.whole_box()
     for i, own in enumerate(robot.actuators):
         ends = np.sort(rng.random((2, 3)), axis=0)
-        box.low[i][:] = own["lower"] + ends[0] * (own["upper"] - own["lower"])
-        box.high[i][:] = own["lower"] + ends[1] * (own["upper"] - own["lower"])
+        box.low[i][:] = own["command_min"] + ends[0] * (own["command_max"] - own["command_min"])
+        box.high[i][:] = own["command_min"] + ends[1] * (own["command_max"] - own["command_min"])
     return box
 
 
@@ -192,12 +200,12 @@ def sizes_and_angles(robot: Robot, i: int, commands: Array) -> tuple[Array, Arra
     """Forces (N,) [N] of commands (N, 3) along their directions, and of planes these directions
     [rad]."""
     own = robot.actuators[i]
-    if own["form"] == POD:
+    if own["command_kind"] == POD:
         return np.asarray(commands[:, 1]), np.asarray(commands[:, 0])
     force = np.array([robot.force(i, command)[0] for command in commands])
     if robot.is_plane(i):
         return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
-    sign = own["sign"] if own["form"] == 0.0 else 1.0
+    sign = own["command_sign"] if own["command_kind"] == 0.0 else 1.0
     return np.asarray(sign * force[:, 0]), None
 
 
@@ -209,13 +217,13 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
         box = boxes_of(robot, rng)
         for i in range(robot.n):
             own = robot.actuators[i]
-            if own["uneven"] != 0.0 or own["gauge"] != 0.0:
+            if own["unevenness"] != 0.0 or own["gauge_table"] != 0.0:
                 continue  # the largest force is not the same in all directions
             low, high = np.array(box.low[i]), np.array(box.high[i])
             share = np.stack(np.meshgrid(*3 * [np.linspace(0.0, 1.0, 6)]), axis=-1).reshape(-1, 3)
             size, angle = sizes_and_angles(robot, i, low + share * (high - low))
             told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
-            slack = 0.02 * own["most"][0]
+            slack = 0.02 * own["row_force_max"][0]
             assert size.min() == pytest.approx(told.low, abs=slack)
             assert size.max() == pytest.approx(told.high, abs=slack)
             if angle is None:
@@ -231,4 +239,6 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
 
 def test_pods_either_way_are_among_the_robots() -> None:
     robot = robot_of(EITHER_WAY)
-    assert (robot.actuators["back"] > 0.0).all() and (robot.actuators["form"] == POD).all()
+    assert (robot.actuators["force_table_reverse"] > 0.0).all() and (
+        robot.actuators["command_kind"] == POD
+    ).all()

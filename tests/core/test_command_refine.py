@@ -18,8 +18,8 @@ EXACT = 1.1e-8
 def wrench_of(robot: Robot, command: Array) -> Array:
     """The wrench (6,) of commands (n, 3) by the core's own laws."""
     force = np.stack([robot.force(i, np.ascontiguousarray(command[i]))[0] for i in range(robot.n)])
-    own = np.einsum("na,nak->k", force, robot.actuators["own"])
-    return np.asarray(own * robot.head["yard"] + robot.head["beside"])
+    own = np.einsum("na,nak->k", force, robot.actuators["effectiveness_normalized"])
+    return np.asarray(own * robot.head["wrench_scale"] + robot.head["wrench_offset"])
 
 
 def refined(robot: Robot, wrench: Array, start: Array, steps: int) -> tuple[float, Array]:
@@ -38,7 +38,7 @@ def test_near_commands_that_give_a_wrench_a_few_steps_come_to_some(name: str) ->
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([8, number])
-        lower, upper = robot.actuators["lower"], robot.actuators["upper"]
+        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
         width = upper - lower
         for _ in range(8):
             known = lower + (0.2 + 0.6 * rng.random((robot.n, 3))) * width
@@ -48,7 +48,7 @@ def test_near_commands_that_give_a_wrench_a_few_steps_come_to_some(name: str) ->
             for steps in (0, 1, 2, 3, 6):
                 error, command = refined(robot, wrench, start, steps)
                 errors.append(error)
-                missing = (wrench_of(robot, command) - wrench) / robot.head["yard"]
+                missing = (wrench_of(robot, command) - wrench) / robot.head["wrench_scale"]
                 assert np.linalg.norm(missing) == pytest.approx(error, rel=1e-6, abs=1e-12)
                 assert (command >= lower).all() and (command <= upper).all()
             assert errors == sorted(errors, reverse=True)
@@ -70,7 +70,7 @@ def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) ->
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([9, number])
-        lower, upper = robot.actuators["lower"], robot.actuators["upper"]
+        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
         width = upper - lower
         for _ in range(6):
             share = 0.25 + 0.5 * rng.random((robot.n, 3))

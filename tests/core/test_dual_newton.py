@@ -38,7 +38,9 @@ def wrenches(robot: Robot, number: int, times: float, count: int) -> Array:
 def looked_at(robot: Robot, wrench: Array, inner: Array) -> tuple[float, Array]:
     """The dual value [W] at multipliers (6,), and the forces (n, 2)."""
     force = np.zeros((robot.n, 2))
-    value = functions().fl_look(at(robot.block), robot.work(), at(wrench), at(inner), at(force))
+    value = functions().fl_dual_value(
+        at(robot.block), robot.work(), at(wrench), at(inner), at(force)
+    )
     return float(value), force
 
 
@@ -47,15 +49,17 @@ def test_the_gradient_of_the_dual_is_what_is_left_of_the_wrench(name: str) -> No
     for number in NUMBERS:
         robot = robot_of(name, number)
         rng = np.random.default_rng([3, number])
-        rank = int(robot.head["range"])
+        rank = int(robot.head["rank"])
         for wrench in wrenches(robot, number, 1.0, 4):
             found = robot.answer(wrench)
-            inner: Array = found["inner"].copy()
+            inner: Array = found["lambda_reduced"].copy()
             size = np.abs(inner).max()
             inner[:rank] += 0.3 * size * rng.normal(size=rank)
             _, force = looked_at(robot, wrench, inner)
-            target = robot.head["basis"].T @ (wrench / robot.head["scale"])
-            residual = target - np.einsum("nr,nrj->j", force, robot.actuators["matrix"])
+            target = robot.head["basis"].T @ (wrench / robot.head["axis_scale"])
+            residual = target - np.einsum(
+                "nr,nrj->j", force, robot.actuators["effectiveness_reduced"]
+            )
             for j in range(rank):
                 change = 1e-5 * size * np.eye(6)[j]
                 ahead, back = (
@@ -71,18 +75,18 @@ def steps_of(name: str) -> tuple[int, int, int]:
     for number in NUMBERS:
         robot = robot_of(name, number)
         within += sum(
-            int(robot.answer(wrench)["steps"]) for wrench in wrenches(robot, number, 1.0, 8)
+            int(robot.answer(wrench)["newton_steps"]) for wrench in wrenches(robot, number, 1.0, 8)
         )
         for policy in ("closest", "direction", "priority"):
             served = _served(Policy(policy))
             for wrench in wrenches(robot, number, 3.0, 4):
-                beyond += int(robot.answer(wrench, policy=served.address)["steps"])
+                beyond += int(robot.answer(wrench, policy=served.address)["newton_steps"])
         previous = None
         for wrench in wrenches(robot, number, 1.0, 8):
             asked = {} if previous is None else {"previous": previous, "calm": 2.0}
             answer = robot.answer(wrench, **asked)
             previous = answer["command"][: robot.n].copy()
-            ticks += int(answer["steps"])
+            ticks += int(answer["newton_steps"])
     return within, beyond, ticks
 
 
@@ -98,7 +102,7 @@ def test_from_the_multipliers_of_an_answer_nothing_is_left_to_do(name: str) -> N
         robot = robot_of(name, number)
         for wrench in wrenches(robot, number, 1.0, 6):
             first = robot.answer(wrench)
-            again = robot.answer(wrench, price=first["price"].copy())
-            assert again["steps"] <= 1
-            near = robot.answer(1.001 * wrench, price=first["price"].copy())
-            assert near["steps"] <= max(4, first["steps"])
+            again = robot.answer(wrench, prices=first["prices"].copy())
+            assert again["newton_steps"] <= 1
+            near = robot.answer(1.001 * wrench, prices=first["prices"].copy())
+            assert near["newton_steps"] <= max(4, first["newton_steps"])

@@ -24,11 +24,17 @@ def columns_of(robot: Robot, lost: Array, free: Array) -> Array:
         if lost[i]:
             continue
         for row in range(int(own["rows"])):
-            axis = own["own"][1 + row] if robot.is_plane(i) else own["own"][row]
-            columns[i, row] = (
-                (own["sign"] if own["form"] == 0.0 else 1.0) * axis * robot.head["yard"]
+            axis = (
+                own["effectiveness_normalized"][1 + row]
+                if robot.is_plane(i)
+                else own["effectiveness_normalized"][row]
             )
-    return columns * (~free & (robot.head["counts"] != 0.0))
+            columns[i, row] = (
+                (own["command_sign"] if own["command_kind"] == 0.0 else 1.0)
+                * axis
+                * robot.head["wrench_scale"]
+            )
+    return columns * (~free & (robot.head["is_commanded"] != 0.0))
 
 
 def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
@@ -40,7 +46,7 @@ def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
     assert not basis[:, rank:].any()
     scale = np.array(span.scale)
     columns = columns_of(robot, lost, free)
-    sized = columns * robot.actuators["most"][..., None]
+    sized = columns * robot.actuators["row_force_max"][..., None]
     size = np.sqrt((sized**2).sum(axis=(0, 1)))
     np.testing.assert_allclose(scale, np.where(size > 1e-8 * size.max(), size, 1.0), rtol=1e-9)
     assert rank == np.linalg.matrix_rank((sized / scale).reshape(-1, 6), tol=1e-6)
@@ -48,12 +54,17 @@ def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
     np.testing.assert_allclose(matrix @ basis.T * scale, columns, atol=1e-7 * np.abs(columns).max())
     assert not matrix[lost].any()
 
-    beside = robot.head["beside"].copy()
+    beside = robot.head["wrench_offset"].copy()
     for i in np.flatnonzero(lost):
         own = robot.actuators[i]
-        if own["speed"] > 0.0:
-            beside -= own["pressure"] * own["rest"] * own["own"][1] * robot.head["yard"]
-    counts = ~free & (robot.head["counts"] != 0.0)
+        if own["flow_speed"] > 0.0:
+            beside -= (
+                own["pressure_area"]
+                * own["zero_lift_drag"]
+                * own["effectiveness_normalized"][1]
+                * robot.head["wrench_scale"]
+            )
+    counts = ~free & (robot.head["is_commanded"] != 0.0)
     np.testing.assert_allclose(span.beside, beside * counts, atol=1e-12)
 
 

@@ -39,13 +39,17 @@ def test_power_and_forces_of_commands_are_those_of_the_plant(name: str) -> None:
                 # A fin has many beats for one force, of which the core knows the cheapest.
                 most = own[~lost].sum()
                 assert power <= most * (1.0 + 2e-3) + 1e-6
-                if not (robot.actuators["form"] == FIN).any():
+                if not (robot.actuators["command_kind"] == FIN).any():
                     assert power == pytest.approx(most, rel=2e-3, abs=1e-6)
             assert not force[lost].any()
             for i in np.flatnonzero(~lost).tolist():
                 law, _ = robot.force(i, np.ascontiguousarray(command[i]))
                 rows = law[1:] if robot.is_plane(i) else law[:2]
-                sign = robot.actuators[i]["sign"] if robot.actuators[i]["form"] == 0.0 else 1.0
+                sign = (
+                    robot.actuators[i]["command_sign"]
+                    if robot.actuators[i]["command_kind"] == 0.0
+                    else 1.0
+                )
                 np.testing.assert_allclose(force[i], sign * rows, atol=1e-12)
 
 
@@ -53,11 +57,11 @@ def test_power_and_forces_of_commands_are_those_of_the_plant(name: str) -> None:
 def test_foils_of_a_flow_cost_their_drag_at_the_speed_of_the_flow(number: int) -> None:
     robot = robot_of("rudders", number)
     rng = np.random.default_rng([2, number])
-    foils = robot.actuators["speed"] > 0.0
+    foils = robot.actuators["flow_speed"] > 0.0
     assert foils.any()
     command = robot.plant.sample(rng, (1,))[0]
     power, force = told(robot, command, np.zeros(robot.n, bool))
     others, _ = told(robot, command, foils)
-    rest = robot.actuators["pressure"] * robot.actuators["rest"]
-    drag = robot.actuators["speed"] * (force[:, 1] + rest)
+    rest = robot.actuators["pressure_area"] * robot.actuators["zero_lift_drag"]
+    drag = robot.actuators["flow_speed"] * (force[:, 1] + rest)
     assert power - others == pytest.approx(drag[foils].sum(), rel=1e-9)

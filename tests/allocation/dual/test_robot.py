@@ -82,8 +82,8 @@ def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
     model = PowerLaw(0.3, reverse)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
     own = actuators_of(AnyRobot().method(Layout("one", (pod,))).compiled.robot.block)[0]
-    assert own["low"] == pytest.approx(ends[0])
-    assert own["least"] == (own["low"] if is_needed else 0.0)
+    assert own["force_min"] == pytest.approx(ends[0])
+    assert own["force_min_needed"] == (own["force_min"] if is_needed else 0.0)
 
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:

@@ -130,7 +130,7 @@ def test_turns_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
             laws = dual.forces(target[None], CLOSEST, None, STILL)
             ended = dual.whole.settled(
-                target, laws.force[0], ROUNDS, CLOSEST, laws.price[0], STILL, most_steps=1e6
+                target, laws.force[0], ROUNDS, CLOSEST, laws.prices[0], STILL, most_steps=1e6
             )
             steps += ended.steps
     assert steps <= MOST_STEPS
