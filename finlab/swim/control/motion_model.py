@@ -65,11 +65,11 @@ class MotionModel:
         self._constant = np.eye(size)
         self._constant[range(3, 6), range(11, 14)] = period_s / self.inertia[3:]
         self._gain = period_s / self.inertia
-        height = self._vehicle.dynamics.center[2]
+        height = self._vehicle.dynamics.center_of_buoyancy[2]
         # Roll swings within a second: an oscillation over a period is a turn, and a step along it
         # would grow. (Of a robot that is heavy at the top the frequency is imaginary, and the
         # cosine a hyperbolic one.)
-        swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
+        swing = np.sqrt(self._vehicle.buoyancy * height / self.inertia[3:5] + 1e-9j)
         sine = np.sin(swing * period_s)
         cosine = np.cos(swing * period_s)
         self._constant[range(3, 5), range(6, 8)] = (-swing * sine).real

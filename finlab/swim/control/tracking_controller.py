@@ -84,8 +84,8 @@ def gains_for(layout: Layout) -> TrackingGains:
     velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
     most = most_of(layout)
     body = dynamics_of(complete_body(layout))
-    linear = body.linear[0]
-    quadratic = max(body.quadratic[0], 1e-9)
+    linear = body.linear_damping[0]
+    quadratic = max(body.quadratic_damping[0], 1e-9)
     steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)
     return TrackingGains(
         velocity=velocity * pace,

@@ -22,7 +22,7 @@ from finlab.swim.identification.robot_model import RobotModel
 from finlab.swim.identification.swim import ANGLES, STEP_S
 from finlab.swim.identification.unknowns import BASE, Unknowns
 from finlab.swim.vehicle.fossen import Dynamics
-from finlab.swim.vehicle.vehicle import integrate
+from finlab.swim.vehicle.many_bodies import integrate
 
 WINDOW = 80
 """Steps of a window."""

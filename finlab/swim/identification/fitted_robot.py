@@ -179,10 +179,10 @@ def _body(fit: RobotFit) -> Body:
         model.body,
         hull=hull,
         added_mass=tuple(added.tolist()),
-        linear_damping=tuple(fitted.linear[:, 0].tolist()),
-        quadratic_damping=tuple(fitted.quadratic[:, 0].tolist()),
-        center_of_buoyancy_m=tuple(fitted.center[:, 0].tolist()),
-        buoyancy_n=max(float(fitted.lift[0]), 0.0),
+        linear_damping=tuple(fitted.linear_damping[:, 0].tolist()),
+        quadratic_damping=tuple(fitted.quadratic_damping[:, 0].tolist()),
+        center_of_buoyancy_m=tuple(fitted.center_of_buoyancy[:, 0].tolist()),
+        buoyancy_n=max(float(fitted.buoyancy[0]), 0.0),
     )
 
 

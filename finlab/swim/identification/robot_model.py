@@ -23,7 +23,7 @@ from finlab.swim.identification.swim import SMOOTHED, STEP_S, Swim
 from finlab.swim.identification.unknowns import SENSORS, SHAPE, Unknowns, blocks_of
 from finlab.swim.vehicle.attitude import rotation_of_angles
 from finlab.swim.vehicle.fossen import Dynamics, accelerations, complete_body, dynamics_of
-from finlab.swim.vehicle.vehicle import Bodies
+from finlab.swim.vehicle.many_bodies import Bodies
 
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
@@ -48,7 +48,7 @@ class RobotModel:
         self.dynamics = Dynamics(*map(np.array, dynamics_of(self.body)))
         """Of that body; arrays."""
         known = self.dynamics
-        at_speed = known.linear + known.quadratic * TYPICAL_SPEED
+        at_speed = known.linear_damping + known.quadratic_damping * TYPICAL_SPEED
         at_speed = np.maximum(at_speed, 0.1 * known.inertia * TYPICAL_SPEED)
         doubt = DAMPING_DOUBT * np.stack([at_speed, at_speed / TYPICAL_SPEED])
         self.blocks = {
@@ -126,11 +126,11 @@ class RobotModel:
         known = self.dynamics
         return Dynamics(
             (known.inertia * np.exp(unknowns.of("inertia", vectors))).T,
-            np.maximum(known.linear + unknowns.of("linear", vectors), 0.0).T,
-            np.maximum(known.quadratic + unknowns.of("quadratic", vectors), 0.0).T,
+            np.maximum(known.linear_damping + unknowns.of("linear", vectors), 0.0).T,
+            np.maximum(known.quadratic_damping + unknowns.of("quadratic", vectors), 0.0).T,
             np.full(len(vectors), known.weight),
-            known.lift + unknowns.of("lift", vectors)[:, 0],
-            (known.center + unknowns.of("buoyancy", vectors)).T,
+            known.buoyancy + unknowns.of("lift", vectors)[:, 0],
+            (known.center_of_buoyancy + unknowns.of("buoyancy", vectors)).T,
         )
 
     def sensed(self, unknowns: Unknowns, vectors: Array, state: Array) -> Array:

@@ -222,8 +222,8 @@ class ClosedLoop:
         if kind == "lost":
             self.layout.without([*(other for other in self.lost if other != name), name])
         self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
-        if kind == "stuck" and index in self.motion.of_fins:
-            self.fin_motion.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
+        if kind == "stuck" and index in self.motion.fin_indices:
+            self.fin_motion.rate[2, np.searchsorted(self.motion.fin_indices, index)] = 0.0
         tells = self.announced if announced is None else announced
         for known in (self.broken, self._told) if tells else (self.broken,):
             known.pop(name, None)

@@ -202,8 +202,8 @@ class ActuatorForce:
         """Takes the true robot and how its fins move."""
         self.motion = ActuatorMotion(layout, fins)
         self._beat = fins
-        of_fins = self.motion.of_fins
-        of_others = self.motion.of_others
+        of_fins = self.motion.fin_indices
+        of_others = self.motion.other_indices
         self._plant = plant_of(layout)
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
@@ -228,14 +228,14 @@ class ActuatorForce:
         fin_watts = np.zeros((2, 0))
         others = np.zeros((0, 3))
         watts = np.zeros((2, 0))
-        if len(motion.of_fins):
-            fins = self.of_fins(dt) * share[motion.of_fins, None]
+        if len(motion.fin_indices):
+            fins = self.of_fins(dt) * share[motion.fin_indices, None]
             fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))
-        if len(motion.of_others):
-            mean = 0.5 * (motion.others.before + motion.others.value)
-            works = share[motion.of_others] * motion.pushes[motion.of_others]
+        if len(motion.other_indices):
+            mean = 0.5 * (motion.others.value_before + motion.others.value)
+            works = share[motion.other_indices] * motion.pushes[motion.other_indices]
             others = self._others.force(mean, flow=water) * works[:, None]
-            spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
+            spent = self._others.power(mean, flow=water) * motion.pushes[motion.other_indices]
             watts = np.array([0.0 * spent, spent])
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
 

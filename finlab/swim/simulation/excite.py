@@ -103,7 +103,7 @@ class ExcitingController:
         self._stiff = inertia * pace**2
         self._damp = inertia * np.maximum(1.6 * pace, least)
         swing = 2.0 * math.pi / np.array(PERIODS_S).T
-        damp = 1j * swing * (self._damp + np.array(dynamics.linear))
+        damp = 1j * swing * (self._damp + np.array(dynamics.linear_damping))
         moved = 1.0 / np.abs(self._stiff - inertia * swing**2 + damp)
         self._size = np.minimum(np.array(SHARE) * most, SHAKEN_TO * REACHED / moved.mean(axis=0))
 
