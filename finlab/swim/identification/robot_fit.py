@@ -17,8 +17,8 @@ from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.swim.identification.estimate import (
     DEVIATION,
-    Fitted,
     Windows,
+    WindowsFit,
     cut,
     fit_windows,
     unseen_gain,
@@ -53,7 +53,7 @@ class RobotFit:
     """A robot as its swims show it."""
 
     model: RobotModel
-    fitted: Fitted
+    fitted: WindowsFit
     explained: float
     other_law: bool | None
     """Whether another law of thrust lessens the error on windows not seen, and is used; None where
@@ -173,7 +173,7 @@ def _fit(
     unknowns = Unknowns(model.blocks, BASE)
     deviation = DEVIATION
 
-    def fit(vector: Array, start: Array, what: str) -> Fitted:
+    def fit(vector: Array, start: Array, what: str) -> WindowsFit:
         nonlocal deviation
         for _ in range(ROUNDS):
             tell(f"fitting {what}")
@@ -207,7 +207,7 @@ def _fit(
     return RobotFit(model, fitted, _explained(fitted, windows), helps, unlikely)
 
 
-def _deviation(fitted: Fitted, deviation: Array) -> Array:
+def _deviation(fitted: WindowsFit, deviation: Array) -> Array:
     """Deviations (12,) of the channels by what is left over, outliers aside."""
     left = np.abs(fitted.residual)
     scale = DEVIATION.copy()
@@ -221,13 +221,13 @@ def _deviation(fitted: Fitted, deviation: Array) -> Array:
     )
 
 
-def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
+def _keep_delays(model: RobotModel, fitted: WindowsFit) -> None:
     model.late = [
         round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)
     ]
 
 
-def _explained(fitted: Fitted, windows: Windows) -> float:
+def _explained(fitted: WindowsFit, windows: Windows) -> float:
     """Share of the motion's variance within windows that the simulated swims explain, mean over
     channels of velocity and rates, or of pose where those are not measured, that change by more
     than noise."""

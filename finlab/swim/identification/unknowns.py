@@ -99,7 +99,7 @@ class Unknowns:
         """Whether the wrench of the actuators depends on each (size,)."""
 
     @cached_property
-    def believed(self) -> Array:
+    def prior_information(self) -> Array:
         """Inverse covariance (size, size) of what is believed before a swim: each is 0 +- 1, and
         the common scale of all inertia is as the layout says. Motion cannot tell it, so nothing
         else must move it."""
