@@ -18,7 +18,7 @@ from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
-    from finlab.swim.identification.fitted_robot import OnlineFit
+    from finlab.swim.identification.online_fit import OnlineFit
     from finlab.swim.simulation import ClosedLoop, Fault, RunLog
 
 
@@ -234,11 +234,12 @@ def _learner(allocator: Allocator) -> OnlineFit:
     lean."""
     import numpy as np
 
-    from finlab.swim.identification.fitted_robot import OnlineFit, leaned
+    from finlab.swim.identification.fitted_robot import with_lean
+    from finlab.swim.identification.online_fit import OnlineFit
 
     learner = OnlineFit(allocator.layout)
     layout = allocator.layout
-    allocator.on(leaned(layout, np.full(layout.n, 0.01)))
+    allocator.on(with_lean(layout, np.full(layout.n, 0.01)))
     return learner
 
 

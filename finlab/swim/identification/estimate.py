@@ -186,7 +186,7 @@ def unseen_gain(
     prior = with_block.prior_information
     fold = np.arange(windows.start.shape[1]) % FOLDS
     is_base = np.ones(with_block.size, bool)
-    is_base[with_block.place(name)] = False
+    is_base[with_block.slice_of(name)] = False
 
     def gain(is_free: NDArray[np.bool_]) -> Array:
         """What each window gains by changes of the free unknowns that the others ask for (W,)."""
@@ -297,7 +297,7 @@ class WindowProblem:
             begin[channel, 1 + size + channel] += DIFFERENCE * START_DEVIATION[channel]
 
         bodies = Dynamics(*(part[..., None] for part in self.model.bodies(self.unknowns, vectors)))
-        current = self.unknowns.of("current", vectors).T[..., None]
+        current = self.unknowns.block("current", vectors).T[..., None]
         state = integrate(begin, wrench, bodies, current, STEP_S)
         return state, self.model.sensed(self.unknowns, vectors, state)
 
@@ -330,7 +330,7 @@ class WindowProblem:
         wrench[:] = first[..., None]
         for k, vector in enumerate(vectors[1:], start=1):
             moved_entry = np.argmax(vector != vectors[0])
-            if self.unknowns.force[moved_entry]:
+            if self.unknowns.moves_wrench[moved_entry]:
                 wrench[..., k] = self.model.wrench(self.unknowns, vector)[self.windows.step]
         return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
 
