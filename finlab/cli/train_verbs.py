@@ -21,7 +21,7 @@ _Count = Annotated[int | None, arg(metavar="N")]
 
 
 @dataclass(frozen=True)
-class Paper:
+class PaperOptions:
     """Options of both of the paper's trainings."""
 
     output: _Output
@@ -69,20 +69,20 @@ def mdn(
     )
 
 
-def surrogate(options: OmitArgPrefixes[Paper]) -> None:
+def surrogate(options: OmitArgPrefixes[PaperOptions]) -> None:
     """Train the paper's physics surrogate and write a checkpoint folder with it alone.
 
     With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate
     ...
     """
-    from finlab.research.paper.training.train import Options, train_surrogate
+    from finlab.research.paper.training.train import TrainingOptions, train_surrogate
 
     check_positive(steps=options.steps)
-    _report(options.output, train_surrogate(Options(**vars(options))))
+    _report(options.output, train_surrogate(TrainingOptions(**vars(options))))
 
 
 def allocator(
-    options: OmitArgPrefixes[Paper], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
+    options: OmitArgPrefixes[PaperOptions], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
 ) -> None:
     """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
 
@@ -92,10 +92,10 @@ def allocator(
     Args:
         surrogate: checkpoint whose surrogate guides the training.
     """
-    from finlab.research.paper.training.train import Options, train_allocator
+    from finlab.research.paper.training.train import TrainingOptions, train_allocator
 
     check_positive(steps=options.steps)
-    _report(options.output, train_allocator(Options(**vars(options)), surrogate))
+    _report(options.output, train_allocator(TrainingOptions(**vars(options)), surrogate))
 
 
 def interaction(

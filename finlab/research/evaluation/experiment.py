@@ -20,7 +20,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.research.evaluation.document import Block, Column, Row, Table
+from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row
 
 EXPERIMENTS = (
     *("wrench", "thrusters", "latency", "ablation", "temperature"),
@@ -116,19 +116,19 @@ class Experiment:
         """All rows of `each_row`."""
         return list(self.each_row(**chosen))
 
-    def table(self, rows: Sequence[Row]) -> Table:
+    def table(self, rows: Sequence[Row]) -> ReportTable:
         """The rows of the default method stand out; below them are those that the paper prints."""
         ours = [
             {**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows
         ]
         printed = [] if self.printed is None else self.printed(rows)
-        return Table(self.columns, [*ours, *printed])
+        return ReportTable(self.columns, [*ours, *printed])
 
-    def words(self) -> list[Block]:
+    def words(self) -> list[ReportBlock]:
         """Blocks of heading and question, which stand before the results."""
         return [f"## {self.name.capitalize()}", self.question]
 
-    def results(self, rows: Sequence[Row]) -> list[Block]:
+    def results(self, rows: Sequence[Row]) -> list[ReportBlock]:
         """Blocks of the table of rows and of the note on how to read it."""
         return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
 

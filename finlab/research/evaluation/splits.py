@@ -56,7 +56,7 @@ limits, the last over the circle."""
 NOISE = 0.03  # standard deviation of each component of a force, as a share of it
 
 
-class Case(NamedTuple):
+class SplitCase(NamedTuple):
     """One layout with targets that its healthy fins can deliver, and what errors on it are divided
     by."""
 
@@ -72,7 +72,7 @@ class Case(NamedTuple):
         return self.layout.without(self.lost)
 
 
-def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
+def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[SplitCase]:
     """The test cases of a split, one of `SPLITS`: layouts, and targets for each of them.
 
     Layout k and its first targets depend on the split, the seed and k alone, so that a small run is
@@ -90,7 +90,7 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
     return [make_case(name, n_targets, seed, k) for k in range(n_layouts)]
 
 
-def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
+def make_case(split: str, n_targets: int, seed: int, k: int) -> SplitCase:
     """Case k of `make_split`."""
     entropy = (DOMAIN, SPLITS[split][0], seed, k)
     layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
@@ -98,7 +98,7 @@ def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     plant = Plant(layout.without(lost))
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
     own = own_sigma(plant, np.random.default_rng(sigma_seed)) if split in OWN_SIGMA else None
-    return Case(layout, targets, lost, own)
+    return SplitCase(layout, targets, lost, own)
 
 
 def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:

@@ -63,7 +63,7 @@ class Rows(NamedTuple):
         return self.features[rows], self.vectors[rows], owner
 
 
-class DataSet(NamedTuple):
+class InteractionSamples(NamedTuple):
     """Samples of many robots."""
 
     rows: dict[str, Rows]
@@ -76,7 +76,7 @@ class DataSet(NamedTuple):
     """The robot (N,) of each sample."""
 
 
-def data_set(samples: Sequence[Samples]) -> DataSet:
+def data_set(samples: Sequence[Samples]) -> InteractionSamples:
     """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots,
     or none with a jet."""
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
@@ -101,7 +101,7 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
         starts = torch.from_numpy(np.concatenate([[0], np.cumsum(counts)]))
         rows[name] = Rows(_tensor(features), _tensor(vectors), starts)
     remains, sizes = (_tensor(np.concatenate(part)) for part in (left, size))
-    return DataSet(rows, remains, sizes, torch.from_numpy(np.concatenate(robot)))
+    return InteractionSamples(rows, remains, sizes, torch.from_numpy(np.concatenate(robot)))
 
 
 def messages_of(
@@ -172,7 +172,7 @@ def train(
     return float(np.sqrt((error**2).sum(axis=1).mean()))
 
 
-def told(weights: dict[str, Any], member: int, data: DataSet, samples: Tensor) -> Tensor:
+def told(weights: dict[str, Any], member: int, data: InteractionSamples, samples: Tensor) -> Tensor:
     """What one network says that the laws leave of the wrenches of some samples (B, 6)."""
     result = torch.zeros((len(samples), 6))
     for name in FORMS:

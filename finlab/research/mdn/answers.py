@@ -89,7 +89,7 @@ class Steps(NamedTuple):
         return self.descent + self.commands
 
 
-class Answers(NamedTuple):
+class RefinedAnswers(NamedTuple):
     """P refined answers to each of N targets, best first: the exact ones by effort, then the
     others."""
 
@@ -104,14 +104,16 @@ class Answers(NamedTuple):
     origin: NDArray[np.intp]
     """Number of the proposal that each came from (N, P), or `OTHER` or `NOW`."""
 
-    def before(self, other: "Answers") -> "Answers":
+    def before(self, other: "RefinedAnswers") -> "RefinedAnswers":
         """These P answers to each target, then Q others to the same: (N, P + Q, ...)."""
-        return Answers._make(np.concatenate(both, axis=1) for both in zip(self, other, strict=True))
+        return RefinedAnswers._make(
+            np.concatenate(both, axis=1) for both in zip(self, other, strict=True)
+        )
 
 
 def follow(
     robot: EffortRobot, target: Array, force: AnyArray, keep: int, steps: Steps, kept: int = 0
-) -> Answers:
+) -> RefinedAnswers:
     """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex: the `keep` most
     promising descents are refined, the first `kept` proposals among these whatever they promise."""
     rows, count, n = force.shape
@@ -149,17 +151,17 @@ def traced(robot: EffortRobot, target: Array, force: AnyArray, steps: Steps) -> 
 
 def refined(
     robot: EffortRobot, target: Array, command: Array, origin: NDArray[np.intp], steps: Steps
-) -> Answers:
+) -> RefinedAnswers:
     """Answers to normalized targets (N, 6) near commands (N, P, n, 3)."""
     rows, count, n, _ = command.shape
     each = np.repeat(target, count, axis=0)
     near = refine(robot.commands, each, command.reshape(-1, n, 3), steps.commands)
     effort = robot.effort(near.command)
     parts = [values.reshape(rows, count, *values.shape[1:]) for values in (*near, effort)]
-    return ranked(robot, Answers._make([*parts, origin]))
+    return ranked(robot, RefinedAnswers._make([*parts, origin]))
 
 
-def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
+def ranked(robot: EffortRobot, answers: RefinedAnswers, bonus: float = 0.0) -> RefinedAnswers:
     """Answers, best first: of those that are exact, or where none is as near as any, the cheapest.
 
     The effort of the first given counts less by a share `bonus`.
@@ -171,7 +173,7 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     score = np.where(answers.error > allowed, INEXACT * (1.0 + answers.error), score)
     order = score.argsort(axis=1, kind="stable")
     place = np.arange(len(order))[:, None]
-    return Answers._make(values[place, order] for values in answers)
+    return RefinedAnswers._make(values[place, order] for values in answers)
 
 
 def distinct(

@@ -64,7 +64,7 @@ class RobotView(NamedTuple):
     """F (n,) [N]."""
 
 
-class Seen(NamedTuple):
+class RobotFeatures(NamedTuple):
     """N targets on one robot as the network sees them."""
 
     nodes: AnyArray
@@ -131,7 +131,7 @@ def robot_view(problem: EffortProblem) -> RobotView:
     )
 
 
-def see(view: RobotView, target: AnyArray) -> Seen:
+def see(view: RobotView, target: AnyArray) -> RobotFeatures:
     """What the network sees of normalized targets (N, 6) on one robot."""
     wanted = target @ view.solver
     many = (
@@ -140,7 +140,7 @@ def see(view: RobotView, target: AnyArray) -> Seen:
     return features(wanted, *many)
 
 
-def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
+def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> RobotFeatures:
     """The features of N targets p (N, n), complex, each on a robot of its own: `static` (N, n, 20)
     as in `RobotView`, and both parts of the blocks of P (N, n, n), complex."""
     rows, n = wanted.shape
@@ -163,7 +163,7 @@ def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Se
     own = np.arange(n)
     nodes[..., 3] = pairs[:, own, own, 0]
     nodes[..., 4:6] = pairs[:, own, own, 2:]
-    return Seen(nodes, pairs, frame)
+    return RobotFeatures(nodes, pairs, frame)
 
 
 def _parts(values: AnyArray) -> tuple[AnyArray, AnyArray]:
@@ -182,7 +182,7 @@ class Proposal(NamedTuple):
 def propose(
     mixture: ForceMixture,
     view: RobotView,
-    seen: Seen,
+    seen: RobotFeatures,
     n_candidates: int,
     temperature: float,
     seed: int,

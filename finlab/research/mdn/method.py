@@ -27,7 +27,7 @@ from finlab.physics.objective import costs
 from finlab.research.mdn.answers import (
     NOW,
     OTHER,
-    Answers,
+    RefinedAnswers,
     Steps,
     effort_robot,
     follow,
@@ -36,7 +36,7 @@ from finlab.research.mdn.answers import (
     traced,
 )
 from finlab.research.mdn.descent import realize
-from finlab.research.mdn.features import Proposal, Seen, propose, see
+from finlab.research.mdn.features import Proposal, RobotFeatures, propose, see
 from finlab.research.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.research.networks.layers import single_threaded_products
 from finlab.research.networks.learned_method import LearnedMethod
@@ -60,11 +60,11 @@ STARTS = {OTHER: "another start", NOW: "the way it moves now"}
 """What answers are called that no component has proposed."""
 
 
-class Found(NamedTuple):
+class RefinedProposals(NamedTuple):
     """Proposals of the network for some targets, and what came of them."""
 
     proposal: Proposal
-    answers: Answers
+    answers: RefinedAnswers
 
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
@@ -132,24 +132,24 @@ class Mdn(LearnedMethod):
             self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed
         )
 
-    def mixture(self, seen: Seen) -> ForceMixture:
+    def mixture(self, seen: RobotFeatures) -> ForceMixture:
         """What the network gives for what it sees of some targets."""
         return self.config(self._network, seen.nodes, seen.pairs)
 
-    def _found(self, policy: Policy, target: Array, seed: int) -> Found:
+    def _found(self, policy: Policy, target: Array, seed: int) -> RefinedProposals:
         """What is found for normalized targets (N, 6)."""
         proposal = self.proposals(target, seed)
         answers = follow(self.robot, target, proposal.force, self.settings.n_refined, STEPS)
         missed = answers.error[:, 0] > self.robot.exact
         if missed.any():
-            first = Answers._make(values[missed] for values in answers)
+            first = RefinedAnswers._make(values[missed] for values in answers)
             for kept, new in zip(
                 answers, self._at_last(policy, target[missed], first), strict=True
             ):
                 kept[missed] = new
-        return Found(proposal, answers)
+        return RefinedProposals(proposal, answers)
 
-    def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
+    def _at_last(self, policy: Policy, target: Array, answers: RefinedAnswers) -> RefinedAnswers:
         """Answers to normalized targets (M, 6) that were missed at first: after more steps, or that
         of the default method, which tells what is to be delivered out of reach."""
         robot = self.robot
@@ -169,7 +169,9 @@ class Mdn(LearnedMethod):
     def _default(self) -> Method:
         return Dual(self.layout, Dual.settings_class(), self.scale)
 
-    def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
+    def _in_motion(
+        self, target: Array, free: RefinedProposals, previous: Array
+    ) -> RefinedProposals:
         """What is found for one target within what the servos allow after a previous command (n,
         3): the way that the robot moves now is kept, and where another is worth it, all fins go
         towards that."""
@@ -185,7 +187,7 @@ class Mdn(LearnedMethod):
         reached = reached._replace(origin=np.where(reached.origin == 0, NOW, reached.origin - 1))
         now_first = np.argsort(reached.origin[0] != NOW, kind="stable")
         reached = ranked(
-            near, Answers._make(values[:, now_first] for values in reached), SWITCH_GAIN
+            near, RefinedAnswers._make(values[:, now_first] for values in reached), SWITCH_GAIN
         )
         if reached.error[0, 0] > near.exact:
             reached = refined(near, target, reached.command, reached.origin, MORE)
@@ -196,7 +198,7 @@ class Mdn(LearnedMethod):
                 reached = other.before(reached)
         return free._replace(answers=reached)
 
-    def _refined(self, reached: Found) -> tuple[Array, tuple[str, ...]]:
+    def _refined(self, reached: RefinedProposals) -> tuple[Array, tuple[str, ...]]:
         """The refined commands (P, n, 3) for a single target, and the components they come from."""
         names = names_of(reached.proposal)
         origin = reached.answers.origin[0].tolist()

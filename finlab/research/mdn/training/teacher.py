@@ -162,7 +162,7 @@ def read_answers(path: Path) -> dict[int, dict[str, Array]]:
     return groups
 
 
-class Batch(NamedTuple):
+class TeacherBatch(NamedTuple):
     """B targets, each on a robot of n fins, with up to L ways to deliver it."""
 
     nodes: Tensor
@@ -175,7 +175,7 @@ class Batch(NamedTuple):
     """Of the ways (B, L); they add up to 1."""
 
 
-class Answers:
+class TeacherData:
     """All robots, targets and ways of some files, in memory; batches are drawn from them."""
 
     def __init__(self, paths: list[Path]) -> None:
@@ -194,7 +194,7 @@ class Answers:
         """Number of targets."""
         return sum(len(group["asked"]) for group in self._groups.values())
 
-    def draw(self, rng: np.random.Generator, size: int) -> Batch:
+    def draw(self, rng: np.random.Generator, size: int) -> TeacherBatch:
         """A random batch; robots are seen as they are or as their mirror image, with fins in any
         order."""
         counts = np.array([len(group["asked"]) for group in self._groups.values()])
@@ -215,7 +215,9 @@ class Answers:
         parts = np.stack([way.real, way.imag], axis=-1)
         weight = np.where(weight < LEAST_WEIGHT, 0.0, weight)
         arrays = (seen.nodes, seen.pairs, parts, weight / weight.sum(1, keepdims=True))
-        return Batch(*(torch.from_numpy(np.asarray(part, dtype=np.float32)) for part in arrays))
+        return TeacherBatch(
+            *(torch.from_numpy(np.asarray(part, dtype=np.float32)) for part in arrays)
+        )
 
 
 def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:

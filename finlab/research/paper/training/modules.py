@@ -15,7 +15,7 @@ from finlab.research.networks import layers
 from finlab.research.networks.trained import to_command, to_normalized
 from finlab.research.paper.network import Mixture, raw_features
 from finlab.research.paper.surrogate import FORCE_UNIT, SurrogateConfig
-from finlab.research.paper.training.samples import Batch
+from finlab.research.paper.training.samples import SampleBatch
 from finlab.research.training.loop import Weights, first_weights
 
 FIRST_WEIGHT = 2.0
@@ -23,7 +23,7 @@ FIRST_WEIGHT = 2.0
 must be learned, and wide first weights start nearer to that."""
 
 
-def features(batch: Batch) -> Tensor:
+def features(batch: SampleBatch) -> Tensor:
     """Node features x_i (B, n, 10) of a batch's robots, scaled as `raw_features` says."""
     x: Tensor = raw_features(batch.position, batch.mounting_angle, batch.lower, batch.upper)
     return x
@@ -40,7 +40,9 @@ def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) 
     return weights
 
 
-def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch: Batch) -> Tensor:
+def surrogate_wrench(
+    config: SurrogateConfig, w: Weights, command: Tensor, batch: SampleBatch
+) -> Tensor:
     """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate
     (Eq. 4): F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine
     correction from the pooled descriptor of the layout."""
@@ -62,16 +64,16 @@ def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch
     return answer
 
 
-WrenchOf = Callable[[Tensor, Batch], Tensor]
+WrenchOf = Callable[[Tensor, SampleBatch], Tensor]
 """Wrenches (B, 6) of commands (B, n, 3) of a batch's robots."""
 
 
-def physics(surrogate: WrenchOf, batch: Batch, std: Tensor) -> Tensor:
+def physics(surrogate: WrenchOf, batch: SampleBatch, std: Tensor) -> Tensor:
     """L_phys (Eq. 5): squared error of the normalized wrench of the recorded commands."""
     return ((surrogate(batch.command, batch) - batch.wrench) / std).square().sum(-1)
 
 
-def imitation(mixture: Mixture, batch: Batch) -> Tensor:
+def imitation(mixture: Mixture, batch: SampleBatch) -> Tensor:
     """L_imit = -log p(u* | G) (B,) of the recorded commands (Eq. 7), the sum over fins."""
     recorded = to_normalized(batch.command, batch.lower, batch.upper)
     likelihood: Tensor = mixture.log_prob(recorded[:, None])[:, 0]
@@ -79,7 +81,11 @@ def imitation(mixture: Mixture, batch: Batch) -> Tensor:
 
 
 def guidance(
-    mixture: Mixture, surrogate: WrenchOf, batch: Batch, std: Tensor, noise: tuple[Tensor, Tensor]
+    mixture: Mixture,
+    surrogate: WrenchOf,
+    batch: SampleBatch,
+    std: Tensor,
+    noise: tuple[Tensor, Tensor],
 ) -> Tensor:
     """L_guide (Eq. 6): squared normalized error of one sample of the mixture, by the surrogate.
 

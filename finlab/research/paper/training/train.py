@@ -23,9 +23,9 @@ from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
 from finlab.research.paper.training.samples import (
     N_FINS,
-    Batch,
-    DataSet,
     DataSettings,
+    SampleBatch,
+    SampleSet,
     fresh_batch,
     generate,
 )
@@ -39,7 +39,7 @@ JUDGES = DataSettings(layouts=500, commands=20, seed=7_000)
 
 
 @dataclass(frozen=True)
-class Options:
+class TrainingOptions:
     """What both trainings have to know, beside the recipe."""
 
     preset: str
@@ -57,17 +57,19 @@ class Options:
     device: str | None = None
 
 
-class Bench:
+class BatchSource:
     """A data set in the memory of this process's device, and its share of every batch."""
 
-    def __init__(self, place: Workplace, samples: DataSet, settings: PaperLoop, seed: int) -> None:
+    def __init__(
+        self, place: Workplace, samples: SampleSet, settings: PaperLoop, seed: int
+    ) -> None:
         self.place = place
         self.samples = samples
         self.settings = settings
         self.seed = seed
         self.rows = place.share(settings.batch_size)
 
-    def batch(self, step: int) -> Batch:
+    def batch(self, step: int) -> SampleBatch:
         """The share of batch number `step`."""
         settings = self.settings
         return self.samples.batch(
@@ -92,13 +94,13 @@ class Bench:
         ]
 
 
-def train_surrogate(options: Options) -> TrainedWeights:
+def train_surrogate(options: TrainingOptions) -> TrainedWeights:
     """Train a preset's surrogate and write a checkpoint folder without an allocator network. Raises
     DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written;
     CommandError: there is no such device."""
     made = recipe(options.preset)
 
-    def terms_of(weights: Weights, bench: Bench) -> Terms:
+    def terms_of(weights: Weights, bench: BatchSource) -> Terms:
         (std,) = bench.tensors(bench.samples.normalization.std)
         wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
 
@@ -109,7 +111,7 @@ def train_surrogate(options: Options) -> TrainedWeights:
 
         return terms
 
-    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
         trained = TrainedWeights(
             name="",
             normalization=samples.normalization,
@@ -126,7 +128,7 @@ def train_surrogate(options: Options) -> TrainedWeights:
     return _train("surrogate", options, made.surrogate_training, begin, terms_of, checkpoint)
 
 
-def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
+def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights:
     """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole
     checkpoint folder.
 
@@ -141,7 +143,7 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
     if options.data is None and (surrogate / "data").is_dir():
         options = replace(options, data=surrogate / "data")
 
-    def terms_of(weights: Weights, bench: Bench) -> Terms:
+    def terms_of(weights: Weights, bench: BatchSource) -> Terms:
         if bench.samples.settings["fin_model"] != base.fin_model:
             raise DataError(
                 f"{options.data}: its wrenches are of another fin model than the surrogate's"
@@ -165,7 +167,7 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
         return terms
 
-    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
         return replace(base, network_sizes=sizes_for_file(network), network=state)
 
     begin = partial(first_weights, network.shapes())
@@ -174,11 +176,11 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
 def _train(
     verb: str,
-    options: Options,
+    options: TrainingOptions,
     settings: PaperLoop,
     begin: Callable[[int, torch.device], Weights],
-    terms_of: Callable[[Weights, Bench], Terms],
-    checkpoint: Callable[[DataSet, State], TrainedWeights],
+    terms_of: Callable[[Weights, BatchSource], Terms],
+    checkpoint: Callable[[SampleSet, State], TrainedWeights],
     surrogate: str = "",
 ) -> TrainedWeights:
     """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
@@ -188,7 +190,7 @@ def _train(
         if options.data is None and place.rank == 0:
             generate(output / "data", recipe(options.preset).data)
         place.wait()
-        samples = DataSet(options.data or output / "data", place.device)
+        samples = SampleSet(options.data or output / "data", place.device)
         weights = begin(options.seed, place.device)
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
@@ -202,7 +204,7 @@ def _train(
         training = Training(weights, settings, output, identity, place)
         if options.resume:
             training.resume()
-        bench = Bench(place, samples, settings, options.seed)
+        bench = BatchSource(place, samples, settings, options.seed)
         training.run(terms_of(weights, bench), save)
         return read_checkpoint(output)
 
