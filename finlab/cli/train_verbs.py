@@ -207,9 +207,9 @@ def interaction_data(
     """
     from finlab.fit.interaction.samples import write_samples
     from finlab.research.evaluation.method_specs import own_function
-    from finlab.research.interaction.drawn_samples import drawn, with_jets
+    from finlab.research.interaction.random_samples import random_samples, with_jets
 
     check_positive(layouts=layouts, commands=commands, actuators=actuators[0])
-    judge = with_jets if plant is None else own_function(plant)
-    write_samples(output, drawn(judge, layouts, commands, seed, noise, actuators))
+    oracle = with_jets if plant is None else own_function(plant)
+    write_samples(output, random_samples(oracle, layouts, commands, seed, noise, actuators))
     print(f"{output}: {layouts} robots with {commands} commands each, seed {seed}")

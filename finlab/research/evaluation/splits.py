@@ -17,6 +17,7 @@ from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, TableLaw, make_law, write_table
 from finlab.research.random_layouts import (
     TRAINING_BOX,
+    ActuatorMaker,
     random_azimuth,
     random_fin_model,
     random_layout,
@@ -25,7 +26,6 @@ from finlab.research.random_layouts import (
     random_thruster,
     random_tilt,
 )
-from finlab.research.random_layouts import Draw as ActuatorDraw
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training
@@ -187,7 +187,7 @@ def _table_folder() -> "TemporaryDirectory[str]":
     return TemporaryDirectory(prefix="finlab-tables-")
 
 
-def _robots(*kinds: ActuatorDraw, count: tuple[int, int], each: bool = False) -> Draw:
+def _robots(*kinds: ActuatorMaker, count: tuple[int, int], each: bool = False) -> Draw:
     """Robots of random actuators of some kinds; options of `random_robot`."""
     return lambda rng, name: (random_robot(rng, name, count, kinds, each), ())
 

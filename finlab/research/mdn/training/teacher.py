@@ -17,7 +17,7 @@ from finlab.physics.plant import Plant
 from finlab.research.mdn.answers import LAST, EffortRobot, distinct, effort_robot
 from finlab.research.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.research.mdn.features import VECTORS, features
-from finlab.research.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
+from finlab.research.random_layouts import FIN_COUNTS, random_fin_kinds, random_fin_robot
 from finlab.whole_file import write_whole
 
 STARTS = 32
@@ -115,7 +115,7 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     if path.exists():
         return path
     rng = np.random.default_rng([DATA_SEED, seed, number])
-    kinds = random_kinds(rng, settings.fins)
+    kinds = random_fin_kinds(rng, settings.fins)
     counts = np.array(list(FIN_COUNTS))
     often = np.array(list(FIN_COUNTS.values()), float)
     groups: dict[int, list[dict[str, Array]]] = {}

@@ -10,14 +10,14 @@ from finlab.physics.objective import yardstick
 from finlab.research.mdn.answers import EffortRobot, effort_robot
 from finlab.research.mdn.descent import realize, wrench
 from finlab.research.mdn.training import teacher
-from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
+from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_kinds, random_fin_robot
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
 def told() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
     rng = np.random.default_rng(6)
-    layout = random_fin_robot(rng, random_kinds(rng, 2), 6)
+    layout = random_fin_robot(rng, random_fin_kinds(rng, 2), 6)
     robot = effort_robot(Plant(layout), STD)
     target = teacher.random_targets(rng, robot, 12)
     return robot, target, teacher.ways_to_deliver(rng, robot.forces, target)
@@ -72,7 +72,7 @@ def test_roots_of_shares_keep_the_direction() -> None:
 @pytest.fixture(scope="module")
 def robots() -> list[Layout]:
     rng = np.random.default_rng(1)
-    kinds = random_kinds(rng, 3)
+    kinds = random_fin_kinds(rng, 3)
     return [random_fin_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]
 
 
