@@ -14,7 +14,8 @@ from typing import Any
 from finlab.display import aligned
 
 Row = dict[str, Any]
-WIDTH = 110  # of plain text
+WIDTH = 110
+"""Of plain text."""
 
 
 def error(value: float) -> str:
@@ -62,8 +63,10 @@ class Column:
     key: str
     title: str
     format: str = "text"
-    interval: str | None = None  # key of an interval [low, high] that stands behind the number
-    unit: str = ""  # of the numbers; none where they are shares, ratios or counts
+    interval: str | None = None
+    """Key of an interval [low, high] that stands behind the number."""
+    unit: str = ""
+    """Of the numbers; none where they are shares, ratios or counts."""
 
     @property
     def heading(self) -> str:
@@ -98,7 +101,8 @@ class ReportTable:
         )
 
 
-ReportBlock = str | ReportTable  # a string is Markdown
+ReportBlock = str | ReportTable
+"""A string is Markdown."""
 
 
 def to_markdown(*blocks: ReportBlock) -> str:

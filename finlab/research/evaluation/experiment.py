@@ -38,8 +38,10 @@ Item = TypeVar("Item")
 class Experiment:
     """A question, what is run to answer it, and the columns of its rows."""
 
-    name: str  # of the verb and of the report's section
-    question: str  # one sentence, in Markdown, which is the help of the verb, too
+    name: str
+    """Of the verb and of the report's section."""
+    question: str
+    """One sentence, in Markdown, which is the help of the verb, too."""
     columns: tuple[Column, ...]
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are
     under `<key>_interval`."""
@@ -49,7 +51,8 @@ class Experiment:
     their defaults and their words under `Args` in its docstring. An int whose default is 0 may be
     0, any other is at least 1. A parameter `layout` is given by position. Times depend on the
     machine; all other values on the options alone."""
-    note: str = ""  # how the columns are to be read, in Markdown
+    note: str = ""
+    """How the columns are to be read, in Markdown."""
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)

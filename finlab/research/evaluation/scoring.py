@@ -20,10 +20,13 @@ from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.splits import SplitCase
 from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
 
-Columns = dict[str, AnyArray]  # arrays of N entries by name
-LEVEL = 0.994426  # share of a normal variable within sqrt(2) times 1.96 standard deviations
+Columns = dict[str, AnyArray]
+"""Arrays of N entries by name."""
+LEVEL = 0.994426
+"""Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
 REPLICATES = 2000
-Interval = tuple[float, float]  # its low and its high end
+Interval = tuple[float, float]
+"""Its low and its high end."""
 
 
 def run_method(

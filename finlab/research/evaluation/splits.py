@@ -30,22 +30,26 @@ from finlab.research.random_layouts import (
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training
 box."""
-OOD_FINS = (6, 8)  # least and most fins in split `ood-fins`
-MANY_FINS = (9, 12)  # least and most fins in split `many-fins`
+OOD_FINS = (6, 8)
+"""Least and most fins in split `ood-fins`."""
+MANY_FINS = (9, 12)
+"""Least and most fins in split `many-fins`."""
 NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as
 parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis
 [m]."""
-DOMAIN = 0x7E57  # leads the seed of every test case; training seeds begin otherwise
+DOMAIN = 0x7E57
+"""Leads the seed of every test case; training seeds begin otherwise."""
 OWN_SIGMA = (
     *("fins", "fins-mixed", "tables"),
     *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
 )
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than
 those of training: errors there are relative to what the robot can do."""
-N_SIGMA = 4096  # uniform commands from which such a robot's yardstick is computed
+N_SIGMA = 4096
+"""Uniform commands from which such a robot's yardstick is computed."""
 LEAST_SIGMA = 0.05
 """Least deviation on an axis, as a share of the largest one among the forces, or among the
 torques."""
@@ -53,16 +57,20 @@ torques."""
 GRID = (8, 9, 12)
 """Amplitudes, frequencies and zero directions of a table; the first two range over the fin's
 limits, the last over the circle."""
-NOISE = 0.03  # standard deviation of each component of a force, as a share of it
+NOISE = 0.03
+"""Standard deviation of each component of a force, as a share of it."""
 
 
 class SplitCase(NamedTuple):
     """One layout with targets that its healthy fins can deliver, and what errors on it are divided
     by."""
 
-    layout: Layout  # all fins, lost ones included
-    targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
-    lost: tuple[str, ...]  # names of the fins that do not work
+    layout: Layout
+    """All fins, lost ones included."""
+    targets: Array
+    """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
+    lost: tuple[str, ...]
+    """Names of the fins that do not work."""
     sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 

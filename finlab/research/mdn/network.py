@@ -17,8 +17,10 @@ from finlab.research.networks import layers
 from finlab.research.networks.layers import Weights
 from finlab.research.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
 
-NODE_SIZE, PAIR_SIZE = 26, 4
-"""Numbers of features of a fin and of a pair of fins."""
+NODE_SIZE = 26
+"""Number of features of a fin."""
+PAIR_SIZE = 4
+"""Number of features of a pair of fins."""
 LOG_STD = (-2.0, 2.0)
 """Middle and half width of the range of the log standard deviations."""
 

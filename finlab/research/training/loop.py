@@ -58,8 +58,10 @@ class LoopSettings:
     steps: int
     batch_size: int
     learning_rate: float
-    warmup: int = 0  # steps over which it rises linearly, if there are as many
-    cosine: bool = True  # whether it falls to a hundredth along a cosine, or stays
+    warmup: int = 0
+    """Steps over which it rises linearly, if there are as many."""
+    cosine: bool = True
+    """Whether it falls to a hundredth along a cosine, or stays."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None

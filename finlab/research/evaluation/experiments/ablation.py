@@ -24,7 +24,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the
 refined ones, so no refinement follows the mean."""
-TIMED_CALLS = 5  # single calls whose mean time a row shows, after one that is not counted
+TIMED_CALLS = 5
+"""Single calls whose mean time a row shows, after one that is not counted."""
 
 
 def run(

@@ -45,7 +45,8 @@ class SwimCase(NamedTuple):
     """Of the noise."""
 
 
-SwimKey = tuple[Any, ...]  # what a row is of
+SwimKey = tuple[Any, ...]
+"""What a row is of."""
 
 
 def repeated(

@@ -23,7 +23,8 @@ from finlab.swim.control import steers
 from finlab.swim.simulation import make_trajectory
 
 HEALTHY = "healthy"
-ALLOWED = 1.15  # growth of the error over the healthy robot's that one lost fin should not exceed
+ALLOWED = 1.15
+"""Growth of the error over the healthy robot's that one lost fin should not exceed."""
 
 
 @dataclass(frozen=True)

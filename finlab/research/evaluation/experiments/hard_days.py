@@ -26,8 +26,10 @@ from finlab.swim.simulation import (
     perturbed,
 )
 
-TWO = ("A", "C")  # those that swim most of the days: a symmetric one and one that is not
-CURRENT = (0.05, -0.05, 0.0)  # 7 cm/s across the path [m/s]
+TWO = ("A", "C")
+"""Those that swim most of the days: a symmetric one and one that is not."""
+CURRENT = (0.05, -0.05, 0.0)
+"""7 cm/s across the path [m/s]."""
 
 HEAVY = ("bluerov2_heavy",)
 OTHER_HEAVY = Body(

@@ -55,7 +55,8 @@ FIGURES = (
     "turn",
 )
 """All figures of a swim."""
-LARGEST = ("turn", "peak_w")  # those of which a row has the largest of its swims, not the mean
+LARGEST = ("turn", "peak_w")
+"""Those of which a row has the largest of its swims, not the mean."""
 
 
 def run(

@@ -34,7 +34,8 @@ SUCCESS_LEVELS = (
     0.5,
     1.0,
 )  # levels t of `success_t`, the share of targets with `err_norm <= t`
-OWN_DOMAIN = 0x0711  # leads the seed of the draws on a user's own layout
+OWN_DOMAIN = 0x0711
+"""Leads the seed of the draws on a user's own layout."""
 HARD = (
     "id",
     "ood",
