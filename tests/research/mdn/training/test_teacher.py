@@ -15,7 +15,7 @@ from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_kinds, r
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
-def told() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
+def told() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
     rng = np.random.default_rng(6)
     layout = random_fin_robot(rng, random_fin_kinds(rng, 2), 6)
     robot = effort_robot(Plant(layout), STD)
@@ -24,12 +24,12 @@ def told() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
 
 
 @pytest.fixture(scope="module")
-def effort() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
+def effort() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
     return told()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
-    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
+    effort: tuple[EffortRobot, np.ndarray, teacher.Minima],
 ) -> None:
     robot, target, ways = effort
     known = np.isfinite(ways.cost)
@@ -42,7 +42,7 @@ def test_ways_deliver_the_target_at_the_cost_that_is_told(
 
 
 def test_ways_differ_and_the_cheapest_comes_first(
-    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
+    effort: tuple[EffortRobot, np.ndarray, teacher.Minima],
 ) -> None:
     robot, _, ways = effort
     root = teacher.root_share(ways.force, robot.forces.fins.maximum)
