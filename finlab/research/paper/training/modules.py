@@ -43,9 +43,17 @@ def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) 
 def surrogate_wrench(
     config: SurrogateConfig, w: Weights, command: Tensor, batch: SampleBatch
 ) -> Tensor:
-    """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate
-    (Eq. 4): F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine
-    correction from the pooled descriptor of the layout."""
+    """Returns wrenches (B, 6) by the physics surrogate [N, N m] (Eq. 4).
+
+    F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine correction from
+    the pooled descriptor of the layout.
+
+    Args:
+        config: sizes of the surrogate.
+        w: its weights.
+        command: (B, n, 3) [rad, Hz, rad].
+        batch: the robots.
+    """
     x = features(batch)
     mask = batch.mask
     inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
@@ -53,15 +61,15 @@ def surrogate_wrench(
     hidden = layers.linear(w, first, inputs[mask])
     for name in others:
         hidden = layers.linear(w, name, functional.silu(hidden))
-    own = hidden.to(command.dtype) * FORCE_UNIT
-    force = own.new_zeros(command.shape).masked_scatter(mask[..., None], own)
+    of_fins = hidden.to(command.dtype) * FORCE_UNIT  # of all fins that are no padding
+    force = of_fins.new_zeros(command.shape).masked_scatter(mask[..., None], of_fins)
     torque = torch.linalg.cross(batch.position, force)
     wrench = torch.cat([force, torque], -1).sum(1)
-    seen = torch.tanh(layers.linear(w, "descriptor.0", x))
-    described = (seen * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
-    scale, bias = layers.linear(w, "affine", described).to(command.dtype).chunk(2, -1)
-    answer: Tensor = wrench * (1.0 + scale) + bias
-    return answer
+    described = torch.tanh(layers.linear(w, "descriptor.0", x))
+    descriptor = (described * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
+    scale, bias = layers.linear(w, "affine", descriptor).to(command.dtype).chunk(2, -1)
+    corrected: Tensor = wrench * (1.0 + scale) + bias
+    return corrected
 
 
 WrenchOf = Callable[[Tensor, SampleBatch], Tensor]

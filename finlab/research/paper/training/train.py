@@ -34,7 +34,7 @@ from finlab.research.training.loop import Terms, Training, Weights, first_weight
 
 NOISE_SEED = 1_000_000
 """Added to the seed of the noise, so that it is unrelated to the order of the data."""
-JUDGES = DataSettings(layouts=500, commands=20, seed=7_000)
+HELD_OUT = DataSettings(layouts=500, commands=20, seed=7_000)
 """Samples that no training sees, from which the error of a surrogate is measured."""
 
 
@@ -55,6 +55,7 @@ class TrainingOptions:
     resume: bool = False
     """Whether to go on from the state in `output`."""
     device: str | None = None
+    """cpu, cuda, or None for the best there is."""
 
 
 class BatchSource:
@@ -63,6 +64,14 @@ class BatchSource:
     def __init__(
         self, place: Workplace, samples: SampleSet, settings: PaperLoop, seed: int
     ) -> None:
+        """Takes a data set.
+
+        Args:
+            place: this process among those that train.
+            samples: the data set.
+            settings: of the loop.
+            seed: of the order of the data and of the noise.
+        """
         self.place = place
         self.samples = samples
         self.settings = settings
@@ -83,9 +92,8 @@ class BatchSource:
         shape = (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
-        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[
-            self.rows
-        ]
+        normal = torch.randn((*shape, 3), generator=generator, device=device)
+        return uniform[self.rows], normal[self.rows]
 
     def tensors(self, *values: Any) -> list[Tensor]:
         """Arrays on the device."""
@@ -100,13 +108,13 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
     CommandError: there is no such device."""
     made = recipe(options.preset)
 
-    def terms_of(weights: Weights, bench: BatchSource) -> Terms:
-        (std,) = bench.tensors(bench.samples.normalization.std)
+    def terms_of(weights: Weights, source: BatchSource) -> Terms:
+        (std,) = source.tensors(source.samples.normalization.std)
         wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
 
         def terms(step: int) -> dict[str, Tensor]:
-            batch = bench.batch(step)
-            with bench.place.autocast():
+            batch = source.batch(step)
+            with source.place.autocast():
                 return {"loss": modules.physics(wrench, batch, std).mean()}
 
         return terms
@@ -119,7 +127,9 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
             surrogate=state,
             fin_model=samples.settings["fin_model"],
         )
-        batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(trained.fin_model)))
+        batch = fresh_batch(
+            replace(HELD_OUT, fin_model=FinModelSpec.from_values(trained.fin_model))
+        )
         std = torch.tensor(trained.normalization.std, dtype=torch.float32)
         error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
         return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
@@ -143,23 +153,23 @@ def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights
     if options.data is None and (surrogate / "data").is_dir():
         options = replace(options, data=surrogate / "data")
 
-    def terms_of(weights: Weights, bench: BatchSource) -> Terms:
-        if bench.samples.settings["fin_model"] != base.fin_model:
+    def terms_of(weights: Weights, source: BatchSource) -> Terms:
+        if source.samples.settings["fin_model"] != base.fin_model:
             raise DataError(
                 f"{options.data}: its wrenches are of another fin model than the surrogate's"
             )
-        mean, std = bench.tensors(*base.normalization)
-        frozen = surrogate_of(base, device=bench.place.device)
-        ramp = replace(settings, steps=bench.settings.steps)
+        mean, std = source.tensors(*base.normalization)
+        frozen = surrogate_of(base, device=source.place.device)
+        ramp = replace(settings, steps=source.settings.steps)
 
         def terms(step: int) -> dict[str, Tensor]:
-            batch = bench.batch(step)
-            with bench.place.autocast():
-                wanted = (batch.wrench - mean) / std
-                hidden = network.encoded(weights, modules.features(batch), wanted, batch.mask)
+            batch = source.batch(step)
+            with source.place.autocast():
+                target = (batch.wrench - mean) / std
+                hidden = network.encoded(weights, modules.features(batch), target, batch.mask)
             mixture = network.mixture(weights, hidden.float())
-            with bench.place.autocast():
-                guide = modules.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
+            with source.place.autocast():
+                guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
             imitate = modules.imitation(mixture, batch).mean()
             entropy = modules.negative_entropy(mixture, batch.mask).mean()
             loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
@@ -204,8 +214,8 @@ def _train(
         training = Training(weights, settings, output, identity, place)
         if options.resume:
             training.resume()
-        bench = BatchSource(place, samples, settings, options.seed)
-        training.run(terms_of(weights, bench), save)
+        source = BatchSource(place, samples, settings, options.seed)
+        training.run(terms_of(weights, source), save)
         return read_checkpoint(output)
 
 
