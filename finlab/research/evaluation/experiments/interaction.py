@@ -113,7 +113,7 @@ def _models(
     }
     for count in own:
         models[f"ridge, {count} own samples"] = partial(Ridge, count)
-    return models | {"judge": lambda own: Learned(file).of(places_of(own.layout))}
+    return models | {"oracle": lambda own: Learned(file).of(places_of(own.layout))}
 
 
 def _some(samples: Samples, count: int) -> Samples:
@@ -131,7 +131,7 @@ def _row(
         method.plant = copy(method.plant)
         method.plant.interaction = told
         command = method.solve(wrenches, policy=CLOSEST).command
-        if name == "judge":
+        if name == "oracle":
             command = np.array(
                 [_exact(oracle, method, w, u) for w, u in zip(wrenches, command, strict=True)]
             )
