@@ -125,12 +125,12 @@ class Damage:
         gives the force that it is allocated where it is asked for more; one that is stuck as well
         gives its share.
         """
-        may = {part.name: part.FAULTS for part in layout.actuators}
+        may = {part.name: part.KIND.faults for part in layout.actuators}
         known = {name: at for name, at in stuck.items() if "stuck" in may[name]}
         blades = {name: share for name, share in torn.items() if "torn" in may[name]}
         weak = {name: share for name, share in torn.items() if name not in blades}
         for name in set(weak) & set(known):
-            if not layout.part(name).TURNS:
+            if not layout.part(name).KIND.sticks_at_angle:
                 known[name] *= weak.pop(name)
         return cls((*lost, *(name for name in stuck if name not in known)), weak, blades, known)
 
@@ -158,16 +158,17 @@ class Damage:
         }
         held: dict[str, float] = {}
         for name, (value,) in _named("stuck", stuck, 1).items():
-            held[name] = math.radians(value) if layout.part(name).TURNS else value
+            held[name] = math.radians(value) if layout.part(name).KIND.sticks_at_angle else value
         kept: dict[str, tuple[float, ...]] = {}
         for name, values in _named("running", running, None).items():
             part = layout.part(name)
-            turns = part.HELD if part.TURNS else None
+            turns = part.KIND.stuck_number if part.KIND.sticks_at_angle else None
             # Of a kind that cannot run on, that is said where the damage is applied.
-            if "running" in part.FAULTS and len(values) != len(part.NUMBERS):
-                units = ["deg" if k == turns else unit for k, (_, unit) in enumerate(part.NUMBERS)]
-                numbers = zip(part.NUMBERS, units, strict=True)
-                wanted = ",".join(f"{number} [{unit}]" for (number, _), unit in numbers)
+            if "running" in part.KIND.faults and len(values) != len(part.KIND.numbers):
+                labels = [number.label for number in part.KIND.numbers]
+                if turns is not None:
+                    labels[turns] = f"{part.KIND.numbers[turns].name} [deg]"
+                wanted = ",".join(labels)
                 got = ",".join(f"{value:g}" for value in values)
                 raise AllocationError(
                     f"running: expected NAME={wanted} of the {part.type} {name!r}, got "
@@ -192,8 +193,8 @@ WHOLE = Damage()
 def _applied(damage: Damage, layout: Layout) -> Layout:
     for kind, known in damage.partly.items():
         for part in [layout.part(name, f"damage: {kind}") for name in known]:
-            if kind not in part.FAULTS:
-                may = ", ".join((*part.FAULTS, "lost"))
+            if kind not in part.KIND.faults:
+                may = ", ".join((*part.KIND.faults, "lost"))
                 raise AllocationError(
                     f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}"
                 )
@@ -211,13 +212,13 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
 def _check_count(part: Actuator, command: Sequence[float]) -> None:
     """Refuses a command that an actuator is said to keep, if it has another number of values than
     its kind's. Raises AllocationError."""
-    if len(command) != len(part.NUMBERS):
-        wanted = ", ".join(f"{name} [{unit}]" for name, unit in part.NUMBERS)
+    if len(command) != len(part.KIND.numbers):
+        wanted = ", ".join(number.label for number in part.KIND.numbers)
         got = ", ".join(f"{value:g}" for value in command)
         raise AllocationError(
             f"damage of {part.name!r}: running: expected the command that {part.type}s have "
             f"({wanted}), "
-            f"{len(part.NUMBERS)} in all, got {len(command)} ({got})"
+            f"{len(part.KIND.numbers)} in all, got {len(command)} ({got})"
         )
 
 

@@ -143,9 +143,9 @@ def _errors(layout: Layout, place: int, known: Known, command: Array, force: Arr
     deviation = known.deviation(np.nan_to_num(command), np.linalg.norm(force, axis=-1))
     deviation = np.where(lost[:, None], 0.0, deviation)
     part = layout.actuators[place]
-    acting = force if len(part.PUSHES) == 1 else force * [0.0, 1.0, 1.0]
+    acting = force if len(part.KIND.push_rows) == 1 else force * [0.0, 1.0, 1.0]
     size = np.linalg.norm(acting, axis=-1, keepdims=True)
-    rest = np.eye(3)[part.PUSHES[0]]  # where it gives no force
+    rest = np.eye(3)[part.KIND.push_rows[0]]  # where it gives no force
     along = np.where(size > 0.0, acting / np.maximum(size, 1e-300), rest)
     errors = np.zeros((len(command), 3, 3))
     errors[:, 0] = deviation[:, :1] * along

@@ -240,9 +240,8 @@ class Plant:
         """Dead bands (n, 3) [N] of the commands that are forces; None where there is none."""
         bands = np.zeros((self.n, 3))
         for i, part in enumerate(self.layout.actuators):
-            limits: tuple[str, ...] = getattr(part, "LIMITS", ())
-            if "force" in limits:
-                bands[i, limits.index("force")] = getattr(part, "dead_band", 0.0)
+            if part.KIND.force_number is not None:
+                bands[i, part.KIND.force_number] = getattr(part, "dead_band", 0.0)
         return bands if bands.any() else None
 
     def rested(self, command: Array) -> Array:
@@ -250,9 +249,9 @@ class Plant:
         rest."""
         if self._dead_band is None:
             return command
-        from finlab.actuators.propeller import held
+        from finlab.actuators.propeller import outside_dead_band
 
-        return held(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
+        return outside_dead_band(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
 
     def grid(self, counts: Sequence[int]) -> Array:
         """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each

@@ -335,7 +335,7 @@ class ClosedLoop:
         result = command.copy()
         for name, share in self.damage.weak.items():
             index = self.layout.index(name)
-            result[index, self.layout.actuators[index].THRUST or 0] /= share
+            result[index, self.layout.actuators[index].KIND.force_number or 0] /= share
         return result
 
     def _moved(self, command: Array) -> Array:
