@@ -22,7 +22,7 @@ NO_UNIT = {"name", "hangs", "common"}
 def arguments_of(docstring: str) -> dict[str, str]:
     """Arguments of a Google style docstring, with what it says of each."""
     section = docstring.split("Args:\n")[1].split("\n\n")[0]
-    starts = re.split(r"^    (\w+): ", inspect.cleandoc("x\n" + section), flags=re.MULTILINE)
+    starts = re.split(r"^    (\w+): ", section, flags=re.MULTILINE)
     return dict(zip(starts[1::2], starts[2::2], strict=True))
 
 
