@@ -31,7 +31,7 @@ PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no bound."""
 ANY_PRICE = 1e12
 """A price at which power does not count [W/N]."""
-SHORT_STEP = 0.2
+SHORTER_STEP = 0.2
 """Part of each step that is tried beside the whole of it."""
 LEAST_PROBE = 1e-15
 """Least distance of the points of a difference, where a limit has no width [rad, Hz]."""
@@ -304,7 +304,7 @@ class LawBox:
         for _ in range(ROUNDS):
             gradient, hessian = self._profit_derivatives(price, beat, NEARLY * span + LEAST_PROBE)
             step = np.clip(_uphill_steps(beat, gradient, hessian), -longest, longest)
-            trial = np.clip(np.concatenate([step, SHORT_STEP * step]) + beat, low, high)
+            trial = np.clip(np.concatenate([step, SHORTER_STEP * step]) + beat, low, high)
             trial_profit = self.profit(price, self.command(trial))
             best_trial = trial_profit.argmax(axis=0)
             is_better = trial_profit[best_trial, row] > best_profit
