@@ -1,6 +1,5 @@
-"""Types of arrays, relative tolerances, and what numpy, torch and CasADi have in common; used in all
-rooms.
-"""
+"""Types of arrays, relative tolerances, and what numpy, torch and CasADi have in common; all of
+finlab uses it."""
 
 import sys
 from contextlib import suppress

@@ -23,7 +23,7 @@ from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of
 from finlab.layout.layout import Layout
 
 if TYPE_CHECKING:
-    from finlab.interaction.interaction import AtPlaces
+    from finlab.interaction.interaction import PointInteraction
 
 
 class Plant:
@@ -52,12 +52,12 @@ class Plant:
             [(slice(None), laws[0][1])] if len(laws) == 1 else laws
         )
         own = layout.interaction
-        self.interaction: AtPlaces | None = None
+        self.interaction: PointInteraction | None = None
         """What the actuators do to each other; None where that does not count."""
         if own is not None:
-            from finlab.layout.places import places_of
+            from finlab.layout.jet_geometry import jet_geometry_of
 
-            self.interaction = own.of(places_of(layout))
+            self.interaction = own.of(jet_geometry_of(layout))
         self.counts: NDArray[np.bool_] = np.ones(6, bool)
         """Axes (6,) of the wrench that count, the others being 0."""
         self.feels_flow = own is not None or any(law.feels_flow for _, law in self._laws)
