@@ -15,8 +15,12 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators.actuator import (
+    ACROSS,
+    Command,
+    CommandNumber,
     Diameter,
     Faults,
+    Kind,
     Metres,
     Place,
     Seconds,
@@ -26,7 +30,6 @@ from finlab.actuators.actuator import (
     held_limits,
     weakened,
 )
-from finlab.actuators.kind import ACROSS, Command, CommandNumber, Kind
 from finlab.actuators.propeller import (
     FORMULAS,
     T200,

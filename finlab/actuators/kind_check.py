@@ -5,8 +5,7 @@ import inspect
 from dataclasses import fields
 from typing import Any
 
-from finlab.actuators.actuator import Actuator, Faults
-from finlab.actuators.kind import ACROSS, DRAWN_AS, Command, Kind
+from finlab.actuators.actuator import ACROSS, DRAWN_AS, Actuator, Command, Faults, Kind
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.errors import FinlabError

@@ -10,8 +10,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from finlab.actuators.actuator import Actuator
-from finlab.actuators.kind import Command
+from finlab.actuators.actuator import Actuator, Command
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel

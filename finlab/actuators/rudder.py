@@ -21,8 +21,12 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.actuators.actuator import (
+    ACROSS,
     Actuator,
+    Command,
+    CommandNumber,
     Faults,
+    Kind,
     Place,
     Seconds,
     TurnRate,
@@ -30,7 +34,6 @@ from finlab.actuators.actuator import (
     Uncertainty,
 )
 from finlab.actuators.hermite_grid import grid_numbers
-from finlab.actuators.kind import ACROSS, Command, CommandNumber, Kind
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, POINTS, Form, Group, Line, RadialTable, Response
 from finlab.actuators.thrust_model import lower_hull

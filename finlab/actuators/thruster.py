@@ -12,8 +12,17 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from finlab.actuators.actuator import Diameter, Faults, Metres, Place, Seconds, Uncertainty
-from finlab.actuators.kind import Command, CommandNumber, Kind
+from finlab.actuators.actuator import (
+    Command,
+    CommandNumber,
+    Diameter,
+    Faults,
+    Kind,
+    Metres,
+    Place,
+    Seconds,
+    Uncertainty,
+)
 from finlab.actuators.propeller import (
     FORMULAS,
     T200,

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.kind import Command
+from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
 from finlab.allocation.settings import USUAL_PERIOD_S

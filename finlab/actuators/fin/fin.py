@@ -17,11 +17,15 @@ from numpy.typing import ArrayLike
 
 from finlab import axes
 from finlab.actuators.actuator import (
+    ACROSS,
     Actuator,
+    Command,
+    CommandNumber,
     CommandRow,
     Diameter,
     Faults,
     Indices,
+    Kind,
     Uncertainty,
     held_limits,
     weakened,
@@ -29,7 +33,6 @@ from finlab.actuators.actuator import (
 from finlab.actuators.fin.fin_laws import stack_laws
 from finlab.actuators.fin.fin_model import FIN_MODELS, FinModelSpec, Limits
 from finlab.actuators.fin.fin_response import FinGroup, fin_table
-from finlab.actuators.kind import ACROSS, Command, CommandNumber, Kind
 from finlab.actuators.law import ActuatorLaw, FinLaw
 from finlab.arrays import Array
 from finlab.errors import LayoutError
