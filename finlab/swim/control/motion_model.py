@@ -87,7 +87,7 @@ class MotionModel:
         self._tilt_decay = np.array([0.0, 0.0, 0.0, *(cosine.real - 1.0), 0.0])
         self._wrench_before = np.zeros((2, layout.n, 6))
         self._force = np.zeros((layout.n, 3))
-        self._may_stick = np.array(["stuck" in part.FAULTS for part in layout.actuators])
+        self._may_stick = np.array(["stuck" in part.KIND.faults for part in layout.actuators])
         self._turning_about_s = np.zeros(layout.n)
         self._any_turning_about = False
         self.is_turning_about = np.zeros(layout.n, dtype=bool)

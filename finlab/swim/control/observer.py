@@ -325,5 +325,5 @@ def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
     """
     largest = np.zeros(6)
     for part, B in zip(layout.actuators, plant_of(layout).effectiveness, strict=True):
-        largest += part.largest(speed) * np.linalg.norm(B[list(part.PUSHES)], axis=0)
+        largest += part.largest(speed) * np.linalg.norm(B[list(part.KIND.push_rows)], axis=0)
     return largest

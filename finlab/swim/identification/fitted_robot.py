@@ -58,7 +58,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
         "a common scale of all forces, damping and inertia does not follow from motion; it rests "
         "on the mass and added mass that the layout gave"
     )
-    if any(part.THRUST is not None for part in fit.model.layout.actuators):
+    if any(part.KIND.force_number is not None for part in fit.model.layout.actuators):
         lines.append(
             "a force in the layout is what a thruster gives: divide it by the strength that was "
             "found for what the thruster is to be sent"

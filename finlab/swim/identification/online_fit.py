@@ -78,6 +78,8 @@ class OnlineFit:
         turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)
         self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {words}{turned}")
         for i, part in enumerate(self.layout.actuators):
-            if part.THRUST is not None:  # so that it gives the force that it is asked for
-                self.factor[i, part.THRUST] = 1.0 / strength[i]
+            if (
+                part.KIND.force_number is not None
+            ):  # so that it gives the force that it is asked for
+                self.factor[i, part.KIND.force_number] = 1.0 / strength[i]
         return replace(self.layout, actuators=fitted_actuators(fit, fit.estimate("lean")))

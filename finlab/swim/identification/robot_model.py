@@ -65,7 +65,7 @@ class RobotModel:
         self.law_force = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own
         frame."""
-        self.is_flow_driven = np.array([part.BY_FLOW for part in layout.actuators])
+        self.is_flow_driven = np.array([part.KIND.driven_by_flow for part in layout.actuators])
         """Which actuators (n,) the flow drives: one that leans meets the water at another angle."""
         self._force_by_lean = np.zeros_like(self.law_force)
         self.delay_steps = [0] * len(SENSORS)
@@ -188,7 +188,7 @@ def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
         lean: angles (n,), after that, about the first axis, a shaft [rad]; of thrusters, which push
             along it, about the second.
     """
-    is_thruster = np.array([len(part.AXES) == 1 for part in layout.actuators])
+    is_thruster = np.array([len(part.KIND.axes) == 1 for part in layout.actuators])
     about_first = np.where(is_thruster, 0.0, lean)
     about_second = np.where(is_thruster, lean, 0.0)
     angles = np.stack([mounting, about_first, about_second], axis=-1)
@@ -207,7 +207,7 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
     parts = list(layout.actuators)
     for k in layout.indices(names):
         part = parts[k]
-        signs = [[-1], [1], [-1]] if len(part.PUSHES) == 1 else [[1], [-1], [-1]]
+        signs = [[-1], [1], [-1]] if len(part.KIND.push_rows) == 1 else [[1], [-1], [-1]]
         parts[k] = part.turned(np.array(part.frame) * signs)
     return replace(layout, actuators=tuple(parts))
 

@@ -39,8 +39,10 @@ class FirstOrderLag:
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
-            self._time_constant[i, each.LAGS] = getattr(each, "time_constant", NO_LAG_S)
-            if not each.TURNS:
+            self._time_constant[i, each.KIND.lagging_number] = getattr(
+                each, "time_constant", NO_LAG_S
+            )
+            if not each.KIND.sticks_at_angle:
                 continue
             low = each.lower[0]
             high = each.upper[0]
@@ -88,11 +90,13 @@ class ActuatorMotion:
         """Which are not."""
         self.fins = FinLag(layout) if fins is None else fins
         self.others = FirstOrderLag([layout.actuators[i] for i in self.other_indices])
-        self._held_columns = np.array([part.HELD for part in layout.actuators])
+        self._held_columns = np.array([part.KIND.stuck_number for part in layout.actuators])
         self._indices = np.arange(layout.n)
         self._working = np.ones(layout.n, bool)
         widths = (layout.upper - layout.lower)[self._indices, self._held_columns]
-        self.angles: NDArray[np.bool_] = np.array([part.TURNS for part in layout.actuators])
+        self.angles: NDArray[np.bool_] = np.array(
+            [part.KIND.sticks_at_angle for part in layout.actuators]
+        )
         """Which actuators (n,) have an angle that stays where they stick."""
         self.turns_fully: NDArray[np.bool_] = self.angles & is_full_turn(widths)
         """Which actuators (n,) may come to any direction."""
