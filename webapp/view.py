@@ -1,14 +1,13 @@
 """One browser: state, questions, answers, and the page that is written of them, in one loop.
 
-browser   a widget changes       viser calls `Intents.do` on the event loop
-loop      the session changes    nothing else ever changes it
-loop      `Jobs.ask`             what can be seen is asked; what was asked already costs nothing
-thread    `solve(question)`      pure: it knows no widget, no session, no loop
-loop      `facts_of`, `Board`    widgets are functions of facts; what did not change is not sent
+    browser   a widget changes       viser calls `Intents.do` on the event loop
+    loop      the session changes    nothing else ever changes it
+    loop      `Jobs.ask`             what can be seen is asked; an old question costs nothing
+    thread    `solve(question)`      pure: it knows no widget, no session, no loop
+    loop      `facts_of`, `Board`    widgets are functions of facts; only what changed is sent
 """
 
 import asyncio
-import time
 from typing import Any
 
 import viser
@@ -30,7 +29,7 @@ longer to write a page twice than once."""
 TOGETHER_S = 0.4
 """How long what comes beside an answer waits for the rest of it [s]."""
 Slots = frozenset[Slot[Any, Any]]
-NONE: Slots = frozenset()
+NO_SLOTS: Slots = frozenset()
 DRAWN_S = 0.004
 """How long after its words the view is drawn [s]: a browser shows what comes without nodes of the
 view at once, and the rest with its next picture."""
@@ -51,6 +50,7 @@ class View:
         compute."""
         self.client = client
         self.session = session
+        self._loop = loop
         self.bell = Bell(loop)
         self.intents = Intents(client, self.bell)
         page = self.page = Page(client, Context(session, solver, pools, self.bell), self.intents)
@@ -64,8 +64,10 @@ class View:
         page.presses.start()
         self._revision: int | None = None
         self._is_due = True
-        self._held_until = 0.0
-        self._held_for: Slots = NONE
+        self._held_for: Slots = NO_SLOTS
+        """Slots whose answers the page waits for before it is written."""
+        self._patience: asyncio.TimerHandle | None = None
+        """Ends that wait."""
         self.bell.ring()
         self._task = loop.create_task(self._run())
 
@@ -82,20 +84,17 @@ class View:
     @property
     def is_settled(self) -> bool:
         """Whether all that was asked is answered, and written."""
-        return not (self._is_due or self.bell.rings or self.jobs.busy)
+        return not (self._is_due or self.bell.rung.is_set() or self.jobs.busy)
 
     async def _run(self) -> None:
         while True:
-            left = None
             try:
                 self._look()
-                if self._is_due:
-                    left = self._held_s()
-                    if left is None:
-                        await self._write()
+                if self._is_due and not self._is_held():
+                    await self._write()
             except Exception as error:  # the page must go on, whatever we have got wrong
                 self.intents.fault(error)
-            await self.bell.wait(left)
+            await self.bell.rung.wait()
 
     def _look(self) -> None:
         """Take what has been answered and done, ask what follows, and see whether the page is
@@ -110,15 +109,17 @@ class View:
         self._is_due = True
         self.intents.is_new = False
         jobs = self.jobs
-        jobs.ask()
-        revised = self._revision != self.session.revision
-        self._revision = self.session.revision
-        if revised and self.busy:
-            self._hold(PATIENCE_S, frozenset([jobs.answering.slot]))
-        elif done or not jobs.beside.issuperset(came):
-            self._held_for = NONE
-        else:
+        if came and not done and jobs.beside.issuperset(came):
+            # Nothing is asked because of what comes beside an answer.
             self._hold(TOGETHER_S, jobs.beside)
+            return
+        jobs.ask()
+        is_revised = self._revision != self.session.revision
+        self._revision = self.session.revision
+        if is_revised and self.busy:
+            self._hold(PATIENCE_S, jobs.first)
+        else:
+            self._held_for = NO_SLOTS
 
     def _attend(self, waiting: Attended) -> bool:
         """Let something that has rung go on; whether there is something new to show."""
@@ -137,18 +138,28 @@ class View:
     def _hold(self, seconds: float, slots: Slots) -> None:
         """Leave the page as it is until some slots are answered, but no longer than some time
         [s]."""
-        if self._held_for != slots:
-            self._held_for = slots
-            self._held_until = time.monotonic() + seconds
+        if self._held_for is slots:
+            return
+        if self._patience is not None:
+            self._patience.cancel()
+        self._held_for = slots
+        self._patience = self._loop.call_later(seconds, self._let_go)
 
-    def _held_s(self) -> float | None:
-        """How much longer the page is left as it is [s]; None where it is to be written."""
-        left = self._held_until - time.monotonic()
+    def _let_go(self) -> None:
+        """Write the page with the answers that there are."""
+        self._held_for = NO_SLOTS
+        self.bell.ring()
+
+    def _is_held(self) -> bool:
+        """Whether an answer is to come that the page waits for."""
         for slot in self._held_for:
-            if left > 0.0 and slot.busy:
-                return left
-        self._held_for = NONE
-        return None
+            if slot.busy:
+                return True
+        self._held_for = NO_SLOTS
+        if self._patience is not None:
+            self._patience.cancel()
+            self._patience = None
+        return False
 
     async def _write(self) -> None:
         """Words first, then the view."""
@@ -188,5 +199,7 @@ class View:
     def close(self) -> None:
         """The browser has gone."""
         self._task.cancel()
+        if self._patience is not None:
+            self._patience.cancel()
         self.jobs.stop()
         self.deferred.forget()

@@ -130,7 +130,7 @@ class Layout(Checked):
             parts = (self.interaction, *parts)
         return tuple(part for part in parts if part.reads)
 
-    @property
+    @cached_property
     def is_of_fins(self) -> bool:
         """Whether all actuators are fins."""
         return self.n_fins == self.n

@@ -162,6 +162,20 @@ class Direct(Pool):
         """There is nothing to end."""
 
 
+@dataclass
+class LaterCall:
+    """A call that is still to come, in place of `asyncio.TimerHandle`."""
+
+    due: float
+    """When it is made, by the monotonic clock [s]."""
+    act: Callable[[], object]
+    is_cancelled: bool = False
+
+    def cancel(self) -> None:
+        """The call is not made any more."""
+        self.is_cancelled = True
+
+
 class LoneBell(Bell):
     """A bell without a page: a test looks itself, by `attend` or `until`."""
 
@@ -169,7 +183,8 @@ class LoneBell(Bell):
 
     def __init__(self) -> None:
         """Nobody has rung."""
-        self._rung: deque[tuple[float, Attended]] = deque()
+        self._rung: deque[Attended] = deque()
+        self._later: list[LaterCall] = []
         self.refused: list[str] = []
         """What the page would have told the user."""
         self.stages: list[Any] = []
@@ -178,23 +193,28 @@ class LoneBell(Bell):
 
     def ring(self, *waiting: Attended) -> None:
         """Keep who has rung."""
-        self._rung.extend((0.0, each) for each in waiting)
+        self._rung.extend(waiting)
 
     def ring_from_thread(self, waiting: Attended, _done: object = None) -> None:
         """Keep who has rung."""
-        self._rung.append((0.0, waiting))
+        self._rung.append(waiting)
 
-    def ring_later(self, seconds: float, waiting: Attended) -> None:
-        """Keep who rings later."""
-        self._rung.append((time.monotonic() + seconds, waiting))
+    def call_later(self, seconds: float, act: Callable[[], object]) -> "LaterCall":
+        """Keep what is called later."""
+        self._later.append(LaterCall(time.monotonic() + seconds, act))
+        return self._later[-1]
 
     def attend(self) -> None:
         """Let all go on that have rung by now, as a page does."""
+        waiting_calls = [call for call in self._later if not call.is_cancelled]
+        self._later = []
+        for call in waiting_calls:
+            if call.due > time.monotonic():
+                self._later.append(call)
+            else:
+                call.act()
         for _ in range(len(self._rung)):
-            due, waiting = self._rung.popleft()
-            if due > time.monotonic():
-                self._rung.append((due, waiting))
-                continue
+            waiting = self._rung.popleft()
             try:
                 came = waiting.attend()
             except FinlabError as error:

@@ -44,6 +44,8 @@ class Jobs:
         self.log = LogReading(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context)
+        self.first = frozenset[Slot[Any, Any]]([self.answering.slot])
+        """What a change of the state waits for before the page is written."""
         self.beside = frozenset[Slot[Any, Any]]([self.answering.search, self.ranging, self.both])
         """What is told shortly after an answer, all of it together."""
 

@@ -5,9 +5,7 @@ question is frozen, an answer is never changed, and all that a slot holds belong
 """
 
 import asyncio
-import contextlib
 import threading
-import time
 import traceback
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
@@ -84,19 +82,29 @@ class Attended(Protocol):
         ...
 
 
+class Timer(Protocol):
+    """A call that is still to come, as `asyncio.TimerHandle` is."""
+
+    def cancel(self) -> None:
+        """The call is not made any more."""
+        ...
+
+
 class Bell:
     """Wakes the loop of one page, and says for whom."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         """A bell for a coroutine on a loop."""
         self._loop = loop
-        self._event = asyncio.Event()
+        self.rung = asyncio.Event()
+        """Set while the page has still to look; it waits for this event."""
         self._waiting: dict[Attended, None] = {}
 
     def ring(self, *waiting: Attended) -> None:
         """Wake the page, for some that wait; called on the loop."""
-        self._waiting.update(dict.fromkeys(waiting))
-        self._event.set()
+        for each in waiting:
+            self._waiting[each] = None
+        self.rung.set()
 
     def ring_from_thread(self, waiting: Attended, _done: object = None) -> None:
         """The same, called from any thread."""
@@ -105,21 +113,16 @@ class Bell:
 
     def ring_later(self, seconds: float, waiting: Attended) -> None:
         """The same after some time [s]; called on the loop."""
-        self._loop.call_later(seconds, self.ring, waiting)
+        self.call_later(seconds, partial(self.ring, waiting))
 
-    async def wait(self, seconds: float | None = None) -> None:
-        """Until it rings, or some time has passed [s]."""
-        with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._event.wait(), seconds)
-
-    @property
-    def rings(self) -> bool:
-        """Whether the page has still to look."""
-        return self._event.is_set()
+    def call_later(self, seconds: float, act: Callable[[], object]) -> Timer:
+        """Call a function on the loop after some time [s], without waking the page; called on the
+        loop."""
+        return self._loop.call_later(seconds, act)
 
     def take(self) -> list[Attended]:
         """Whom it rang for, once each; from now on it is silent again."""
-        self._event.clear()
+        self.rung.clear()
         waiting = list(self._waiting)
         self._waiting.clear()
         return waiting
@@ -180,7 +183,8 @@ class Slot(Generic[Question, Answer]):
         self._watched = watched
         self.title = title
         self._work: Work[Question] | None = None
-        self._due: float | None = None
+        self._rest: Timer | None = None
+        """Begins to work on the question when it has not changed for some time."""
         self.question: Question | None = None
         """The newest one."""
         self.answered: Question | None = None
@@ -212,14 +216,13 @@ class Slot(Generic[Question, Answer]):
             self._cancel()
         if at_once or self._rest_s == 0.0:
             self._begin()
-        else:
-            self._due = time.monotonic() + self._rest_s
-            self._bell.ring_later(self._rest_s, self)
+            return
+        if self._rest is not None:
+            self._rest.cancel()
+        self._rest = self._bell.call_later(self._rest_s, self._begin)
 
     def attend(self) -> bool:
-        """Begin what has rested, or take an answer that has come."""
-        if self._due is not None and time.monotonic() >= self._due:
-            self._begin()
+        """Take an answer that has come."""
         work = self._work
         if work is None:
             return False
@@ -238,7 +241,7 @@ class Slot(Generic[Question, Answer]):
             traceback.print_exception(error)
             self.error = f"it failed: {error or type(error).__name__}"
         self.is_error_new = self.error is not None and self.error != error_before
-        if self.answered is not self.question and self._due is None:
+        if self.answered is not self.question and self._rest is None:
             self._begin()
         return True
 
@@ -250,16 +253,21 @@ class Slot(Generic[Question, Answer]):
     def forget(self) -> None:
         """Drop question and answer; what is under way counts no more."""
         self._cancel()
-        self._due = None
+        self._end_rest()
         self.question = self.answered = self.answer = self.error = None
 
     def _begin(self) -> None:
         assert self.question is not None
-        self._due = None
+        self._end_rest()
         work = self._work = Work(self.question, partial(self._bell.ring_from_thread, self))
         more = (work,) if self._watched else ()
         work.future = self._pool.submit(partial(self._solve, work.question, *more))
         work.future.add_done_callback(partial(self._bell.ring_from_thread, self))
+
+    def _end_rest(self) -> None:
+        if self._rest is not None:
+            self._rest.cancel()
+            self._rest = None
 
     def _cancel(self) -> None:
         work = self._work

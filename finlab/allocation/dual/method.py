@@ -381,8 +381,11 @@ class Dual(Method):
         price = np.where(is_finite, price, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        at_rest = proved_power(self.compiled, wrench, np.zeros_like(price), now)
-        bound = np.maximum(proved_power(self.compiled, wrench, price, now), at_rest)
+        # The last row is that of the price 0, which proves for any wrench what all take at rest.
+        prices = np.concatenate([price, np.zeros((1, 6))])
+        wrenches = np.concatenate([wrench, np.zeros((1, 6))])
+        proved = proved_power(self.compiled, wrenches, prices, now)
+        bound = np.maximum(proved[:-1], proved[-1])
         largest_power = self.compiled.robot.largest_power
         if not self._measured:
             # The value is one of tables, which are off by a share of full power, at the least
