@@ -40,20 +40,6 @@ class Rule:
         self.is_due = True
         self.last = UNKNOWN
 
-    def write(self, facts: Facts) -> None:
-        """Make it again, and send what has changed."""
-        made = self.make(*map(facts.__getitem__, self.names))
-        if self.handle is not None:
-            if self.key == "content" and type(made) is not Markup:
-                made = escape(made)  # content that is not marked as markup is text
-            # A user may have changed a value.
-            before = self.handle.value if self.key == "value" else self.last
-            empty = made != made and before != before  # NaN, as before
-            if before is UNKNOWN or (before != made and not empty):
-                setattr(self.handle, self.key, str(made) if self.key == "content" else made)
-            self.last = made
-        self.is_due = False
-
 
 class Group:
     """Rules that stand or fall together, and wait while nobody can see what they show."""
@@ -69,12 +55,25 @@ class Group:
         self._fault = fault
 
     def write(self, facts: Facts) -> None:
-        """Make again what is due."""
+        """Make again what is due, and send what has changed."""
         self.is_due = False
         try:
             for rule in self.rules:
-                if rule.is_due:
-                    rule.write(facts)
+                if not rule.is_due:
+                    continue
+                made = rule.make(*map(facts.__getitem__, rule.names))
+                handle = rule.handle
+                key = rule.key
+                if handle is not None:
+                    if key == "content" and type(made) is not Markup:
+                        made = escape(made)  # content that is not marked as markup is text
+                    # A user may have changed a value.
+                    before = handle.value if key == "value" else rule.last
+                    is_nan_as_before = made != made and before != before
+                    if before is UNKNOWN or (before != made and not is_nan_as_before):
+                        setattr(handle, key, str(made) if key == "content" else made)
+                    rule.last = made
+                rule.is_due = False
         except Exception as error:
             self.fail(error)
         else:

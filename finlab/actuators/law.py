@@ -107,7 +107,8 @@ class Blade:
 
     def _parts(self, amplitude: Values) -> tuple[Values, Values]:
         """Parts of drag, over A, and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
-        sqrt = library_of(amplitude).sqrt
+        # Mostly asked of arrays, many times for one answer.
+        sqrt = np.sqrt if isinstance(amplitude, np.ndarray) else library_of(amplitude).sqrt
         # The torque changes sign where s0 = (K A / J) (1 - s0^2).
         twice_ratio = 2.0 * self._drag_over_inertia * amplitude
         s0 = twice_ratio / (1.0 + sqrt(1.0 + twice_ratio * twice_ratio))
@@ -257,13 +258,12 @@ class PlanarLaw(FinLaw):
 
     @final
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        xp = library_of(command)
         amplitude = command[..., 0]
         frequency = command[..., 1]
         zero_direction = command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
-        if xp is np:
+        if isinstance(command, np.ndarray):
             # Half the time of `stack`: the plant evaluates this for every answer of an allocator.
             force = np.zeros((*thrust.shape, 3), thrust.dtype)
             np.cos(direction, out=force[..., 1])
@@ -271,6 +271,7 @@ class PlanarLaw(FinLaw):
             planar = force[..., 1:]
             planar *= thrust[..., None]
             return force
+        xp = library_of(command)
         # Nothing acts along the shaft.
         parts = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(parts, axis=-1)

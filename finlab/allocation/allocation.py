@@ -156,7 +156,7 @@ class Answer(PlainData, Generic[Number]):
         """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the
         actuators: what the layout says, or a table's own; zeros where nothing is known to be."""
         if not self._plant.is_uncertain:
-            return self._by_parts(lambda plant, rows: np.zeros((len(rows), 6)))
+            return read_only(np.zeros((*self.command.shape[:-2], 6)))
         from finlab.physics.expected_miss import expected_miss
 
         return self._by_parts(expected_miss)
@@ -199,8 +199,9 @@ class Answer(PlainData, Generic[Number]):
             return read_only(values)  # type: ignore[return-value]
         return float(np.ravel(values)[0])  # type: ignore[return-value]
 
-    @property
+    @cached_property
     def _plant(self) -> Plant:
+        """Judge of commands: the laws of all actuators in the question's flow."""
         return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
 
     def _by_parts(self, judge: Callable[[Plant, Array], Array]) -> Array:
@@ -219,7 +220,9 @@ class Answer(PlainData, Generic[Number]):
     def __getstate__(self) -> dict[str, Any]:
         for name in (*self.LAZY, "_general_notes"):
             getattr(self, name)
-        return {**self.__dict__, "later": None}
+        state = {**self.__dict__, "later": None}
+        state.pop("_plant", None)  # quickly made again
+        return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():

@@ -101,8 +101,11 @@ def _has_others(values: object) -> bool:
             else values.dtype.kind not in "iuf"
         )
     if isinstance(values, list | tuple):
-        # Most are plain numbers, and every tick asks.
-        return any(type(value) is not float and _has_others(value) for value in values)
+        for value in values:
+            # Most are plain numbers, and every tick asks.
+            if type(value) is not float and _has_others(value):
+                return True
+        return False
     return isinstance(values, bool | np.bool_ | str | bytes)
 
 

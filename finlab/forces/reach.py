@@ -114,14 +114,15 @@ def axis_ranges(
     parts = _parts(layout, tuple(lost), water, layout.stamps)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     held = np.where(axes == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
-    rays, held = (np.tile(rows, (len(parts.radius) // len(axes), 1)) for rows in (axes, held))
-    size = largest(parts, rays, held).size.reshape(-1, 2, 6)
+    count = len(parts.radius) // len(axes)
+    rays = np.tile(axes, (count, 1))
+    origins = np.tile(held, (count, 1))
+    size = largest(parts, rays, origins).size.reshape(-1, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -CROSSED
     high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
-    return Ranges(
-        *[np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)]
-    )
+    scale = np.where(there.any(axis=0), SCALE, np.nan)
+    return Ranges(-low * scale + 0.0, high * scale + 0.0)
 
 
 @lru_cache(maxsize=16)

@@ -69,7 +69,9 @@ class EffortMeter:
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
-        return self.with_gradient(command)[0]
+        # Of a quadratic form, half the slopes times the commands.
+        energy: AnyArray = 0.5 * np.einsum("rni,rni->r", self.gradient(command), command)
+        return energy
 
     def gradient(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""

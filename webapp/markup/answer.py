@@ -28,6 +28,10 @@ BARS_HEADER = Markup(
 )
 MIDDLE = "<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"
 """Where nothing is asked, in the track of bars."""
+LEAST_FORCE_SCALE = 2.0
+"""Least force at the end of a bar [N]."""
+LEAST_TORQUE_SCALE = 0.5
+"""Least torque at the end of a bar [N m]."""
 PLAIN_HEADER = Markup(
     "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
@@ -51,15 +55,14 @@ def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
     values = np.array([wanted, wanted if got is None else got])
     # One scale for the forces and one for the torques, so that bars compare; it moves in coarse
     # steps only.
-    scales = [
-        max(nice_limit(np.abs(values[:, part]).max()), least)
-        for part, least in ((slice(0, 3), 2), (slice(3, 6), 0.5))
-    ]
+    force_scale = max(nice_limit(np.abs(values[:, :3]).max()), LEAST_FORCE_SCALE)
+    torque_scale = max(nice_limit(np.abs(values[:, 3:]).max()), LEAST_TORQUE_SCALE)
     rows = []
     for k in range(6):
         wish = None if np.isnan(demanded[k]) else float(demanded[k])
-        rows.append(_bar_row(k, wish, None if got is None else float(got[k]), scales[k // 3]))
-    header = BARS_HEADER.format(f"±{scales[0]:g} N, ±{scales[1]:g} N m")
+        scale = force_scale if k < 3 else torque_scale
+        rows.append(_bar_row(k, wish, None if got is None else float(got[k]), scale))
+    header = BARS_HEADER.format(f"±{force_scale:g} N, ±{torque_scale:g} N m")
     return html("<div class='fl'><div class='bars'>{}{}</div></div>", header, Markup("".join(rows)))
 
 
@@ -120,16 +123,8 @@ def fin_table(
     for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
-        first = html(
-            "{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name
-        )
-        remark = (
-            damage_words(damage, fin.name, fin.KIND.sticks_at_angle)
-            if is_damaged and not failed
-            else ""
-        )
-        if remark:
-            first += html("<div class='missing damage'>{}</div>", remark)
+        words = damage_words(damage, fin.name, fin.KIND.sticks_at_angle) if is_damaged and not failed else ""
+        remark = html("<div class='missing damage'>{}</div>", words) if words else ""
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
         elif failed:
@@ -137,7 +132,8 @@ def fin_table(
         else:
             force = float(np.linalg.norm(allocation.forces[i]))
             cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)
-        rows.append(html("<tr class='{}'><td>{}</td>{}</tr>", kind, first, cells))
+        row = "<tr class='{}'><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>"
+        rows.append(html(row, kind, swatch(i, failed), fin.name, fin.name, remark, cells))
     header = html(HEADER if layout.fins else PLAIN_HEADER, "fin" if layout.is_of_fins else "")
     return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
 
@@ -151,11 +147,8 @@ def _cells(
     meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
     if not isinstance(part, Fin):
         along = force if part.KIND.sticks_at_angle else command[0]
-        remark = (
-            f"{part.type}, {_degrees(command[part.KIND.stuck_number])}°"
-            if part.KIND.sticks_at_angle
-            else part.type
-        )
+        angle = round(math.degrees(command[part.KIND.stuck_number])) if part.KIND.sticks_at_angle else 0
+        remark = f"{part.type}, {angle:+d}°".replace("-", "−") if part.KIND.sticks_at_angle else part.type
         words = html("<td colspan='3' class='words'>{}</td>", remark)
         cell = html(
             "<td class='{}'>{}</td>",
@@ -168,8 +161,5 @@ def _cells(
         f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td "
         f"class='{second}'>{frequency:.2f}</td>"
     )
-    return Markup(f"{angles}<td>{_degrees(direction)}</td><td>{force:.2f}</td><td>{meter}</td>")
-
-
-def _degrees(angle: float) -> str:
-    return f"{round(math.degrees(angle)):+d}".replace("-", "−")
+    turn = f"{round(math.degrees(direction)):+d}".replace("-", "−")
+    return Markup(f"{angles}<td>{turn}</td><td>{force:.2f}</td><td>{meter}</td>")

@@ -184,9 +184,10 @@ def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
 def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
     """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for
     none."""
-    blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
-    if not blind:
+    is_blind = reach < 1e-6
+    if not is_blind.any():
         return None
+    blind = [AXIS_WORDS[k] for k in range(6) if is_blind[k]]
     without = (
         f"Without {fins_words([layout.index(name) for name in failed], layout)} this"
         if failed

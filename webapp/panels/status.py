@@ -149,7 +149,8 @@ def corner(
     """Legend and status line in the lower left corner of the page; `least` where the answer itself
     is shown, not another way to do the same, whose `badge` says where that comes from; `refined` is
     the step of its refinement, nothing at its end."""
-    fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
+    count = state.layout.n
+    fins = f"{count - len(state.failed)} of {count} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
         parts.append(html("<span class='missing'>{}</span>", error))
@@ -164,12 +165,10 @@ def corner(
 def _figures(
     allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str
 ) -> list[str]:
-    color = COLORS[verdict_of(allocation, in_reach)]
-    verdict = verdict_sentence(allocation, in_reach)
-    if refined:
-        color = DEAD
-        verdict = refined
-    pill = "pill long" if len(verdict) > LONG else "pill"
+    verdict = verdict_of(allocation, in_reach)
+    color = DEAD if refined else COLORS[verdict]
+    sentence = refined or verdict_sentence(allocation, verdict)
+    pill = "pill long" if len(sentence) > LONG else "pill"
     missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
         "-", "−"
@@ -183,23 +182,23 @@ def _figures(
         if value is None:  # effort is of fins
             continue
         is_least = least and LEAST.get(kind) == allocation.method
-        kept = f"least {word}" if is_least else word
-        cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
-        costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
+        label = f"least {word}" if is_least else word
+        cost = "<span><span class='dim'>{}</span> <b class='{}'>{}</b>{}</span>"
+        costs.append(html(cost, label, word, three_digits(value), unit))
     method = allocation.method
     ms = allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
-    error = "<span class='dim'>error</span> <b class='err'>{}</b>"
     return [
         html(
-            "<span title='missing, as a share of what the robot can push: {}'>{}</span>",
+            "<span title='missing, as a share of what the robot can push: {}'>"
+            "<span class='dim'>error</span> <b class='err'>{}</b></span>",
             rest,
-            html(error, error_digits(allocation.err_norm)),
+            error_digits(allocation.err_norm),
         ),
         *costs,
         html("<span class='aside'>{}</span>", who),
-        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), verdict),
+        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), sentence),
     ]
 
 
@@ -229,6 +228,9 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
 
 
 def _cards(legend: str, status: list[str]) -> str:
-    card = "<div class='fl fl-card {}'>{}</div>"
-    both = html(card, "fl-legend-card", legend), html(card, "fl-status", status)
-    return html("<div class='fl-corner'>{}{}</div>", *both)
+    return html(
+        "<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{}</div>"
+        "<div class='fl fl-card fl-status'>{}</div></div>",
+        legend,
+        status,
+    )

@@ -44,16 +44,24 @@ class Arrows:
             visible=False,
         )
 
-    def show(self, starts: Array, ways: Array, colors: list[Rgb], size: float) -> None:
-        """Show arrows from `starts` (n, 3) along `ways` (n, 3) [m]; those of no length are left
-        out."""
+    def show(
+        self, starts: Array, ways: Array, colors: NDArray[np.uint8], size: float
+    ) -> None:
+        """Show arrows; those of no length are left out.
+
+        Args:
+            starts: where they begin (n, 3) [m].
+            ways: from there to their tips (n, 3) [m].
+            colors: of each (n, 3), in linear light.
+            size: factor of the thickness of their shafts.
+        """
         drawn = np.linalg.norm(ways, axis=1) > SHORTEST * size
         self.node.visible = bool(drawn.any())
         if not drawn.any():
             return
         points = np.stack([starts, starts + ways], axis=1)[drawn] / size
         self.node.scale = size
-        self.node.colors = linear(colors)[drawn]
+        self.node.colors = colors[drawn]
         self.node.points = points.round(DIGITS).astype(np.float32)
 
 
@@ -79,14 +87,15 @@ class ForceNodes:
             receive_shadow=False,
             visible=False,
         )
-        self._colors: list[Rgb] = []
+        self._colors = np.zeros((0, 3), dtype=np.uint8)
+        """Of each actuator (n, 3), in linear light."""
         self._middles = self._turns = self._starts = np.zeros((0, 3))
         self._sizes = (1.0, 1.0)
 
     def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
         """Where actuators stand; `sizes` are of them and of arrows."""
         size, _ = self._sizes = sizes
-        self._colors = [fin_color(k) for k in range(layout.n)]
+        self._colors = linear([fin_color(k) for k in range(layout.n)])
         shafts = layout.frames[:, 0] * layout.is_fin[:, None]
         self._starts = layout.position + size * (ROOT + SPAN / 2) * shafts
         self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
@@ -106,7 +115,7 @@ class ForceNodes:
         scales = np.full((*across.shape, 3), size)
         scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
         turns = turned_about_x(self._turns[beats, None], across)
-        fans.batched_colors = np.repeat(linear(self._colors)[beats], WEDGES, axis=0)
+        fans.batched_colors = np.repeat(self._colors[beats], WEDGES, axis=0)
         fans.batched_positions = _rows(
             np.broadcast_to(self._starts[beats, None], (*across.shape, 3))
         )

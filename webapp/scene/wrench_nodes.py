@@ -14,7 +14,7 @@ from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring
-from webapp.scene.force_nodes import DIGITS, Arrows, quaternion
+from webapp.scene.force_nodes import DIGITS, Arrows, linear, quaternion
 from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Findings
 from webapp.tasks.swimmer import Swimmer
@@ -34,6 +34,8 @@ RINGS = (0.05, 0.16)
 """The largest ring's radius stays within these [m]."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
+FORCE_COLORS = linear([DELIVERED, MISSING])
+"""Of the arrows of the delivered and of the missing force (2, 3), in linear light."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -131,7 +133,7 @@ class WrenchNodes:
         delivered = size * scale * got[:3]
         starts = np.stack([np.zeros(3), delivered])
         ways = np.stack([delivered, size * scale * missing[:3]])
-        self._forces.show(starts, ways, [DELIVERED, MISSING], size)
+        self._forces.show(starts, ways, FORCE_COLORS, size)
         length = float(np.linalg.norm(asked))
         self._asked_force.show(asked, length, (round(length, DIGITS), size, size))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):

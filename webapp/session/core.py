@@ -75,6 +75,8 @@ class Core:
         self.mode = 0
         self.step = None
         self.shifts = ()
+        if not self.chosen:
+            return
         old = before.layout.names
         names = self.state.layout.names
         called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
@@ -109,6 +111,8 @@ class Core:
     @property
     def selection(self) -> tuple[str, ...]:
         """All selected actuators, in the order of the layout."""
+        if not self.chosen:
+            return ()
         return tuple(name for name in self.state.layout.names if name in self.chosen)
 
     def select(self, name: str | None) -> None:

@@ -79,10 +79,11 @@ class State:
     def asking(self, other: "State") -> "State":
         """The same robot with the question of another state: what is asked for, of whom, and
         how."""
-        robot = {key: getattr(self, key) for key in ("layout", "damage", "links")}
-        fits = self.layout is other.layout
+        method = other.method
+        if self.layout is not other.layout:
+            method = method_for(self.layout, method)
         return replace(
-            other, **robot, method=other.method if fits else method_for(self.layout, other.method)
+            other, layout=self.layout, damage=self.damage, links=self.links, method=method
         )
 
     def with_target(self, axis: int, value: Any) -> "State":

@@ -52,13 +52,15 @@ class Fitting(Slot[Upload, Fitted]):
     off."""
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context.pools.long, context.bell, fitted, watched=True, title="Not fitted")
+        super().__init__(
+            context.pools.long,
+            context.bell,
+            fitted,
+            watched=True,
+            stage="reading the file",
+            title="Not fitted",
+        )
         self._session = context.session
-
-    @property
-    def progress(self) -> str | None:
-        """What is done with the file."""
-        return (super().progress or "reading the file") if self.busy else None
 
     def start(self, actuator: str, name: str, content: bytes) -> None:
         """Begin with a file for an actuator. FinlabError: another file is under way, the file is

@@ -33,17 +33,19 @@ class LogReading(Slot[LogFile, "Judgement"]):
     """One log at a time for one page."""
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context.pools.long, context.bell, judged, watched=True, title="Not judged")
+        super().__init__(
+            context.pools.long,
+            context.bell,
+            judged,
+            watched=True,
+            stage="reading the log",
+            title="Not judged",
+        )
         self._session = context.session
         self.by_page = False
         """Whether the page's robot counts, not that of the log's parameters."""
         self.moment: float | None = None
         """Which moment of the log is on the robot [s]."""
-
-    @property
-    def progress(self) -> str | None:
-        """What is done with the log."""
-        return (super().progress or "reading the log") if self.busy else None
 
     def choose_robot(self, by_page: object) -> None:
         """Judge by the page's robot, or by the one that the log tells; a log that is there is

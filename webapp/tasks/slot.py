@@ -158,6 +158,7 @@ class Slot(Generic[Question, Answer]):
         rest_s: float = 0.0,
         live: bool = False,
         watched: bool = False,
+        stage: str | None = None,
         title: str = "",
     ) -> None:
         """An empty slot.
@@ -166,14 +167,15 @@ class Slot(Generic[Question, Answer]):
             pool: threads that answer.
             bell: rung for this slot when there is an answer, or progress.
             solve: gives the answer to a question, on a thread; what it raises is the slot's
-            `error`.
+                `error`.
             rest_s: how long a question must not change before it is worked on [s].
             live: whether what is under way is finished when the question changes, so that a page
                 follows a dragged slider; else it is cancelled.
             watched: whether `solve` also gets the `Work`: to report, and to see that it is
-            cancelled.
+                cancelled.
+            stage: progress of work that has reported nothing yet.
             title: heading of the note that tells of an error; empty where the page says it
-            elsewhere.
+                elsewhere.
         """
         self._pool = pool
         self._bell = bell
@@ -181,12 +183,18 @@ class Slot(Generic[Question, Answer]):
         self._rest_s = rest_s
         self._live = live
         self._watched = watched
+        self._stage = stage
         self.title = title
         self._work: Work[Question] | None = None
         self._rest: Timer | None = None
         """Begins to work on the question when it has not changed for some time."""
         self.question: Question | None = None
         """The newest one."""
+        self.busy = False
+        """Whether the newest question has no answer yet."""
+        self.progress: Any = None
+        """How far the work on the question is, where that is reported; None while there is
+        none."""
         self.answered: Question | None = None
         """The one that answer and error belong to; it may be an earlier one."""
         self.answer: Answer | None = None
@@ -194,32 +202,24 @@ class Slot(Generic[Question, Answer]):
         self.is_error_new = False
         """Whether the answer before had no such error."""
 
-    @property
-    def busy(self) -> bool:
-        """True while the newest question has no answer."""
-        return self.answered is not self.question
-
-    @property
-    def progress(self) -> Any:
-        """How far the work on the question is, where it reports that."""
-        return None if self._work is None else self._work.progress
-
     def ask(self, question: Question, at_once: bool = False) -> None:
         """Have a question answered, unless it is the one that was asked last; `at_once` without a
         rest."""
         if self.question is not None and question == self.question:
             return
         self.question = question
+        self.busy = True
         if self._work is not None:
             if self._live:  # the newest comes next
                 return
             self._cancel()
-        if at_once or self._rest_s == 0.0:
-            self._begin()
-            return
         if self._rest is not None:
             self._rest.cancel()
-        self._rest = self._bell.call_later(self._rest_s, self._begin)
+            self._rest = None
+        if at_once or self._rest_s == 0.0:
+            self._begin()
+        else:
+            self._rest = self._bell.call_later(self._rest_s, self._begin)
 
     def attend(self) -> bool:
         """Take an answer that has come."""
@@ -228,8 +228,10 @@ class Slot(Generic[Question, Answer]):
             return False
         future = work.future
         if future is None or not future.done():
-            return work.progress is not None
+            self.progress = work.progress
+            return self.progress is not None
         self._work = None
+        self.progress = None
         self.answered = work.question
         error_before = self.error
         self.answer = self.error = None
@@ -241,7 +243,8 @@ class Slot(Generic[Question, Answer]):
             traceback.print_exception(error)
             self.error = f"it failed: {error or type(error).__name__}"
         self.is_error_new = self.error is not None and self.error != error_before
-        if self.answered is not self.question and self._rest is None:
+        self.busy = self.answered is not self.question
+        if self.busy and self._rest is None:
             self._begin()
         return True
 
@@ -253,25 +256,27 @@ class Slot(Generic[Question, Answer]):
     def forget(self) -> None:
         """Drop question and answer; what is under way counts no more."""
         self._cancel()
-        self._end_rest()
+        if self._rest is not None:
+            self._rest.cancel()
+            self._rest = None
+        self.busy = False
         self.question = self.answered = self.answer = self.error = None
 
     def _begin(self) -> None:
         assert self.question is not None
-        self._end_rest()
-        work = self._work = Work(self.question, partial(self._bell.ring_from_thread, self))
-        more = (work,) if self._watched else ()
-        work.future = self._pool.submit(partial(self._solve, work.question, *more))
-        work.future.add_done_callback(partial(self._bell.ring_from_thread, self))
-
-    def _end_rest(self) -> None:
-        if self._rest is not None:
-            self._rest.cancel()
-            self._rest = None
+        self._rest = None
+        ring = partial(self._bell.ring_from_thread, self)
+        work = Work(self.question, ring)
+        watch = (work,) if self._watched else ()
+        work.future = self._pool.submit(partial(self._solve, work.question, *watch))
+        work.future.add_done_callback(ring)
+        self._work = work
+        self.progress = self._stage
 
     def _cancel(self) -> None:
         work = self._work
         self._work = None
+        self.progress = None
         if work is not None:
             work.cancelled.set()
             if work.future is not None:

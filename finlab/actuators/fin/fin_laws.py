@@ -39,7 +39,9 @@ class Drag(PlanarLaw):
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
         """See `PlanarLaw`; it does not depend on the zero direction."""
-        return self.coefficient * (frequency * library_of(amplitude).sin(amplitude)) ** 2
+        # Mostly asked of arrays, many times for one answer.
+        sin = np.sin if isinstance(amplitude, np.ndarray) else library_of(amplitude).sin
+        return self.coefficient * (frequency * sin(amplitude)) ** 2
 
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array

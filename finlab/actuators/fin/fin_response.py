@@ -132,9 +132,9 @@ class FinGroup(Group):
             share = force / self._largest[i]
             cell = np.minimum((np.sqrt(share) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
-            profit = table.box.profit(v, table.box.best(v, starts))
+            profit = table.box.optimum(v, starts).profit
             if not table.is_largest_at_corner or (v < 0.0).any():
-                profit = np.maximum(profit, table.box.profit(v, table.box.best(v)))
+                profit = np.maximum(profit, table.box.optimum(v).profit)
             result[:, i] = profit
         return result
 
@@ -208,6 +208,15 @@ def _form(law: FinLaw, box: LawBox, beat: Array, directions: Directions) -> Form
     )
 
 
+class Optimum(NamedTuple):
+    """The commands with the largest profit at K prices."""
+
+    command: Array
+    """(K, 3) [rad, Hz, rad]."""
+    profit: Array
+    """Price times force, less the power (K,) [W]."""
+
+
 class LawBox:
     """One fin's law within the limits of amplitude and frequency, in its strongest direction."""
 
@@ -277,18 +286,22 @@ class LawBox:
         beat = np.stack(np.meshgrid(amplitude, frequency, indexing="ij"), axis=-1)
         return self.command(beat.reshape(-1, 2))
 
-    def best(self, price: Array, starts: Array | None = None) -> Array:
+    def best(self, price: Array) -> Array:
+        """Returns the commands (K, 3) with the largest profit at prices (K,) [W/N]; see
+        `optimum`."""
+        return self.optimum(price).command
+
+    def optimum(self, price: Array, starts: Array | None = None) -> Optimum:
         """Returns the commands with the largest profit, by Newton's method within the limits.
 
         Args:
             price: prices (K,) [W/N].
-            starts: amplitudes and frequencies (S, K, 2), from the best of which each begins; a grid
-                for all when None.
-
-        Returns:
-            Commands (K, 3) [rad, Hz, rad].
+            starts: amplitudes and frequencies (S, K, 2) near the optimum, from the best of which
+                each begins, and which end with a step that gains no more than rounding; a grid for
+                all when None.
         """
         row = np.arange(len(price))
+        least_gain = 0.0 if starts is None else ROUNDING
         if starts is None:
             grid = self.grid()
             profit = self.profit(price[:, None], grid)
@@ -307,12 +320,13 @@ class LawBox:
             trial = np.clip(np.concatenate([step, SHORTER_STEP * step]) + beat, low, high)
             trial_profit = self.profit(price, self.command(trial))
             best_trial = trial_profit.argmax(axis=0)
-            is_better = trial_profit[best_trial, row] > best_profit
-            if not is_better.any():
-                break
+            gain = trial_profit[best_trial, row] - best_profit
+            is_better = gain > 0.0
             beat = np.where(is_better[:, None], trial[best_trial, row], beat)
             best_profit = np.where(is_better, trial_profit[best_trial, row], best_profit)
-        return self.command(beat)
+            if not (gain > least_gain * np.abs(best_profit)).any():
+                break
+        return Optimum(self.command(beat), best_profit)
 
     def _profit_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
         """Gradient (K, 2) and Hessian (K, 2, 2) of the profit at prices (K,), by amplitude and
