@@ -60,7 +60,8 @@ def test_a_name_that_a_package_passes_on_leads_to_its_file(graph: ImportGraph) -
         "tests/allocation/test_question.py"
     )  # from finlab.allocation import Allocator
     assert (
-        "finlab/allocation/allocator.py" in imports and "finlab/allocation/modes.py" not in imports
+        "finlab/allocation/allocator.py" in imports
+        and "finlab/allocation/binding.py" not in imports
     )
 
 

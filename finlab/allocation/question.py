@@ -101,11 +101,9 @@ def _has_others(values: object) -> bool:
             else values.dtype.kind not in "iuf"
         )
     if isinstance(values, list | tuple):
-        for value in values:
-            # Most are plain numbers, and every tick asks.
-            if type(value) is not float and _has_others(value):
-                return True
-        return False
+        # Most are plain numbers, and every tick asks.
+        others = [value for value in values if type(value) is not float]
+        return any(map(_has_others, others))
     return isinstance(values, bool | np.bool_ | str | bytes)
 
 

@@ -75,6 +75,23 @@ class Candidates(PlainData):
         arrays = {name: getattr(self, name)[some] for name in ARRAYS}
         return Candidates(**arrays, source=tuple(np.array(self.source, object)[some]))
 
+    def split(self, count: int) -> "tuple[Candidates, ...]":
+        """As many parts of equal length, in their order."""
+        length = len(self.command) // count
+        parts = []
+        for start in range(0, len(self.command), length):
+            some = slice(start, start + length)
+            part = Candidates(
+                command=self.command[some],
+                wrench=self.wrench[some],
+                err_norm=self.err_norm[some],
+                effort=self.effort[some],
+                power=self.power[some],
+                source=self.source[some],
+            )
+            parts.append(part)
+        return tuple(parts)
+
     def exact(self, within: float) -> "Candidates":
         """Those whose error is at most that, the ones of least effort first."""
         order = self.effort.argsort(kind="stable").tolist()

@@ -137,7 +137,9 @@ def _labels(places: list[Point]) -> list[Point]:
     return labels
 
 
+@cache
 def _legend() -> str:
+    """Signs and words of what is drawn, above the plot."""
     sign = "<circle cx='{}' cy='10' r='{}' stroke='currentColor' stroke-width='2' fill='{}'/>"
     looks = ((DOT - 1.0, "currentColor"), (RING - 1.0, "none"), (RING - 1.0, "currentColor"))
     parts = []

@@ -62,9 +62,8 @@ def error_axis(logs: Array) -> Axis:
     for power in range(low, high + 1, max(1, round((high - low) / 5))):
         below = "≤" if 10.0**power <= EXACT else ""
         raised = str(power).replace("-", "−")
-        ticks.append(
-            (float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised))
-        )
+        label = Markup(f"{below}10<tspan dy='-4' font-size='8'>{raised}</tspan>")
+        ticks.append((float(power), label))
     margin = 0.06 * (high - low)
     return Axis("error", low - margin, high + margin, tuple(ticks))
 

@@ -58,9 +58,10 @@ def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
     return Verdict.APPROXIMATE if in_reach else Verdict.OUT_OF_REACH
 
 
-def verdict_sentence(allocation: Allocation, verdict: Verdict) -> str:
-    """A verdict on an answer, and what else could be done, or which policy chose the answer; the
-    answer's sentence says what is missing."""
+def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
+    """The verdict, and what else could be done, or which policy chose the answer; the answer's
+    sentence says what is missing."""
+    verdict = verdict_of(allocation, in_reach)
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
     if verdict is Verdict.EXACT:

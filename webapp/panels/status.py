@@ -165,9 +165,8 @@ def corner(
 def _figures(
     allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str
 ) -> list[str]:
-    verdict = verdict_of(allocation, in_reach)
-    color = DEAD if refined else COLORS[verdict]
-    sentence = refined or verdict_sentence(allocation, verdict)
+    color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
+    sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
     missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(

@@ -44,9 +44,7 @@ class Arrows:
             visible=False,
         )
 
-    def show(
-        self, starts: Array, ways: Array, colors: NDArray[np.uint8], size: float
-    ) -> None:
+    def show(self, starts: Array, ways: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
 
         Args:

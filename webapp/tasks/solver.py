@@ -1,6 +1,7 @@
 """The solver: from a state to an answer with all that a page shows of it, by allocators that it
 keeps."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +13,6 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
-from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
@@ -23,6 +23,7 @@ from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
 from webapp.markup.words import OWN, fins_words
 from webapp.session.state import DRAWING, State, chosen
+from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
@@ -95,35 +96,35 @@ def modes_of(
     last = ways[-1].command
     signatures = mode_signature(last, force_sizes(layout, last))
     ends = np.full(len(last), -1)
-    for k, named in reversed(list(enumerate(shown))):
-        ends[same_signature(named.mode.signature, signatures)] = k
+    for k in reversed(range(len(shown))):
+        ends[same_signature(shown[k].mode.signature, signatures)] = k
     return Modes(shown, len(modes), ways, ends=tuple(ends.tolist()))
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
     """The first modes with their names, no two alike; all but the first one are the network's."""
-    shown = modes[:MAX_SHOWN]
-    badges = [badge, *["network"] * (len(shown) - 1)]
-    return tuple(NamedMode(*each) for each in zip(shown, _names(shown), badges, strict=False))
-
-
-def _names(modes: Sequence[Mode]) -> list[str]:
-    """Who rests; modes of the same name are numbered."""
-    names = [_resting_words(mode) for mode in modes]
-    places = [names[:k].count(name) + 1 for k, name in enumerate(names)]
-    return [
-        f"{name} ({place})" if place > 1 else name
-        for name, place in zip(names, places, strict=True)
-    ]
+    named: list[NamedMode] = []
+    count_of: Counter[str] = Counter()
+    for mode in modes[:MAX_SHOWN]:
+        words = _resting_words(mode)
+        count_of[words] += 1
+        number = count_of[words]
+        name = f"{words} ({number})" if number > 1 else words
+        named.append(NamedMode(mode, name, "network" if named else badge))
+    return tuple(named)
 
 
 def _resting_words(mode: Mode) -> str:
-    still = [k for k in mode.resting if k in mode.still]
-    hardly = [k for k in mode.resting if k not in still]
-    both = ((still, "rest", "rests"), (hardly, "hardly push", "hardly pushes"))
-    parts = [
-        f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in both if fins
-    ]
+    """Which fins rest, and which hardly push."""
+    still: list[int] = []
+    weak: list[int] = []
+    for fin in mode.resting:
+        (still if fin in mode.still else weak).append(fin)
+    parts = []
+    if still:
+        parts.append(f"{fins_words(still)} {'rest' if len(still) > 1 else 'rests'}")
+    if weak:
+        parts.append(f"{fins_words(weak)} hardly {'push' if len(weak) > 1 else 'pushes'}")
     return ", ".join(parts) or "all fins push"
 
 

@@ -131,21 +131,23 @@ class EffortFins:
         """Where each fin's rows begin (n,)."""
         return np.arange(len(self.largest)) * LEVELS
 
+    @cached_property
+    def _circles(self) -> NDArray[np.intp]:
+        """Where the values around each fin's circle begin (n,) in an array (n, POINTS)."""
+        return np.arange(len(self.lean)) * POINTS
+
     def deflection(self, direction: Array) -> Array:
         """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero
         directions."""
-        return self._around(self.lean, direction)
+        cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
+        return np.asarray(self.lean.ravel().take(cell + self._circles))
 
     def gauges(self, direction: Array) -> Array:
         """Shares (..., n) of the table's force in directions (..., n) [rad]."""
-        return (
-            np.ones(len(self.half)) if self.gauge is None else self._around(self.gauge, direction)
-        )
-
-    def _around(self, values: Array, direction: Array) -> Array:
-        """Of values (n, POINTS), those nearest to directions (..., n)."""
+        if self.gauge is None:
+            return np.ones(len(self.half))
         cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
-        return np.asarray(values.ravel().take(cell + np.arange(len(values)) * POINTS))
+        return np.asarray(self.gauge.ravel().take(cell + self._circles))
 
     def lookup(self, size: Array) -> Array:
         """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest

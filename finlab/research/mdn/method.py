@@ -122,9 +122,8 @@ class Mdn(LearnedMethod):
                 self.robot, normalized[0], proposal.force[0].astype(complex), TRACE_STEPS
             )
         names = names_of(proposal)
-        count = len(trace[0])
         every = self._candidates(normalized, np.concatenate(trace), names * len(trace))
-        return tuple([every.rows(slice(k, k + count)) for k in range(0, len(every.command), count)])
+        return every.split(len(trace))
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """Returns the network's proposals.
