@@ -1,7 +1,6 @@
 """A fault in whatever a widget does: the page says so in a sentence, and goes on."""
 
 import asyncio
-import threading
 import types
 from collections.abc import Iterator
 from typing import Any
@@ -9,10 +8,9 @@ from typing import Any
 import pytest
 import viser
 
-from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.exhaustive import sampled
-from tests.webapp.stand_in import LoneBell, SilentClient, until
+from tests.webapp.stand_in import SilentClient, until
 from tests.webapp.test_app import app, on_loop, server, view
 from webapp.app import App
 from webapp.session import Session
@@ -20,7 +18,6 @@ from webapp.session.lessons import Guide
 from webapp.tasks.designs import Designs
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
-from webapp.tasks.slot import Pool, Slot, Work
 from webapp.tasks.swimming import Swimming
 from webapp.view import View
 
@@ -156,77 +153,3 @@ def test_every_widget_survives_a_fault_in_what_is_written(
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.3 and faults(view) == []
-
-
-def test_a_live_slot_works_on_one_question_and_then_on_the_newest(worker: Pool) -> None:
-    gate = threading.Event()
-    asked = list[int]()
-
-    def solve(question: int) -> int:
-        asked.append(question)
-        assert gate.wait(30)
-        return question
-
-    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, live=True)
-    for question in range(100):
-        slot.ask(question)
-    gate.set()
-    until(lambda: not slot.busy)
-    assert asked == [0, 99] and slot.answer == 99
-
-
-def test_another_slot_is_cancelled_and_a_stale_answer_is_never_taken(worker: Pool) -> None:
-    gate = threading.Event()
-    seen = list[bool]()
-
-    def solve(question: int, work: Work[int]) -> int:
-        assert gate.wait(30)
-        seen.append(work.cancelled.is_set())
-        return question
-
-    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, watched=True)
-    answers = set()
-    for question in range(3):
-        slot.ask(question)
-    gate.set()
-
-    def ended() -> bool:
-        answers.add(slot.answer)
-        return not slot.busy
-
-    until(ended)
-    assert (
-        answers <= {None, 2} and slot.answer == 2 and seen[-1] is False and seen.count(False) == 1
-    )
-
-
-def test_a_question_waits_until_it_rests_and_what_was_asked_costs_nothing(worker: Pool) -> None:
-    asked: list[str] = []
-    slot: Slot[str, None] = Slot(worker, LoneBell(), asked.append, rest_s=0.05)
-    for question in ("a", "b", "c", "c"):
-        slot.ask(question)
-        assert not slot.attend()
-    until(lambda: not slot.busy)
-    slot.ask("c")
-    assert not slot.busy and asked == ["c"]
-    slot.ask("d", at_once=True)
-    worker.submit(lambda: None).result(30)
-    assert asked == ["c", "d"]
-
-
-def test_a_fault_does_not_end_the_thread(worker: Pool, capsys: pytest.CaptureFixture[str]) -> None:
-    def refuse(_question: str) -> None:
-        raise FinlabError("not so")
-
-    bad: Slot[str, None] = Slot(worker, LoneBell(), lambda _: 1 / 0)  # type: ignore[arg-type,return-value]
-    refused: Slot[str, None] = Slot(worker, LoneBell(), refuse)
-    good: Slot[str, str] = Slot(worker, LoneBell(), str.upper)
-    for slot in (bad, refused, good):
-        slot.ask("a")
-    until(lambda: not any(slot.busy for slot in (bad, refused, good)))
-    assert (bad.error, refused.error) == (
-        "it failed: division by zero",
-        "not so",
-    ) and good.answer == "A"
-    printed = capsys.readouterr().err
-    assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"
