@@ -28,7 +28,7 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
     return {
         "state": state,
         **vars(state),  # layout, damage, target, method, policy, network
-        "failed": state.failed,
+        "lost": state.lost,
         "flow": state.flow,
         # The layout with the limits that are left to damaged actuators.
         "able": state.able,

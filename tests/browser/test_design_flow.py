@@ -180,7 +180,7 @@ def test_reach_draws_sets_and_compares_layouts(page: Any) -> None:
     card = page.text(".score")
     page.key("n")
     page.key("x")
-    page.until(lambda: page.session.state.failed == ("front_right",))
+    page.until(lambda: page.session.state.lost == ("front_right",))
     page.until(
         lambda: page.vertices("/robot/attainable/now") != whole and page.text(".score") != card
     )

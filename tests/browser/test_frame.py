@@ -169,7 +169,7 @@ def test_keys_do_what_the_list_of_commands_says(page: Any) -> None:
     page.key("n")
     page.until(lambda: session.selected is not None)
     page.key("x")
-    page.until(lambda: session.state.failed == (session.selected,))
+    page.until(lambda: session.state.lost == (session.selected,))
     page.key("Delete")
     page.until(lambda: session.state.layout.n_fins == 3)
     for _ in range(3):

@@ -45,7 +45,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     page.until(lambda: len(page.instances("/robot/forces")) == 4)
     force = page.instances("/robot/forces")[0]
     page.press("2")
-    page.until(lambda: session.state.failed == ("front_left",))
+    page.until(lambda: session.state.lost == ("front_left",))
     page.until(
         lambda: "lost" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status")
     )
@@ -58,15 +58,13 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     for number in ("1", "3"):
         page.press(number)
         page.until(
-            lambda number=number: (
-                session.state.layout.names[int(number) - 1] in session.state.failed
-            )
+            lambda number=number: session.state.layout.names[int(number) - 1] in session.state.lost
         )
     page.press("4")
     page.until(lambda: "once all are lost" in page.text(".fl-status"))
     page.unfold("Damage", "Which")
     page.press("All")
-    page.until(lambda: session.state.failed == ())
+    page.until(lambda: session.state.lost == ())
     page.choose("Which", "back_left")
     page.until(lambda: session.selected == "back_left")
     page.type("Strength [%]", "50")
@@ -121,7 +119,7 @@ def test_a_robot_with_thrusters_is_shown_and_answered(page: Any) -> None:
     page.until(lambda: "thruster" in page.text("table.fins") and "Exact" in page.text(".fl-status"))
     page.press("6")
     page.until(
-        lambda: session.state.failed == ("lift_right",) and "5 of 6" in page.text(".fl-status")
+        lambda: session.state.lost == ("lift_right",) and "5 of 6" in page.text(".fl-status")
     )
     page.until(lambda: 0 < len(page.instances("/robot/forces")) < 6)
     page.tab("Simulate")
@@ -183,7 +181,7 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     ends = page.page.locator(".fl-timeline .plot").evaluate_all(BOTTOMS)
     assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
-    page.until(lambda: swimming.swimmer.shown.failed == ("front_left",))
+    page.until(lambda: swimming.swimmer.shown.believed_lost == ("front_left",))
     page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
     page.page.get_by_role("button", name="2 ✕", exact=True).locator("visible=true").first.wait_for()
     page.press("Pause")
@@ -212,7 +210,7 @@ def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     page.press("Start")
     page.until(lambda: swimming.swimmer is not None)
     page.until(lambda: swimming.swimmer.shown.lost == ("front_right",))
-    page.until(lambda: swimming.swimmer.shown.failed == ("front_right",))
+    page.until(lambda: swimming.swimmer.shown.believed_lost == ("front_right",))
     page.until(lambda: "The monitor found front_right lost" in page.page.inner_text("body"))
     page.press("Pause")
     page.until(lambda: not swimming.running and not swimming.busy)

@@ -107,7 +107,7 @@ def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
 def test_refusals_become_notes_and_lose_nothing(server: viser.ViserServer, view: View) -> None:
     state = view.session.state
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, float("nan"))))
-    on_loop(server, lambda: view.do(lambda: view.session.toggle_failure("<b>nobody</b>")))
+    on_loop(server, lambda: view.do(lambda: view.session.toggle_loss("<b>nobody</b>")))
     assert view.session.state == state
     assert len(view.client.notes) == 2
     assert "Fx" in view.client.notes[0]

@@ -150,7 +150,7 @@ def test_an_allocator_is_kept_until_its_robot_changes() -> None:
     solver = Solver()
     state = State(UCAT, target=PRESETS["Turn"])
     first = solver.allocator(state)
-    assert solver.allocator(state.with_target(0, 2.0).with_failure_toggled(UCAT.names[0])) is first
+    assert solver.allocator(state.with_target(0, 2.0).with_loss_toggled(UCAT.names[0])) is first
     moved = UCAT.replace_actuator(UCAT.names[0], position=(0.2, -0.1, 0.0))
     assert solver.allocator(state.with_layout(moved)) is not first
 

@@ -51,7 +51,7 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
     session.damage("front_left", "weak", 0.5)
     session.damage("front_left", "weak", 0.3)
     session.damage("front_left", "stuck", 1.0)
-    session.toggle_failure("front_left")
+    session.toggle_loss("front_left")
     session.mend("front_left")
     assert session.state.damage == Damage()
     session.undo()

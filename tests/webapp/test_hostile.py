@@ -240,5 +240,5 @@ def test_no_page_takes_names_for_markup(server: viser.ViserServer, view: View) -
             texts = contents(server)
             assert any("&lt;img" in text for text in texts)
             assert not any(re.search("<img|<script|&amp;lt;", text) for text in texts)
-    on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(EVIL[:40])))
-    assert view.session.state.failed == (EVIL[:40],)
+    on_loop(server, lambda: view.do(lambda: view.session.toggle_loss(EVIL[:40])))
+    assert view.session.state.lost == (EVIL[:40],)

@@ -144,9 +144,9 @@ def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worke
     until(lambda: not improver.busy)
     found = improver.answer
     assert found is not None, improver.error
-    assert found.layout.names == layout.names and not set(found.moved) & set(state.failed)
+    assert found.layout.names == layout.names and not set(found.moved) & set(state.lost)
     assert found.layout.actuators[:lost] == layout.actuators[:lost]
-    room = Room(layout.without(state.failed), 0.02)
-    left = found.layout.without(state.failed)
+    room = Room(layout.without(state.lost), 0.02)
+    left = found.layout.without(state.lost)
     assert room.broken(left.position[None], left.frames[None])[0] == 0.0
-    assert mirror_pairs(left) == mirror_pairs(layout.without(state.failed))
+    assert mirror_pairs(left) == mirror_pairs(layout.without(state.lost))

@@ -126,17 +126,17 @@ def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> 
     session.select("front_left")
     session.mirror()
     session.select("front_left")
-    session.toggle_failure("front_left")
+    session.toggle_loss("front_left")
     session.rename("front_left", " bow <b> ")
     state = session.state
-    assert state.failed == ("bow <b>",) and ("bow <b>", "front_right") in state.links
+    assert state.lost == ("bow <b>",) and ("bow <b>", "front_right") in state.links
     assert session.selected == "bow <b>"
     assert (
         "<b>"
         not in actuator_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
     )
     session.undo()
-    assert session.selected == "front_left" and session.state.failed == ("front_left",)
+    assert session.selected == "front_left" and session.state.lost == ("front_left",)
 
 
 def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:

@@ -106,7 +106,7 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     assert view.board.facts is not None and view.board.facts["both"] is not None
 
     def fail() -> object:
-        view.do(partial(session.toggle_failure, "front_left"))
+        view.do(partial(session.toggle_loss, "front_left"))
         view._write_words()
         return view.board.facts and view.board.facts["both"]
 

@@ -19,7 +19,7 @@ from webapp.session.state import State
 
 def _answer(state: State) -> Allocation:
     allocator = Allocator(state.layout, state.method)
-    return allocator.allocate(state.target, lost=state.failed, policy=state.policy)
+    return allocator.allocate(state.target, lost=state.lost, policy=state.policy)
 
 
 def _turn_a_shaft(session: Session) -> None:
@@ -33,7 +33,7 @@ SOLVED: dict[str, Callable[[Session], object]] = {
     "temperature": lambda session: session.set_setting("temperature", 2.0),
     "watts-or-effort": lambda session: session.keep_least("watts"),
     "null-space": lambda session: (session.shift(0, 3.0), session.show_mode(2)),
-    "lost-fin": lambda session: session.toggle_failure("front_left"),
+    "lost-fin": lambda session: session.toggle_loss("front_left"),
     "no-yaw": _turn_a_shaft,
     "out-of-reach": lambda session: session.set_setting("policy", "direction"),
     "jets": lambda session: session.set_jets(True),
@@ -62,7 +62,7 @@ def test_wrong_ways_do_not_count() -> None:
     session = Session(load_layout("penta"))
     session.guide.open("lost-fin")
     for fin in ("front_left", "back_right", "front_right"):  # one fin alone turns nothing
-        session.toggle_failure(fin)
+        session.toggle_loss(fin)
     session.guide.take(_answer(session.state))
     assert not session.guide.solved
     session.guide.open("out-of-reach")

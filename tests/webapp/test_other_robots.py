@@ -85,7 +85,7 @@ def test_every_task_shows_the_robot(
     assert all(f"/robot/fins/{k}/turn/blade" in nodes for k in range(layout.n))
     assert f"/robot/fins/{layout.n}/turn/blade" not in nodes
     first = layout.names[0]
-    tab.on_loop(lambda: tab.view.do(lambda: session.toggle_failure(first)))
+    tab.on_loop(lambda: tab.view.do(lambda: session.toggle_loss(first)))
     tab.settle()
     assert "lost" in " ".join(tab.figures()) and tab.client.notes == []
     for act in (

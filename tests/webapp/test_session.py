@@ -55,11 +55,11 @@ def test_undo_is_of_the_robot_and_not_of_the_question(session: Session) -> None:
     session.set_setting("method", "qp")
     assert session.history.undo_name is None
     name = session.state.layout.names[0]
-    session.toggle_failure(name)
+    session.toggle_loss(name)
     session.set_preset("Dive")
     session.set_setting("policy", "priority")
     asked = session.state
-    assert session.undo() == f"Fail {name}" and session.state.failed == ()
+    assert session.undo() == f"Fail {name}" and session.state.lost == ()
     assert session.state == replace(asked, damage=Damage())
     session.keep_least("effort")
     session.redo()
@@ -92,13 +92,13 @@ def test_bad_settings_change_nothing(session: Session) -> None:
 
 def test_all_may_fail_but_the_last_cannot_go(session: Session) -> None:
     for name in session.state.layout.names:
-        session.toggle_failure(name)
-    assert session.state.failed == session.state.layout.names
-    session.toggle_failure(session.state.layout.names[3])
+        session.toggle_loss(name)
+    assert session.state.lost == session.state.layout.names
+    session.toggle_loss(session.state.layout.names[3])
     for name in session.state.layout.names[:3]:
         session.select(name)
         session.delete()
-    assert session.state.failed == ()
+    assert session.state.lost == ()
     session.select(session.state.layout.names[0])
     with pytest.raises(FinlabError, match="only actuator"):
         session.delete()

@@ -83,25 +83,25 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     begin(swimming)
     swimming.set_running(False)
     swimming.toggle("front_left")
-    until(lambda: swimming.swimmer.shown.failed == ("front_left",))
+    until(lambda: swimming.swimmer.shown.believed_lost == ("front_left",))
     swimming.step()
     until(lambda: swimming.time > 0)
     assert swimming.swimmer.shown.force[1].max() < 1e-6  # it hangs, and the robot is at rest
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
-        until(lambda name=name: name in swimming.swimmer.shown.failed)
+        until(lambda name=name: name in swimming.swimmer.shown.believed_lost)
     assert "drift off" in swim_card(*now(swimming))
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
-    until(lambda: "front_left" not in swimming.swimmer.shown.failed)
+    until(lambda: "front_left" not in swimming.swimmer.shown.believed_lost)
 
 
 def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
     aligned = replace(UCAT, actuators=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
     swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
     until(lambda: swimming.swimmer is not None)
-    assert swimming.swimmer.shown.failed == ()
+    assert swimming.swimmer.shown.believed_lost == ()
     assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))
 
 
@@ -136,18 +136,21 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
         swimmer.step()
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmer.shown.lost == ("front_left",))
-    assert swimmer.shown.failed == () and swimmer.shown.found == ()
+    assert swimmer.shown.believed_lost == () and swimmer.shown.found == ()
     assert "does not know yet" in swim_card(*now(swimming))
     while not swimmer.swim.damage.lost and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found
-    assert (name, swimmer.shown.failed) == ("front_left", ("front_left",)) and 0.0 < seconds < 8.0
+    assert (name, swimmer.shown.believed_lost) == (
+        "front_left",
+        ("front_left",),
+    ) and 0.0 < seconds < 8.0
     assert f"found front_left lost {seconds:.1f} s after" in swim_card(*now(swimming))
     doubts = swimmer.shown.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     assert swimmer.shown.doubted == ("front_left",)
-    blind = swimmer.shown._replace(failed=(), found=())
+    blind = swimmer.shown._replace(believed_lost=(), found=())
     assert (
         "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
     )

@@ -102,9 +102,9 @@ def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> 
 
 
 @cache
-def swatch(index: int, failed: bool = False) -> str:
+def swatch(index: int, is_lost: bool = False) -> str:
     """The fin's number on its colour."""
-    color = DEAD if failed else fin_color(index)
+    color = DEAD if is_lost else fin_color(index)
     return html(
         "<span class='swatch' style='background:{};color:{}'>{}</span>",
         css(color),
@@ -121,19 +121,19 @@ def fin_table(
     is_damaged = damage != WHOLE
     rows = []
     for i, fin in enumerate(layout.actuators):
-        failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
-        kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
-        words = damage_words(damage, fin.name, fin.KIND.sticks_at_angle) if is_damaged and not failed else ""
+        is_lost = allocation is not None and not np.isfinite(allocation.command[i, 0])
+        kind = " ".join(["dead"] * is_lost + ["chosen"] * (fin.name == selected))
+        words = damage_words(damage, fin.name, fin.KIND.sticks_at_angle) if is_damaged and not is_lost else ""
         remark = html("<div class='missing damage'>{}</div>", words) if words else ""
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
-        elif failed:
+        elif is_lost:
             cells = Markup("<td colspan='5'>lost</td>")
         else:
             force = float(np.linalg.norm(allocation.forces[i]))
             cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)
         row = "<tr class='{}'><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>"
-        rows.append(html(row, kind, swatch(i, failed), fin.name, fin.name, remark, cells))
+        rows.append(html(row, kind, swatch(i, is_lost), fin.name, fin.name, remark, cells))
     header = html(HEADER if layout.fins else PLAIN_HEADER, "fin" if layout.is_of_fins else "")
     return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
 

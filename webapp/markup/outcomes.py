@@ -34,7 +34,7 @@ def findings_words(shown: Moment) -> list[str]:
         for name, seconds in shown.found
     ]
     for name in shown.lost:
-        if name not in shown.failed:
+        if name not in shown.believed_lost:
             known = name in shown.doubted
             rest = (
                 "the monitor takes it for torn or stuck"
@@ -45,11 +45,11 @@ def findings_words(shown: Moment) -> list[str]:
     sentences += [
         html("<span class='missing'>The monitor takes {} for torn or stuck.</span>", name)
         for name in shown.doubted
-        if name not in (*shown.failed, *shown.lost)
+        if name not in (*shown.believed_lost, *shown.lost)
     ]
     sentences += [
         html("<span class='missing'>{} works, but the allocator takes it for lost.</span>", name)
-        for name in shown.failed
+        for name in shown.believed_lost
         if name not in shown.lost
     ]
     return sentences
@@ -82,8 +82,10 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
         words = unlearned_sentence(swimmer.layout, swimmer.unknown_fins)
         warning += html("<div class='missing'>{}: {}.</div>", swimmer.method, words)
     if not shown.controllable:
-        lost = [swimmer.fins.index(name) for name in shown.failed]
-        fins = f"Without {fins_words(lost, swimmer.layout)}" if lost else "With these actuators"
+        missing = [swimmer.fins.index(name) for name in shown.believed_lost]
+        fins = "With these actuators"
+        if missing:
+            fins = f"Without {fins_words(missing, swimmer.layout)}"
         warning += html(
             "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "
             "to drift off.</div>",

@@ -135,7 +135,7 @@ def answer_sentence(
     elif busy:
         sentences.append(WORKING)
     blind = authority_sentence(
-        state.layout, state.failed, axis_reach(state.able, state.failed, state.flow)
+        state.layout, state.lost, axis_reach(state.able, state.lost, state.flow)
     )
     if blind is not None:
         sentences.insert(0, _warning(blind))

@@ -181,7 +181,7 @@ def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
     )
 
 
-def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
+def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> str | None:
     """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for
     none."""
     is_blind = reach < 1e-6
@@ -189,8 +189,8 @@ def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) ->
         return None
     blind = [AXIS_WORDS[k] for k in range(6) if is_blind[k]]
     without = (
-        f"Without {fins_words([layout.index(name) for name in failed], layout)} this"
-        if failed
+        f"Without {fins_words([layout.index(name) for name in lost], layout)} this"
+        if lost
         else "This"
     )
     return f"{without} robot cannot {listed(blind)}."

@@ -115,7 +115,7 @@ def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
         "chosen" if chosen else "",
         part.name,
         press("fin", str(index)),
-        swatch(index, part.name in state.failed),
+        swatch(index, part.name in state.lost),
         "" if twin is None else "paired",
         part.name,
         part.name,

@@ -51,11 +51,11 @@ def tasks(task: str) -> str:
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
 
 
-def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
+def check(able: Layout, lost: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
     """What can be said of a layout at once: its axes, what a failure costs, what looks like a
     mistake."""
     remarks = (*warnings(layout), *righting_sentences(layout))
-    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, remarks)
+    return check_card(quick_check(able, lost, flow), layout.n - len(lost) > 1, remarks)
 
 
 def camera() -> str:

@@ -1,4 +1,4 @@
-"""Which actuators have failed, and what is wrong with the others: a button for each, and
+"""Which actuators are lost, and what is wrong with the others: a button for each, and
 sliders."""
 
 import math
@@ -17,7 +17,7 @@ from webapp.session.state import STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color, ink
 
 Row = tuple[Sequence[str], Sequence[str], Sequence[str]]
-"""Names of actuators, and of those of them that have failed, and that are held."""
+"""Names of actuators, and of those of them that are lost, and that are held."""
 DEGREE = 180.0 / math.pi
 
 
@@ -35,20 +35,18 @@ def add_fin_buttons(
     @wraps(row)
     def paint(*facts: object) -> str:
         nonlocal names
-        names, failed, held = row(*facts)
+        names, lost, held = row(*facts)
         colors = []
         for k, name in enumerate(names):
             color = css(fin_color(k)), ink(fin_color(k))
-            kinds = {name in failed: (css(DEAD), "#fff"), name in held: ("transparent", "inherit")}
+            kinds = {name in lost: (css(DEAD), "#fff"), name in held: ("transparent", "inherit")}
             colors.append(kinds.get(True, color))
         return button_colors(marker, colors)
 
     @wraps(row)
     def options(*facts: object) -> tuple[str, ...]:
-        known, failed, _ = row(*facts)
-        return tuple(
-            [f"{k + 1} ✕" if name in failed else f"{k + 1}" for k, name in enumerate(known)]
-        )
+        known, lost, _ = row(*facts)
+        return tuple([f"{k + 1} ✕" if name in lost else f"{k + 1}" for k, name in enumerate(known)])
 
     def pressed(button: str) -> None:
         numbers = {str(k + 1): name for k, name in enumerate(names)}

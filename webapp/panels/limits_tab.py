@@ -71,7 +71,7 @@ def add_improving(page: Page) -> None:
         "Press a number to hold one, or to let it move. Pairs stay pairs.",
         "fl-movers",
         partial(change, SearchRequest.with_held_toggled),
-        lambda layout, draft, failed: (layout.names, failed, draft.held),
+        lambda layout, draft, lost: (layout.names, lost, draft.held),
     )
     page.bind_number(
         gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),

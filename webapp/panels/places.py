@@ -106,8 +106,8 @@ def add_keys(page: Page) -> None:
     robot = page.scenery.robot
     swimming = page.jobs.swimming
 
-    def fail_selected() -> None:
-        session.toggle_failure(session.selected or session.state.layout.names[0])
+    def toggle_loss_of_selected() -> None:
+        session.toggle_loss(session.selected or session.state.layout.names[0])
 
     # What it is called and does and, if any, its key as viser calls that, and a modifier.
     table: list[tuple[Any, ...]] = [
@@ -129,7 +129,7 @@ def add_keys(page: Page) -> None:
         ("Share the design by a link", page.designs.share),
         ("Unlink the selected fin from its mirror image", session.unlink),
         ("Start over", session.start_over),
-        ("Fail or repair the selected fin", fail_selected, "X"),
+        ("Fail or repair the selected fin", toggle_loss_of_selected, "X"),
         *((f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
         *((f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
         ("Swim: pause or go on", lambda: swimming.set_running(not swimming.running), "B"),

@@ -96,7 +96,7 @@ def set_rows(findings: Findings | None, size: float) -> str:
     rows = [_key(_patch(css(REACH, 0.6)), "in reach")]
     if findings.whole is not None:
         question = findings.question
-        word = "with all" if question.failed else "before"
+        word = "with all" if question.lost else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html(
         "<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED)
@@ -150,7 +150,7 @@ def corner(
     is shown, not another way to do the same, whose `badge` says where that comes from; `refined` is
     the step of its refinement, nothing at its end."""
     count = state.layout.n
-    fins = f"{count - len(state.failed)} of {count} {parts_word(state.layout)}"
+    fins = f"{count - len(state.lost)} of {count} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
         parts.append(html("<span class='missing'>{}</span>", error))

@@ -91,10 +91,10 @@ def add_run(page: Page) -> None:
 
 
 def _breakable(
-    layout: Layout, failed: tuple[str, ...], swimmer: Swimmer | None, moment: Moment | None
+    layout: Layout, lost: tuple[str, ...], swimmer: Swimmer | None, moment: Moment | None
 ) -> Row:
     if swimmer is None or moment is None:
-        return layout.names, failed, ()
+        return layout.names, lost, ()
     return swimmer.fins, moment.lost, ()
 
 
@@ -107,8 +107,8 @@ def add_figures(page: Page) -> None:
     page.board.show(save, visible=lambda swims: swims)
 
 
-def _trim(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:
-    trim = trim_sentence(layout, axis_reach(able, failed))
+def _trim(able: Layout, lost: tuple[str, ...], layout: Layout) -> str:
+    trim = trim_sentence(layout, axis_reach(able, lost))
     said = [*([] if trim is None else [trim]), *righting_sentences(layout)]
     return html("<div class='fl missing'>{}</div>", " ".join(said)) if said else ""
 

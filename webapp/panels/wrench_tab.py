@@ -1,4 +1,4 @@
-"""The question and its answer: the target wrench, bars, failures, commands, and what jets
+"""The question and its answer: the target wrench, bars, losses, commands, and what jets
 change."""
 
 from functools import partial
@@ -26,15 +26,15 @@ from webapp.tasks.solver import BothWays
 
 
 def add_commands(page: Page) -> None:
-    """What each actuator does, and which have failed."""
+    """What each actuator does, and which are lost."""
     about = "Press a number to fail or repair it; X does it to the selected one."
     add_fin_buttons(
         page,
         "Fail",
         about,
-        "fl-fails",
-        page.session.toggle_failure,
-        lambda layout, failed: (layout.names, failed, ()),
+        "fl-losses",
+        page.session.toggle_loss,
+        lambda layout, lost: (layout.names, lost, ()),
     )
     page.add_html(
         lambda layout, damage, able, shown, selected, flow: fin_table(
@@ -55,11 +55,11 @@ def add_target(page: Page) -> None:
     sliders: list[Any] = [_add_slider(page, k) for k in range(6)]
     ends = [1.0] * 6
 
-    def reach(able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
-        ends[:] = [slider_end(size) for size in axis_reach(able, failed, flow).tolist()]
+    def reach(able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
+        ends[:] = [slider_end(size) for size in axis_reach(able, lost, flow).tolist()]
 
     def ask(
-        target: tuple[float, ...], able: Layout, failed: tuple[str, ...], flow: Flow | None
+        target: tuple[float, ...], able: Layout, lost: tuple[str, ...], flow: Flow | None
     ) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for value, slider, most in zip(target, sliders, ends, strict=True):
@@ -80,16 +80,14 @@ def add_target(page: Page) -> None:
         shown: Markup = style(ranges, able, *[slider.max for slider in sliders])
         return shown
 
-    def hint(
-        ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None
-    ) -> None:
+    def hint(ranges: Ranges | None, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
         """Say what the marks are; they change more often than that."""
         if ranges is None:
             return
-        known = able, failed, flow, np.isfinite(ranges.low).tolist()
+        known = able, lost, flow, np.isfinite(ranges.low).tolist()
         if known == said.get("hints"):
             return
-        most = axis_reach(able, failed, flow)  # with the others free
+        most = axis_reach(able, lost, flow)  # with the others free
         for k, slider in enumerate(sliders):
             if able.commanded[k]:
                 slider.hint = _hint(k, ranges.low[k], most[k])

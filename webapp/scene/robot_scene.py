@@ -147,7 +147,7 @@ class RobotScene:
         selection: tuple[str, ...],
         selected: str | None,
         task: str,
-        failed: tuple[str, ...],
+        lost: tuple[str, ...],
         damage: Damage,
         dragged: int | None,
         swims: bool,
@@ -166,9 +166,7 @@ class RobotScene:
         stuck = () if swims else damage.stuck
         for i, part in enumerate(drawn.actuators):
             remark = (
-                ""
-                if swims or part.name in failed
-                else damage_words(damage, part.name, part.KIND.sticks_at_angle)
+                "" if swims or part.name in lost else damage_words(damage, part.name, part.KIND.sticks_at_angle)
             )
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)
@@ -189,12 +187,12 @@ class RobotScene:
     def _push(
         self,
         drawn: Layout,
-        failed: tuple[str, ...],
+        lost: tuple[str, ...],
         shown: Allocation | None,
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        lost = failed if moment is None else moment.lost
+        idle = lost if moment is None else moment.lost
         if moment is not None:
             commands = moment.motion
             forces = moment.force
@@ -206,7 +204,7 @@ class RobotScene:
             forces = np.zeros((drawn.n, 3))
         scaled = LENGTH / scale.newtons
         works = [
-            part.name not in lost and math.isfinite(commands[i, 0])
+            part.name not in idle and math.isfinite(commands[i, 0])
             for i, part in enumerate(drawn.actuators)
         ]
         self._moves = [
@@ -229,7 +227,7 @@ class RobotScene:
         self,
         drawn: Layout,
         shown: Allocation | None,
-        failed: tuple[str, ...],
+        lost: tuple[str, ...],
         moment: Moment | None,
         display: Display,
         swim: SwimSettings,

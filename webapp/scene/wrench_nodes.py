@@ -190,7 +190,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class AttainableNodes:
-    """Sand for what works, grey for all where something has failed, a blue ball for what is
+    """Sand for what works, grey for all where something is lost, a blue ball for what is
     asked."""
 
     def __init__(self, scene: viser.SceneApi) -> None:

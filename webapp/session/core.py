@@ -26,7 +26,7 @@ class Core:
     method and policy stay as they are."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
-        """Start with a layout, no failures, and a gentle wrench forward and to the left."""
+        """Start with a layout, no damage, and a gentle wrench forward and to the left."""
         self._first = State(layout, target=FIRST)
         self.history = History(self._first)
         self.display = display or Display()
@@ -180,10 +180,10 @@ class Core:
         state = replace(self.state, layout=replace(layout, axes=axes_in(counts)))
         self._commit(f"{'Command' if counts[axis] else 'Free'} {AXES[axis]}", state)
 
-    def toggle_failure(self, name: str) -> None:
-        """An actuator fails, or is repaired."""
-        verb = "Repair" if name in self.state.failed else "Fail"
-        self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
+    def toggle_loss(self, name: str) -> None:
+        """An actuator is lost, or repaired."""
+        verb = "Repair" if name in self.state.lost else "Fail"
+        self._commit(f"{verb} {name}", self.state.with_loss_toggled(name))
 
     def damage(self, name: str, kind: str, value: Any) -> None:
         """An actuator has a fault of a kind, see `Damage`: a share, an angle [rad], a command; None
@@ -196,9 +196,7 @@ class Core:
         state = self.state
         for kind in state.layout.part(name).KIND.faults:
             state = state.with_fault(name, kind, None)
-        self._commit(
-            f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state
-        )
+        self._commit(f"Mend {name}", state.with_loss_toggled(name) if name in state.lost else state)
 
     def mend_all(self) -> None:
         """All actuators are whole again."""

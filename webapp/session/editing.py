@@ -41,11 +41,11 @@ class Session(Core):
 
     # Robots.
 
-    def open_layout(self, layout: Layout, step: str = "", failed: tuple[str, ...] = ()) -> None:
-        """Another layout, of which some may have failed; the target stays, damage and links are
+    def open_layout(self, layout: Layout, step: str = "", lost: tuple[str, ...] = ()) -> None:
+        """Another layout, of which some may be lost; the target stays, damage and links are
         forgotten. `step` is what undo calls it."""
         method = method_for(layout, self.state.method)
-        anew = replace(self.state, layout=layout, damage=Damage(failed), links=(), method=method)
+        anew = replace(self.state, layout=layout, damage=Damage(lost), links=(), method=method)
         self._commit(step or f"Open {layout.name}", anew)
         self.saved = layout
 

@@ -62,7 +62,7 @@ DONE: dict[str, Callable[[Core, Allocation], bool]] = {
         least_of(session.state.method) == "watts" and answer.reachable
     ),
     "null-space": lambda session, _: bool(session.shifts) and session.mode == 2,
-    "lost-fin": lambda session, answer: bool(session.state.failed) and answer.reachable,
+    "lost-fin": lambda session, answer: bool(session.state.lost) and answer.reachable,
     "no-yaw": lambda session, answer: (
         session.state.layout.fins != shipped()["no_yaw"].fins and answer.reachable
     ),

@@ -42,7 +42,7 @@ DRAWING: dict[str, MdnSettings | PaperSettings] = {"mdn": MdnSettings(), "paper"
 
 @dataclass(frozen=True)
 class State:
-    """A layout, its failures and the question asked of it."""
+    """A layout, its damage and the question asked of it."""
 
     layout: Layout
     damage: Damage = WHOLE
@@ -72,7 +72,7 @@ class State:
         return self.layout if self.damage == WHOLE else self.damage.applied_to(self.layout)
 
     @cached_property
-    def failed(self) -> tuple[str, ...]:
+    def lost(self) -> tuple[str, ...]:
         """Names of the actuators that are lost."""
         return tuple(self.damage.lost)
 
@@ -93,10 +93,10 @@ class State:
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
 
-    def with_failure_toggled(self, name: str) -> "State":
-        """One actuator failed or repaired."""
+    def with_loss_toggled(self, name: str) -> "State":
+        """One actuator lost or repaired."""
         self.layout.index(name)
-        lost = set(self.failed) ^ {name}
+        lost = set(self.lost) ^ {name}
         return self.with_lost(name for name in self.layout.names if name in lost)
 
     def with_lost(self, names: Iterable[str]) -> "State":
@@ -123,7 +123,7 @@ class State:
         more."""
         names = {old: renamed.get(old, old) for old in self.layout.names}
         now = {old: new for old, new in names.items() if new in layout.names}
-        lost = {now.get(name) for name in self.failed}
+        lost = {now.get(name) for name in self.lost}
         damage = replace(
             self.damage.renamed(now), lost=[name for name in layout.names if name in lost]
         )

@@ -74,29 +74,29 @@ class SwimSettings:
         layout = self.day.believed(state.able)
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         make_controller(self.controller, layout)
-        affected = _affected(layout, state.failed, day)
+        affected = _affected(layout, state.lost, day)
         weak = () if day.weak is None else affected
         losses = tuple(Fault(name, 0.5 * path.duration_s) for name in affected) if day.lost else ()
-        robot = layout, state.failed, path, state.method
+        robot = layout, state.lost, path, state.method
         return Plan(*robot, day, weak, losses, self.announced, self.controller)
 
 
-def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
+def _affected(layout: Layout, lost: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
     """The fins that a day weakens or takes away: the first without which the robot can still be
     steered."""
     count = day.lost if day.weak is None else 1
-    working = [name for name in layout.names if name not in failed]
+    working = [name for name in layout.names if name not in lost]
     if count and count >= len(working):
         text = f"{day.name} takes {count} of the {len(working)} working fins away"
         raise FinlabError(f"{text}; choose another scenario, or a robot with more fins")
-    return steerable_loss(layout, count, failed) or tuple(working[:count])
+    return steerable_loss(layout, count, lost) or tuple(working[:count])
 
 
 class Plan(NamedTuple):
     """One swim."""
 
     layout: Layout
-    failed: tuple[str, ...]
+    lost: tuple[str, ...]
     """Fins that are lost from the start, announced from the start."""
     path: Trajectory
     method: str

@@ -28,10 +28,10 @@ apart."""
 
 
 @lru_cache(maxsize=64)
-def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
+def axis_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the
     others free, in a flow (6,) [m/s, rad/s]."""
-    works = np.array([name not in failed for name in layout.names])
+    works = np.array([name not in lost for name in layout.names])
     reach: Array = _extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0)
     reach.setflags(write=False)
     return reach

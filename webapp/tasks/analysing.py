@@ -17,7 +17,7 @@ class Question:
     """What is to be worked out."""
 
     layout: Layout
-    failed: tuple[str, ...]
+    lost: tuple[str, ...]
     saved: Layout
     """Another one to compare with."""
     drawn: str
@@ -36,34 +36,36 @@ class Findings:
     now: AttainableSet | None
     """What the working fins attain, where a set is drawn."""
     whole: AttainableSet | None
-    """The same with all fins, where one has failed; else that of the layout to compare with."""
+    """The same with all fins, where one is lost; else that of the layout to compare with."""
 
 
 @lru_cache(maxsize=32)
 def find(question: Question) -> Findings:
     """Answer a question; takes about a second, but all first pages ask the same."""
     layout = question.layout
-    failed = question.failed
+    lost = question.lost
     saved = question.saved
     flow = question.flow
     other = saved != layout
-    # An actuator that the other layout does not have cannot have failed there.
-    lost = tuple(name for name in failed if name in saved.names)
+    # An actuator that the other layout does not have cannot be lost there.
+    lost_in_saved = tuple(name for name in lost if name in saved.names)
     kind = DRAWN[question.drawn]
     now = reference = None
     if kind is not None:
-        now = attainable_set(layout, kind, lost=failed, flow=flow)
-        if failed or other:
-            reference = attainable_set(layout if failed else saved, kind, flow=flow)
-    card = score_card(layout, failed, flow)
-    before = score_card(saved, lost, flow) if other and len(lost) < saved.n else None
+        now = attainable_set(layout, kind, lost=lost, flow=flow)
+        if lost or other:
+            reference = attainable_set(layout if lost else saved, kind, flow=flow)
+    card = score_card(layout, lost, flow)
+    before = None
+    if other and len(lost_in_saved) < saved.n:
+        before = score_card(saved, lost_in_saved, flow)
     return Findings(question, card, before, now, reference)
 
 
 @lru_cache(maxsize=32)
 def find_ranges(question: State) -> Ranges:
     """The range of each component of a state's target."""
-    return axis_ranges(question.layout, question.target, question.failed, question.flow)
+    return axis_ranges(question.layout, question.target, question.lost, question.flow)
 
 
 @dataclass(frozen=True)

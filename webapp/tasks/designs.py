@@ -81,7 +81,7 @@ class Designs:
         self._deferred.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
-        self._session.open_layout(opened.layout, failed=opened.lost)
+        self._session.open_layout(opened.layout, lost=opened.lost)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
             self._notify("Opened from a link", text, calm=True)
@@ -127,7 +127,7 @@ class Designs:
         shipped = State(now.layout, method=now.method)
         self._export(
             file_stem(now.layout.name) + files.BUNDLE,
-            lambda: make_bundle(solver.allocator(shipped), now.failed).zip_bytes(),
+            lambda: make_bundle(solver.allocator(shipped), now.lost).zip_bytes(),
         )
 
     def graph(self) -> None:

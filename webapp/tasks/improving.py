@@ -72,7 +72,7 @@ class Search:
     """One search."""
 
     state: State
-    """Where it begins; what has failed stays where it is."""
+    """Where it begins; what is lost stays where it is."""
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
@@ -88,7 +88,7 @@ class Improver(Slot[Search, Improvement]):
     def best(self) -> Layout | None:
         """What works of the best layout so far; of the offered one, once the search is done."""
         if self.answer is not None and self.question is not None:
-            return self.answer.layout.without(self.question.state.failed)
+            return self.answer.layout.without(self.question.state.lost)
         progress: Progress | None = self.progress
         return None if progress is None else progress.layout
 
@@ -97,7 +97,7 @@ class Improver(Slot[Search, Improvement]):
         FinlabError: a search is running, nothing works, or nothing may move."""
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        bounds = request.bounds(state.layout.without(state.failed))
+        bounds = request.bounds(state.layout.without(state.lost))
         self.forget()
         self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
 
@@ -106,7 +106,7 @@ def improve(search: Search, work: Work[Search]) -> Improvement:
     """The best layout that is found until the work is cancelled, or all rounds are done."""
     layout = search.state.layout
     state = search.state
-    left = layout.without(state.failed)
+    left = layout.without(state.lost)
     rests = time.monotonic()
 
     def report(progress: Progress) -> None:

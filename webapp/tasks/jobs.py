@@ -67,7 +67,7 @@ class Jobs:
             )
         drawn = session.display.drawn
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
-            question = Question(state.able, state.failed, session.saved, drawn, state.flow)
+            question = Question(state.able, state.lost, session.saved, drawn, state.flow)
             self.analyst.ask(question)
         kind = DRAWN[drawn]
         if task == "Design" and kind is not None:

@@ -62,7 +62,8 @@ class Moment(NamedTuple):
     flow: Array
     """Velocity of the water where it is (3,), in the world [m/s]."""
     lost: tuple[str, ...]
-    failed: tuple[str, ...]
+    """Actuators that are lost, known or not."""
+    believed_lost: tuple[str, ...]
     """Those that the allocator takes for lost."""
     found: tuple[tuple[str, float], ...]
     """Unannounced losses that the monitor has detected, each with the time that it took [s]."""
@@ -178,7 +179,7 @@ class Swimmer:
             reference=swim.task.setpoint(swim.time).position,
             flow=np.array(swim.vehicle.current),
             lost=swim.lost,
-            failed=tuple(swim.damage.lost),
+            believed_lost=tuple(swim.damage.lost),
             found=tuple(self._found.items()),
             doubted=tuple(
                 name for name, chance in zip(self.fins, chances, strict=True) if chance > 0.5
@@ -207,7 +208,7 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
         monitor=FaultMonitor(layout),
         truth=day.true(layout),
     )
-    for name in plan.failed:
+    for name in plan.lost:
         swim.fail(name, announced=True)
     for name in plan.weak:
         swim.fail(name, "torn", day.weak or 0.0, announced=False)
