@@ -1,6 +1,23 @@
 // Frames of the 3D view: actuators move here, and only what has changed is drawn. viser draws for a quarter of a second after
 // each message, and once a second in any case; on a machine without a graphics card one frame takes as long. A page that
 // is not used comes to rest: after REST_MS they stand still, until the mouse moves or something is asked.
+//
+// Private parts of viser, React and three.js that are used here, why, and where it could be had upstream (files of
+// src/viser/client/src in viser-project/viser, unless said otherwise). All are found through `window.__viserMutable`
+// (App.tsx), which viser gives its own end-to-end tests.
+// - `scene.__r3f.root` (react-three-fiber's `getRootState`): the renderer and `invalidate`; viser could hand out both in
+//   ViewerContext.ts.
+// - `gl.render` is replaced: viser draws each frame that is asked for, whether anything has changed or not; a setting of
+//   <Canvas frameloop> and a test for change in App.tsx would do.
+// - `requestRender` is replaced: it says that a message has changed the view; an event in MessageHandler.tsx would do.
+// - `getRenderRequestState` is read: pictures that Python asks for are drawn in any case (MessageHandler.tsx).
+// - `nodePoseData`, `nodeRefFromName`: poses set in the page, 25 a second and none sent; an animation of a node in
+//   SceneTree.tsx would do.
+// - `cameraControl`: the camera goes along with a node; "follow a node" in CameraControls of App.tsx would do.
+// - the shader of labels is changed, by its text: labels of a dark theme; a colour of labels in label/LabelRenderer.tsx
+//   would do.
+// - `preventDefault` of a press on the canvas is emptied: SceneTree.tsx calls it for nodes that can be dragged, from a
+//   listener that react-three-fiber has made passive, and the browser writes an error each time.
 (() => {
   if (window.finlabFrames) return;
   const REST_MS = 30000, LOOKED_AT_MS = 4000; // after the last touch

@@ -1,5 +1,10 @@
 // What the page of viser does otherwise: with Ctrl, or on a slider, the camera stays where it is, keys have their usual
 // second names, and buttons have hints.
+//
+// No private part of viser is used here, but the classes of Mantine's elements, and how viser nests them; each part below
+// says what it makes up for. Upstream (src/viser/client/src/components of viser-project/viser): NumberInput.tsx,
+// TextInput.tsx (send with Enter), Dropdown.tsx (select what is typed over), Button.tsx (hints), common.tsx (names for
+// readers of the screen, a class of one's own for a folder or for markup), and App.tsx (keys of the camera).
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;

@@ -1,5 +1,9 @@
 // Words of the app's own markup that can be pressed: data-press says what one is, data-key of whom. The server
 // (handles.py) hears of each once, and of what else scripts of ours tell it.
+//
+// Private part of viser that is used here: `__viserMutable.sendMessage` (ViewerContext.ts in src/viser/client/src of
+// viser-project/viser) sends the value of a hidden text box, at once and without its debounce. A message from the page
+// to Python that scripts may send would do, as `RunJavascriptMessage` is one the other way (WebsocketMessages.ts).
 (() => {
   if (window.finlabPresses) return;
   const AGAIN_MS = 700, TRIES = 40; // a page that is just connecting may lose what it is told to send

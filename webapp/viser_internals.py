@@ -1,22 +1,22 @@
-"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is
-upgraded.
+"""Every use of viser's private parts in Python (of 1.1.1): look here first when viser is upgraded.
 
-Each function says why; what would make it needless upstream:
+Each function says why it is needed. What would make it needless upstream, in `src/viser` of
+viser-project/viser:
 
-| here | upstream |
-|---|---|
-| `start_server`, `_guarded` | hooks for requests, headers and sizes (`infra/_infra.py`,
-`WebsockServer`) |
-| `_name_page` | title, icon and first page as arguments of `ViserServer` (`_viser.py`) |
-| `stored` | an awaitable `get_item` of `client.local_storage` (`_viser.py`) |
-| `_quicken` | the archive of icons kept open (`_icons.py`), hints per class
-(`_assignable_props_api.py`) |
-| `uuid_of` | a public name of a widget's element in the page (`_gui_handles.py`) |
-| `run_script`, `run_file` | a public way to run a script, as its plots do (`_gui_api.py`,
-`add_plotly`) |
-| `hold_uploads` | sizes and parts checked as they come (`_gui_api.py`,
-`_handle_file_transfer_part`) |
-| `disable_sharing` | an argument that closes the share tunnel (`_viser.py`, `ShareUrlRequest`) |
+- `start_server`, `_guarded`: hooks for requests, headers and sizes of messages; `infra/_infra.py`,
+  class `WebsockServer`.
+- `_name_page`: title, icon and first page as arguments of `ViserServer`; `_viser.py`.
+- `stored`: an awaitable `get_item` of `client.local_storage`; `_viser.py`.
+- `_keep_property_types`: types of properties looked up once for each class;
+  `_assignable_props_api.py`, `AssignablePropsBase._prop_hints`.
+- `uuid_of`: a public name of a widget's element in the page; `_gui_handles.py`.
+- `run_script`, `run_file`: a public way to run a script, as `add_plotly` does; `_gui_api.py`.
+- `hold_uploads`: sizes and parts of files checked as they come; `_gui_api.py`,
+  `_handle_file_transfer_part`.
+- `disable_sharing`: an argument that closes the share tunnel; `_viser.py`, `ShareUrlRequest`.
+
+The private parts that the page's scripts use are listed at the heads of `frames.js`, `presses.js`
+and `habits.js`.
 """
 
 import asyncio
@@ -31,14 +31,12 @@ from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
 from operator import attrgetter
-from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
-from zipfile import ZipFile
 
 import viser
 import websockets.asyncio.server as websockets_server
-from viser import _icons, _messages
+from viser import _messages
 from viser._assignable_props_api import AssignablePropsBase
 from websockets.http11 import Request, Response
 
@@ -58,7 +56,7 @@ LOCAL = Guard("127.0.0.1")
 def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
     it."""
-    _quicken()
+    _keep_property_types()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
 
@@ -149,16 +147,12 @@ async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]
 
 
 @cache
-def _quicken() -> None:
-    """Spare a first page what viser does again and again: it opens its archive of 4,000 icons for
-    each one that it draws, half a second in all, and looks up the types of properties for each
-    handle."""
-    icons: Any = _icons
-    opened: Any = cache(ZipFile)
-    icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(opened(archive)))
-    for name, kind in vars(_messages).items():
+def _keep_property_types() -> None:
+    """Let viser look up the types of a handle's properties once for each class, in place of once
+    for each handle: of the 500 handles of a page that takes a third of the time to build it."""
+    for name, props in vars(_messages).items():
         if name.endswith("Props"):
-            kind.finlab_hints = get_type_hints(kind)
+            props.finlab_hints = get_type_hints(props)
     handles: Any = AssignablePropsBase
     handles._prop_hints = property(attrgetter("_impl.props.finlab_hints"))
 

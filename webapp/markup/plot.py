@@ -1,4 +1,15 @@
-"""Plots as SVG: axes with round ticks, curves, and what their colours mean."""
+"""Plots as SVG: axes with round ticks, curves, and what their colours mean.
+
+viser has a chart of its own, `gui.add_uplot`, which zooms and needs no code here. It serves none of
+these plots:
+
+- Curves over time, of swims and logs, stand beside each other, up to six in one row of a low
+  drawer, and those of a log have a line at the chosen moment. A chart of viser is a widget with a
+  row of its own, and draws no such line.
+- The plot of modes has rings, numbers and trails that can be pressed, and samples that travel from
+  one step to the next; those of an actuator's model are thumbnails in its card. A chart of viser
+  draws series over one axis, and is no markup.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
