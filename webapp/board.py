@@ -48,7 +48,7 @@ class Group:
         """`fail` hides all that the rules show, or shows it again where it gets None; `fault` hears
         why."""
         self.rules: list[Rule] = []
-        self.there = True
+        self.is_visible = True
         self.is_due = True
         self._failed = False
         self._fail = fail
@@ -132,12 +132,12 @@ class Board:
             self._of_fact[name].append(rule)
         return rule
 
-    def doubt(self, handle: Any) -> None:
+    def recheck(self, handle: Any) -> None:
         """A user has changed a handle, and the session may have refused it."""
         for rule in self._of_handle.get(id(handle), []):
             rule.is_due = rule.group.is_due = True
 
-    def distrust(self) -> None:
+    def write_all(self) -> None:
         """Something went wrong: all is made again next time."""
         self.facts = None
 
@@ -166,7 +166,7 @@ class Board:
                     for rule in rules:
                         rule.is_due = rule.group.is_due = True
         for group in self.groups:
-            if group.is_due and group.there and group is not self.view:
+            if group.is_due and group.is_visible and group is not self.view:
                 group.write(facts)
 
     def draw(self) -> None:

@@ -1,38 +1,41 @@
 """The facts of one page: all that its panels and its view are functions of, by name."""
 
-from typing import Any
-
 from webapp.board import Facts
 from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
-from webapp.tasks.answering import Seen
+from webapp.tasks.answering import ShownAnswer
 from webapp.tasks.jobs import Jobs
-from webapp.tasks.slot import Slot
 
 
-def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scale: Scale) -> Facts:
-    """The facts of a session and of what has been worked out for it, and of the view: what is
-    `seen` of the newest answer, the place of the actuator that is `dragged`, and the scale of
-    arrows."""
+def facts_of(
+    session: Session, jobs: Jobs, answer: ShownAnswer, dragged: int | None, scale: Scale
+) -> Facts:
+    """The facts of a session, of what has been worked out for it, and of the view.
+
+    Args:
+        session: its state, and what is looked at.
+        jobs: questions of the page, and their answers.
+        answer: what is seen of the newest answer.
+        dragged: index of the actuator that is dragged; None for none.
+        scale: what lengths in the view stand for.
+    """
     state = session.state
     swimming = jobs.swimming
-    swimmer = jobs.swimming.swimmer
-    tasks: dict[str, Slot[Any, Any]] = {"ranges": jobs.ranging, "found": jobs.analyst}
-    tasks |= {"better": jobs.improver, "fitted": jobs.fitting, "judged": jobs.log}
-    known: Facts = {}
+    swimmer = swimming.swimmer
     opened = session.opened
-    both = jobs.both.answer
-    for name, task in tasks.items():
-        known |= {name: task.answer, f"{name}_error": task.error}
+    jet_comparison = jobs.jet_comparison.answer
+    if jet_comparison is not None and jet_comparison.state != state:
+        jet_comparison = None  # it is of an earlier question
     return {
+        # The state: layout, damage, target, method, policy, network ...
         "state": state,
-        **vars(state),  # layout, damage, target, method, policy, network
+        **vars(state),
         "lost": state.lost,
         "flow": state.flow,
-        # The layout with the limits that are left to damaged actuators.
         "able": state.able,
-        **vars(session),  # saved, desk, display, draft, swim, loops
+        # The session: saved, desk, display, draft, swim, loops ...
+        **vars(session),
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,
@@ -42,24 +45,35 @@ def facts_of(session: Session, jobs: Jobs, seen: Seen, dragged: int | None, scal
         "redo": session.history.redo_name,
         "stop": session.guide.stop,
         "solved": session.guide.solved,
-        **seen._asdict(),
+        # The newest answer: best, shown, in_reach, busy, error, modes ...
+        **answer._asdict(),
         "playing": jobs.refining.running,
-        **known,
-        # With and without jets, of the present question.
-        "both": both if both is not None and both.state == state else None,
-        "finding": jobs.analyst.busy,
+        "jet_comparison": jet_comparison,
         "run": jobs.comparison.run,
+        # What takes longer.
+        "ranges": jobs.ranging.answer,
+        "ranges_error": jobs.ranging.error,
+        "analysis": jobs.analyst.answer,
+        "analysis_error": jobs.analyst.error,
+        "is_analysing": jobs.analyst.busy,
+        "improvement": jobs.improver.answer,
+        "improvement_error": jobs.improver.error,
         "progress": jobs.improver.progress,
         "improving": jobs.improver.busy,
         "growing": jobs.growing.answer,
+        "fitted": jobs.fitting.answer,
+        "fitted_error": jobs.fitting.error,
         "fitting": jobs.fitting.progress,
+        "judged": jobs.log.answer,
+        "judged_error": jobs.log.error,
         "judging": jobs.log.progress,
         "by_page": jobs.log.by_page,
         "log_moment": jobs.log.moment,
+        # A swim, and the view.
         "swims": swimming.active,
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.shown,
-        "drawn": state.layout if swimmer is None else swimmer.layout,  # the robot in the view
+        "visible_layout": state.layout if swimmer is None else swimmer.layout,
         "paused": swimming.active and not swimming.running and not swimming.done,
         "pace": pace_words(swimming) if swimming.active else "",
         "dragged": dragged,

@@ -27,9 +27,9 @@ class Intents:
         self._faults: set[str] = set()
         self.is_new = False
         """Whether something was done, or went wrong, since the page was written."""
-        self.doubted: list[Any] = []
+        self.changed_handles: list[Any] = []
         """Handles that a user has changed: the session may have refused it."""
-        self.is_distrusted = False
+        self.has_fault = False
         """Whether something went wrong since the page was written: nothing that was drawn is
         trusted."""
 
@@ -44,7 +44,7 @@ class Intents:
         except Exception as error:  # the page must go on, whatever we have got wrong
             self.fault(error)
         if handle is not None:
-            self.doubted.append(handle)
+            self.changed_handles.append(handle)
         self.is_new = True
         self._bell.ring()
 
@@ -59,7 +59,7 @@ class Intents:
 
     def fault(self, error: Exception) -> None:
         """An error of our own is reported, once however often the page is written."""
-        self.is_distrusted = True
+        self.has_fault = True
         text = f"{type(error).__name__}: {error}"
         if text not in self._faults:
             self._faults.add(text)

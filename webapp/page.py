@@ -62,7 +62,7 @@ class Page:
     @property
     def shown(self) -> Allocation | None:
         """What is on the robot."""
-        return self.jobs.answering.seen().shown
+        return self.jobs.answering.shown_answer().shown
 
     def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
         """Carry out `act(value)` when the user changes an input."""

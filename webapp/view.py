@@ -177,20 +177,20 @@ class View:
         intents = self.intents
         board = self.board
         session = self.session
-        if intents.is_distrusted:
-            board.distrust()
-            intents.is_distrusted = False
-        for handle in intents.doubted:
-            board.doubt(handle)
-        intents.doubted.clear()
+        if intents.has_fault:
+            board.write_all()
+            intents.has_fault = False
+        for handle in intents.changed_handles:
+            board.recheck(handle)
+        intents.changed_handles.clear()
         try:
-            seen = self.jobs.answering.seen()
+            answer = self.jobs.answering.shown_answer()
             guide = session.guide
-            if guide.stop is not None and seen.shown is not None and not seen.busy:
-                guide.take(seen.shown)
+            if guide.stop is not None and answer.shown is not None and not answer.busy:
+                guide.take(answer.shown)
             self.scenery.follow_guide()
-            scale = self.scenery.fit(session.state.target, seen.shown)
-            facts = facts_of(session, self.jobs, seen, self.scenery.robot.dragged, scale)
+            scale = self.scenery.fit(session.state.target, answer.shown)
+            facts = facts_of(session, self.jobs, answer, self.scenery.robot.dragged, scale)
         except Exception as error:
             board.fail(error)
         else:

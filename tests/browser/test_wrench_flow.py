@@ -88,15 +88,18 @@ def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     assert "optimum" in rows.first.inner_text()
     assert "network" in rows.last.inner_text()
     page.until(lambda: "proved least" in page.text(".said"))
-    watts = answering.seen().best.power
+    watts = answering.shown_answer().best.power
     page.choose("Least", "effort")
     page.until(lambda: session.state.method == "mdn" and not page.view.busy)
     page.until(
-        lambda: "least effort" in page.text(".fl-status") and answering.seen().best.power > watts
+        lambda: (
+            "least effort" in page.text(".fl-status")
+            and answering.shown_answer().best.power > watts
+        )
     )
     page.until(lambda: rows.count() > 1 and not answering.searching)
     page.until(lambda: "component" in rows.first.inner_text())
-    best = answering.seen().best
+    best = answering.shown_answer().best
     rows.nth(1).click()
     page.until(lambda: session.mode == 1 and page.view.shown is not best)
     page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))

@@ -117,11 +117,11 @@ def test_solver_errors_become_notes_and_the_page_goes_on(
     server: viser.ViserServer, view: View
 ) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "ipopt")))
-    until(lambda: view.jobs.answering.seen().error is not None)
+    until(lambda: view.jobs.answering.shown_answer().error is not None)
     assert view.client.notes == ["No answer: ipopt is out of order in this test"]
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "dual")))
     until(lambda: not view.busy)
-    assert view.jobs.answering.seen().error is None and view.shown is not None
+    assert view.jobs.answering.shown_answer().error is None and view.shown is not None
 
 
 def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) -> None:

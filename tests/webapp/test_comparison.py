@@ -90,14 +90,14 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     reply = solver.reply(state)
     samples = reply.answer.samples
     modes = solver.modes(reply)
-    assert samples is not None and modes.ways[0] == samples
+    assert samples is not None and modes.refinement[0] == samples
     assert modes.shown[0].mode.sources[0].startswith("component "), (
         "the answer comes from the network"
     )
     led = {samples.source[k] for k in range(len(samples)) if modes.ends[k] == 0}
     assert led and led <= set(modes.shown[0].mode.sources)
     dear = replace(samples, effort=np.full(len(samples), 1e4))
-    far = mode_plot(replace(modes, ways=(dear, *modes.ways[1:])), 0, None, 200)
+    far = mode_plot(replace(modes, refinement=(dear, *modes.refinement[1:])), 0, None, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
     assert all(source_words(named.mode.sources).startswith("component") for named in modes.shown)
     assert {named.badge for named in modes.shown} == {"network"}
@@ -118,7 +118,7 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
     )
     assert others and all(mode.err_norm < 1e-3 and mode.power >= first.power for mode in others)
     assert mode_plot(modes, 0, None, 200).count("class='mode'") == len(modes.shown)
-    end = modes.ways[-1]
+    end = modes.refinement[-1]
     for k, place in enumerate(modes.ends):
         assert place >= 1 and end.err_norm[k] < 1e-6, "each proposal is refined to a mode, exact"
         assert end.effort[k] == pytest.approx(modes.shown[place].mode.effort, rel=0.02)

@@ -114,7 +114,7 @@ class Tab:
             self.on_loop(partial(self.view.do, act))
             self.settle()
             root = self.server.gui._container_handle_from_uuid["root"]
-            hidden = [s.whole for s in self.view.frame.sections if not s.group.there]
+            hidden = [s.whole for s in self.view.frame.sections if not s.group.is_visible]
             markup += list(_html(root, hidden))
         return [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in markup]
 

@@ -16,7 +16,7 @@ from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.looking import SearchRequest
 from webapp.session.state import State
-from webapp.tasks.analysing import Findings, Question, find
+from webapp.tasks.analysing import Analysis, AnalysisQuestion, analyse
 from webapp.tasks.improving import Improver, Room
 from webapp.tasks.slot import Pool, Slot
 
@@ -74,16 +74,16 @@ def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Pool) -> Non
 
 def test_analyst_answers_only_the_question_that_stays(worker: Pool) -> None:
     layout = load_layout(shipped_layouts()["pair"])
-    asked: list[Question] = []
+    asked: list[AnalysisQuestion] = []
 
-    def answer(question: Question) -> Findings:
+    def answer(question: AnalysisQuestion) -> Analysis:
         asked.append(question)
-        return find(question)
+        return analyse(question)
 
-    analyst: Slot[Question, Findings] = Slot(worker, LoneBell(), answer, rest_s=0.1)
+    analyst: Slot[AnalysisQuestion, Analysis] = Slot(worker, LoneBell(), answer, rest_s=0.1)
     for k in range(20):
         moved = layout.replace_actuator(layout.names[0], position=(0.01 * k, 0.2, 0.0))
-        analyst.ask(Question(moved, (), layout, "none"))
+        analyst.ask(AnalysisQuestion(moved, (), layout, "none"))
         time.sleep(0.01)
         analyst.attend()
     until(lambda: not analyst.busy)
@@ -124,7 +124,7 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
         assert math.degrees(fin.mounting_angle) == pytest.approx(
             round(math.degrees(fin.mounting_angle)), abs=1e-9
         )
-    afterwards = find(Question(layout, (), layout, "none")).card
+    afterwards = analyse(AnalysisQuestion(layout, (), layout, "none")).card
     assert afterwards.authority.weakest == found.card_after.authority.weakest
     assert [loss.weakest for loss in afterwards.losses] == [
         loss.weakest for loss in found.card_after.losses

@@ -54,9 +54,9 @@ def test_jets_travel_in_files_and_links() -> None:
 def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
     state = State(replace(HEAVY, interaction=Jets()), target=AHEAD, speed=speed)
     solver = Solver()
-    both = solver.both(state)
-    best = both.counted
-    blind = both.blind
+    both = solver.jet_comparison(state)
+    best = both.with_jets
+    blind = both.without_jets
     alone = Allocator(HEAVY).allocate(AHEAD)
     flow = np.array(state.flow) if state.flow else None
     miss = np.subtract(AHEAD, plant_of(state.layout).wrench(alone.command, flow=flow))
@@ -103,12 +103,12 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     assert taken == [True] * 4 + [False] * 4, "jets of the lifting ones meet nothing"
     assert "taken by jets" in " ".join(tab.figures())
     view = tab.view
-    assert view.board.facts is not None and view.board.facts["both"] is not None
+    assert view.board.facts is not None and view.board.facts["jet_comparison"] is not None
 
     def fail() -> object:
         view.do(partial(session.toggle_loss, "front_left"))
         view._write_words()
-        return view.board.facts and view.board.facts["both"]
+        return view.board.facts and view.board.facts["jet_comparison"]
 
     assert tab.on_loop(fail) is None, "no figure stands under another question"
     tab.settle()

@@ -83,7 +83,7 @@ def found(method: str = "mdn") -> Modes:
 
 def test_samples_and_modes_are_drawn_and_listed() -> None:
     modes = found()
-    samples, middle, end = modes.ways
+    samples, middle, end = modes.refinement
     assert len(modes.ends) == len(samples) == len(end)
     for source, place in zip(samples.source, modes.ends, strict=True):
         assert place < 0 or source in modes.shown[place].mode.sources, (
@@ -141,20 +141,28 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
     answering.ask()
     answering.search.attend()
     modes = answering.modes
-    best = answering.seen().shown
+    best = answering.shown_answer().shown
     assert modes.steps == 2 and not answering.searching
     session.show_mode(1)
     refining.toggle()
     seen = []
     while session.step is not None:
         proposal = modes.ends.index(1)
-        shown = answering.seen().shown
+        shown = answering.shown_answer().shown
         assert shown is not None and refining.running
-        np.testing.assert_array_equal(shown.command, modes.ways[session.step].command[proposal])
+        np.testing.assert_array_equal(
+            shown.command, modes.refinement[session.step].command[proposal]
+        )
         seen.append(session.step)
         refining.attend()
-    assert seen == [0, 1] and not refining.running and answering.seen().shown not in (None, best)
-    np.testing.assert_array_equal(answering.seen().shown.command, modes.shown[1].mode.command)
+    assert (
+        seen == [0, 1]
+        and not refining.running
+        and answering.shown_answer().shown not in (None, best)
+    )
+    np.testing.assert_array_equal(
+        answering.shown_answer().shown.command, modes.shown[1].mode.command
+    )
     session.set_loop(True)
     refining.toggle()
     for _ in range(2 + HOLD):

@@ -41,7 +41,7 @@ from webapp.session import Session, files
 from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
-from webapp.tasks.analysing import Question, find
+from webapp.tasks.analysing import AnalysisQuestion, analyse
 from webapp.tasks.comparing import Run
 from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
@@ -218,7 +218,7 @@ def test_cards_say_what_a_layout_can_do() -> None:
     ucat, blind = (
         replace(load_layout(shipped_layouts()[name]), axes=AXES) for name in ("ucat", "no_yaw")
     )
-    found = find(Question(ucat, ("front_left",), blind, "forces"))
+    found = analyse(AnalysisQuestion(ucat, ("front_left",), blind, "forces"))
     assert found.now is not None and found.whole is not None
     assert found.before is not None and found.before.layout == "no_yaw", (
         "any layout may stand beside"

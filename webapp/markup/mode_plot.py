@@ -37,12 +37,12 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     """Effort, which the network's proposals keep least, against the error: samples, after so many
     steps of refinement (None: all), are small dots with lines to where they end, modes are rings;
     `height` in px."""
-    if not modes.shown or not modes.ways:
+    if not modes.shown or not modes.refinement:
         return ""
     error = np.array([named.mode.err_norm for named in modes.shown])
     effort = np.array([named.mode.effort for named in modes.shown])
     refined = np.stack([effort, _logarithm(error)], axis=1)
-    raw = np.array([[way.effort, way.err_norm] for way in modes.ways]).swapaxes(1, 2)
+    raw = np.array([[way.effort, way.err_norm] for way in modes.refinement]).swapaxes(1, 2)
     raw[..., 1] = _logarithm(raw[..., 1])
     far = max(float(effort.max()), FAR * float(effort[len(effort) > 1 :].max()))
     near = raw[0, :, 0] <= far

@@ -22,7 +22,7 @@ from webapp.panels import places
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
-from webapp.session.looking import DRAWERS, WAYS, Desk
+from webapp.session.looking import CANDIDATES, DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
@@ -72,7 +72,7 @@ class Section:
         """Whether it belongs to what is being done."""
         place = self.place
         opened = place.region != places.DRAWER or place.title == drawer
-        self.group.there = there = task in place.tasks and place.about in about and opened
+        self.group.is_visible = there = task in place.tasks and place.about in about and opened
         if there:
             self._met = True
             self._say("")
@@ -195,7 +195,7 @@ class Frame:
 def _strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
     folded = drawer is None
-    names = [name for name in DRAWERS[desk.task] if name != WAYS[0] or layout.is_of_fins]
+    names = [name for name in DRAWERS[desk.task] if name != CANDIDATES or layout.is_of_fins]
     pressed = ((name, html("aria-pressed='{}'", str(name == drawer).lower())) for name in names)
     tabs = [button(name, "drawer", name, attribute) for name, attribute in pressed]
     word = "Open the drawer" if folded else "Fold the drawer"

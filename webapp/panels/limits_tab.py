@@ -15,7 +15,7 @@ from webapp.markup.words import fins_words, html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
-from webapp.tasks.analysing import Findings
+from webapp.tasks.analysing import Analysis
 
 
 def add_reach(page: Page) -> None:
@@ -25,22 +25,25 @@ def add_reach(page: Page) -> None:
     )
     sets = page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about)
     page.bind(sets, partial(page.session.set_display, "drawn"), lambda display: display.drawn)
-    page.add_html(_findings)
+    page.add_html(_analysis_card)
 
 
-def _findings(found: Findings | None, finding: bool, found_error: str | None) -> str:
-    if found_error is not None:
+def _analysis_card(
+    analysis: Analysis | None, is_analysing: bool, analysis_error: str | None
+) -> str:
+    """What a layout can do, or why that is not known."""
+    if analysis_error is not None:
         return Markup("<div class='fl missing'>This layout cannot be analysed.</div>")
-    if found is None:
+    if analysis is None:
         return Markup("<div class='fl dim'>computing …</div>")
-    note = Markup("<span class='dim'>computing …</span> ") if finding else ""
-    if found.now is not None:
-        unit = "N" if found.now.kind == "force" else "N m"
-        gap = three_digits(found.now.gap)
+    note = Markup("<span class='dim'>computing …</span> ") if is_analysing else ""
+    if analysis.now is not None:
+        unit = "N" if analysis.now.kind == "force" else "N m"
+        gap = three_digits(analysis.now.gap)
         note += html(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
-    table = score_table(found.question.layout, found.card, found.before)
+    table = score_table(analysis.question.layout, analysis.card, analysis.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 
 
@@ -106,23 +109,25 @@ def add_improving(page: Page) -> None:
     add_html(gui, marker("fl-verdict"))
     verdicts = {"Accept": accept, "Leave": improver.forget}
     verdict = page.add_buttons("Result", verdicts, visible=False, hint="Accepting can be undone.")
-    board.show(verdict, visible=lambda better: better is not None and better.improved)
+    board.show(
+        verdict, visible=lambda improvement: improvement is not None and improvement.improved
+    )
     add_html(gui, marker("fl-column"))
     page.add_html(_searched)
 
 
 def _searched(
-    better: Improvement | None,
+    improvement: Improvement | None,
     progress: Progress | None,
     improving: bool,
-    better_error: str | None,
+    improvement_error: str | None,
     draft: SearchRequest,
 ) -> str:
     text = "Searching …" if improving else ""
-    if better_error is not None:
-        text = html("<div class='missing'>{}</div>", better_error)
-    elif better is not None:
-        text = _before_and_after(better)
+    if improvement_error is not None:
+        text = html("<div class='missing'>{}</div>", improvement_error)
+    elif improvement is not None:
+        text = _before_and_after(improvement)
     elif progress is not None:
         unit = GOAL_UNITS[draft.goal]
         best, before = (three_digits(abs(v)) + unit for v in (progress.best, progress.before))

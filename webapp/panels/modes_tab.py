@@ -81,7 +81,7 @@ def add_candidates(page: Page) -> None:
     hint = "How far samples stray from the means of the mixture's components: 0 is the means alone."
     warmth = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
     page.bind_number(warmth, partial(session.set_setting, "temperature"), _temperature)
-    board.show(warmth, visible=lambda modes: bool(modes.ways))
+    board.show(warmth, visible=lambda modes: bool(modes.refinement))
     solver = page.solver
     hint = "What method paper answers with: the shipped network, or one trained in runs."
     networks = gui.add_dropdown("Network", tuple(solver.networks()), hint=hint)
@@ -107,10 +107,10 @@ def add_saving(page: Page) -> None:
     """The ways as a file."""
 
     def save() -> None:
-        best = page.jobs.answering.seen().best
+        best = page.jobs.answering.shown_answer().best
         modes = page.jobs.answering.modes
         if best is not None and modes.shown and not page.jobs.answering.searching:
-            page.designs.ways(best, modes)
+            page.designs.save_modes(best, modes)
 
     button = page.add_button(
         "Save as CSV",
@@ -152,7 +152,7 @@ def step_words(modes: Modes, step: int | None) -> str:
     at = modes.steps if step is None else step
     words = "descent in forces" if at <= TRACE_STEPS.descent else "made exact"
     words = "samples of the network" if at == 0 else words
-    left = float(np.median(modes.ways[at].err_norm))
+    left = float(np.median(modes.refinement[at].err_norm))
     return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))
 
 

@@ -11,7 +11,7 @@ from webapp.handles import add_html, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
-from webapp.tasks.null_ways import MOST
+from webapp.tasks.null_space_modes import MOST
 from webapp.tasks.solver import Modes
 
 ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
@@ -30,7 +30,7 @@ def add_null_space(page: Page) -> None:
     sliders = [_add_slider(page, k) for k in range(MOST)]
 
     def place(modes: Modes, shifts: tuple[float, ...]) -> None:
-        known = modes.null
+        known = modes.null_space
         for k, slider in enumerate(sliders):
             there = known is not None and k < len(known.names)
             put(slider, visible=there)
@@ -68,7 +68,7 @@ def _add_slider(page: Page, direction: int) -> viser.GuiSliderHandle[float]:
 
 
 def _about(modes: Modes) -> str:
-    known = modes.null
+    known = modes.null_space
     if known is None:
         return ""
     said = f"{ABOUT} {known.more} more directions are not shown." if known.more else ABOUT
@@ -76,7 +76,7 @@ def _about(modes: Modes) -> str:
 
 
 def _mean_words(modes: Modes) -> str:
-    if modes.null is None or len(modes.shown) < 3:
+    if modes.null_space is None or len(modes.shown) < 3:
         return ""
     wrong = modes.shown[2].mode.err_norm > REACHED
     return html(

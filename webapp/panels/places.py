@@ -30,7 +30,7 @@ from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
 from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_speed, add_target
-from webapp.session.looking import TASKS, WAYS
+from webapp.session.looking import CANDIDATES, NULL_SPACE, TASKS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
 
@@ -38,7 +38,6 @@ TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "v
 """The bar above all; the list at the left; the inspector at the right; the drawer below; over the
 view."""
 DESIGN, ALLOCATE, SIMULATE, EXPORT, LOG = TASKS
-CANDIDATES, NULL_SPACE = WAYS
 
 
 class Place(NamedTuple):

@@ -16,7 +16,7 @@ from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
-from webapp.tasks.analysing import Findings
+from webapp.tasks.analysing import Analysis
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, REACH, TAKEN, WATER, css
@@ -43,7 +43,7 @@ def _written(
     pace: str,
     state: State,
     display: Display,
-    found: Findings | None,
+    analysis: Analysis | None,
     scale: Scale,
     shown: Allocation | None,
     best: Allocation | None,
@@ -58,12 +58,12 @@ def _written(
     if swimmer is not None and moment is not None:
         return swim_corner(swimmer, moment, pace, scale.newtons)
     size = arrow_size(state.layout)
-    drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
+    set_keys = set_rows(analysis if display.drawn != "none" and task == "Design" else None, size)
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
     way = modes.shown[mode] if shown is not best and mode < len(modes.shown) else None
     if way is not None and way.mode.err_norm > REACHED:
         refined = way.name.capitalize()
-    words = legend(*scale, size, drawn) + JETS * (state.layout.interaction is not None)
+    words = legend(*scale, size, set_keys) + JETS * (state.layout.interaction is not None)
     badge = "" if way is None else way.badge
     return corner(state, words, shown, busy, error, shown is best, in_reach, refined, badge)
 
@@ -89,20 +89,20 @@ def _length(newtons: float, size: float) -> str:
     return html("<i>arrow </i>{:g} m = {:g} N", 0.1 * size, newtons)
 
 
-def set_rows(findings: Findings | None, size: float) -> str:
+def set_rows(analysis: Analysis | None, size: float) -> str:
     """The bodies of what can be attained, and their scale."""
-    if findings is None or findings.now is None:
+    if analysis is None or analysis.now is None:
         return ""
     rows = [_key(_patch(css(REACH, 0.6)), "in reach")]
-    if findings.whole is not None:
-        question = findings.question
+    if analysis.whole is not None:
+        question = analysis.question
         word = "with all" if question.lost else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html(
         "<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED)
     )
-    unit = "N" if findings.now.kind == "force" else "N m"
-    scale = f"body {0.1 * size:g} m = {three_digits(0.1 / set_scale(findings))} {unit}"
+    unit = "N" if analysis.now.kind == "force" else "N m"
+    scale = f"body {0.1 * size:g} m = {three_digits(0.1 / set_scale(analysis))} {unit}"
     rows.append(html("{}<span class='dim wide'>{}</span>", _key(ball, "asked in it"), scale))
     return Markup().join(rows)
 

@@ -13,16 +13,16 @@ from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
-from webapp.kept import Kept
 from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
 from webapp.markup.verdict import answer_sentence, rest_sentence
 from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, three_digits
+from webapp.memoized import Memoized
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
-from webapp.tasks.solver import BothWays
+from webapp.tasks.solver import JetComparison
 
 
 def add_commands(page: Page) -> None:
@@ -71,7 +71,7 @@ def add_target(page: Page) -> None:
 
     board.act(reach)
     board.act(ask, *sliders)
-    style = Kept(reach_style)
+    style = Memoized(reach_style)
     said: dict[str, Any] = {}
 
     def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
@@ -166,7 +166,7 @@ def _hint(axis: int, low: float, reach: float) -> str:
 def add_answer(page: Page) -> None:
     """What is asked, what the actuators give, and what is left undone; an answer to an earlier
     question stands beside what was asked then."""
-    bars = Kept(bars_of)
+    bars = Memoized(bars_of)
 
     def write(
         shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None
@@ -195,15 +195,16 @@ def add_jets(page: Page) -> None:
     page.add_html(jets_table)
 
 
-def jets_table(both: BothWays | None) -> str:
+def jets_table(jet_comparison: JetComparison | None) -> str:
     """What the answer misses and takes, and what that of the actuators' laws alone would."""
-    if both is None:
+    if jet_comparison is None:
         return ""
-    answers = both[1:]
+    with_jets = jet_comparison.with_jets
+    without_jets = jet_comparison.without_jets
     rows = [
-        row("error", *(error_digits(answer.err_norm) for answer in answers)),
-        row("power [W]", *(three_digits(answer.power) for answer in answers)),
+        row("error", error_digits(with_jets.err_norm), error_digits(without_jets.err_norm)),
+        row("power [W]", three_digits(with_jets.power), three_digits(without_jets.power)),
     ]
-    said = rest_sentence(both.blind)
+    said = rest_sentence(without_jets)
     words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
     return html(words, JETS_HEADER, rows, said[0].lower() + said[1:])

@@ -25,9 +25,9 @@ from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, p
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session import Session
 from webapp.session.looking import DRAWN, Display
-from webapp.session.state import chosen
+from webapp.session.state import one_of
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.analysing import Findings
+from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import LIGHT, fin_color
 from webapp.viser_internals import run_script
@@ -98,7 +98,7 @@ class RobotScene:
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
         self._size = view_size(self._session.state.layout)
-        place = self._size * np.array(CAMERAS[chosen(view, "view", CAMERAS)])
+        place = self._size * np.array(CAMERAS[one_of(view, "view", CAMERAS)])
         # Lower than the robot's middle: below it stands the legend.
         self.aim(place, np.array([0.0, 0.0, -0.02 * self._size]))
 
@@ -128,22 +128,27 @@ class RobotScene:
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
     def _show_stage(
-        self, drawn: Layout, display: Display, dragged: int | None, task: str, swims: bool
+        self, visible_layout: Layout, display: Display, dragged: int | None, task: str, swims: bool
     ) -> None:
         if dragged is not None:  # a hull that breathes with the fin one drags is hard to aim at
             return
         # Glass within glass is not drawn; inside an attainable set the hull is a net.
         net = display.drawn != "none" and task == "Design"
-        size = arrow_size(drawn)
+        size = arrow_size(visible_layout)
         self._stage.refresh(
-            hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn), size
+            hull_of(visible_layout),
+            display.dark,
+            display.shadows,
+            net,
+            has_inside(visible_layout),
+            size,
         )
-        if not swims and not 0.75 < view_size(drawn) / self._size < 1.34:  # another robot
+        if not swims and not 0.75 < view_size(visible_layout) / self._size < 1.34:  # another robot
             self.look_from("3D")
 
     def _place(
         self,
-        drawn: Layout,
+        visible_layout: Layout,
         selection: tuple[str, ...],
         selected: str | None,
         task: str,
@@ -152,19 +157,19 @@ class RobotScene:
         dragged: int | None,
         swims: bool,
     ) -> None:
-        hull = hull_of(drawn)
-        sizes = (part_size(drawn), arrow_size(drawn))
+        hull = hull_of(visible_layout)
+        sizes = (part_size(visible_layout), arrow_size(visible_layout))
         self._arrow_size = sizes[1]
-        self._top = hull_top(drawn)
-        while len(self._fins) < drawn.n:
+        self._top = hull_top(visible_layout)
+        while len(self._fins) < visible_layout.n:
             self._fins.append(
                 ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag)
             )
-        for node in self._fins[drawn.n :]:
+        for node in self._fins[visible_layout.n :]:
             node.hide()
         edited = selected if task == "Design" and not swims else None
         stuck = () if swims else damage.stuck
-        for i, part in enumerate(drawn.actuators):
+        for i, part in enumerate(visible_layout.actuators):
             remark = (
                 "" if swims or part.name in lost else damage_words(damage, part.name, part.KIND.sticks_at_angle)
             )
@@ -174,19 +179,19 @@ class RobotScene:
             moved = part.name == edited
             pinned = part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
-        self._forces.place(drawn, sizes)
+        self._forces.place(visible_layout, sizes)
         self._works = []
         if edited is None:
             self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
         else:
-            index = drawn.index(edited)
-            part = drawn.actuators[index]
+            index = visible_layout.index(edited)
+            part = visible_layout.actuators[index]
             color = fin_color(index)
             self._direction.show(np.array(part.position), np.array(part.direction), sizes[1], color)
 
     def _push(
         self,
-        drawn: Layout,
+        visible_layout: Layout,
         lost: tuple[str, ...],
         shown: Allocation | None,
         scale: Scale,
@@ -200,16 +205,16 @@ class RobotScene:
             commands = shown.command
             forces = shown.forces
         else:
-            commands = np.full((drawn.n, 3), np.nan)
-            forces = np.zeros((drawn.n, 3))
+            commands = np.full((visible_layout.n, 3), np.nan)
+            forces = np.zeros((visible_layout.n, 3))
         scaled = LENGTH / scale.newtons
         works = [
             part.name not in idle and math.isfinite(commands[i, 0])
-            for i, part in enumerate(drawn.actuators)
+            for i, part in enumerate(visible_layout.actuators)
         ]
         self._moves = [
             motion(part, commands[i] if works[i] else None)
-            for i, part in enumerate(drawn.actuators)
+            for i, part in enumerate(visible_layout.actuators)
         ]
         if works != self._works:
             self._works = works
@@ -218,14 +223,14 @@ class RobotScene:
         arrows = np.where(np.array(works)[:, None], forces, 0.0) * (scaled * self._arrow_size)
         moves = np.array(self._moves)
         self._forces.command(arrows, moves[:, 0] * works, moves[:, 2])
-        if drawn.interaction is not None or self._jets.drawn:
-            robot = shown.layout if shown is not None and moment is None else drawn
-            jets = None if drawn.interaction is None else robot
+        if visible_layout.interaction is not None or self._jets.drawn:
+            robot = shown.layout if shown is not None and moment is None else visible_layout
+            jets = None if visible_layout.interaction is None else robot
             self._jets.refresh(jets, forces, scaled, self._arrow_size)
 
     def _flap(
         self,
-        drawn: Layout,
+        visible_layout: Layout,
         shown: Allocation | None,
         lost: tuple[str, ...],
         moment: Moment | None,
@@ -244,7 +249,7 @@ class RobotScene:
 
     def _show_wrench(
         self,
-        drawn: Layout,
+        visible_layout: Layout,
         target: tuple[float, ...],
         shown: Allocation | None,
         scale: Scale,
@@ -264,22 +269,27 @@ class RobotScene:
 
     def _show_sets(
         self,
-        found: Findings | None,
+        analysis: Analysis | None,
         growing: AttainableSet | None,
         display: Display,
         target: tuple[float, ...],
         task: str,
-        drawn: Layout,
+        visible_layout: Layout,
     ) -> None:
-        shown = found if display.drawn != "none" and task == "Design" else None
+        shown = analysis if display.drawn != "none" and task == "Design" else None
         better = growing if growing is not None and growing.kind == DRAWN[display.drawn] else None
-        self._attainable.refresh(shown, better, np.array(target), arrow_size(drawn))
+        self._attainable.refresh(shown, better, np.array(target), arrow_size(visible_layout))
 
     def _offer(
-        self, better: Improvement | None, progress: Progress | None, layout: Layout, swims: bool
+        self,
+        improvement: Improvement | None,
+        progress: Progress | None,
+        layout: Layout,
+        swims: bool,
     ) -> None:
         """The actuators that a search would put elsewhere, where it would put them so far."""
-        offer = progress if better is None or not better.improved else better
+        is_improved = improvement is not None and improvement.improved
+        offer = improvement if is_improved else progress
         other = None if offer is None or swims else offer.layout
         now = {part.name: (part.position, part.frame) for part in layout.actuators}
         parts = () if other is None or other.name != layout.name else other.actuators
@@ -289,10 +299,18 @@ class RobotScene:
             self._offered.show(moved_parts, moved, part_size(layout))
 
     def _clicked(self, index: int, also: bool) -> None:
-        select = self._session.select_also if also else self._session.select
-        self._do(
-            lambda: select(self._board.facts["drawn"].names[index]) if self._board.facts else None
-        )
+        self._do(partial(self._select, index, also))
+
+    def _select(self, index: int, also: bool) -> None:
+        """Select an actuator in the view; `also` beside those that are selected."""
+        facts = self._board.facts
+        if facts is None:
+            return
+        name = facts["visible_layout"].names[index]
+        if also:
+            self._session.select_also(name)
+        else:
+            self._session.select(name)
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float]) -> None:
         session = self._session

@@ -16,7 +16,7 @@ from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring
 from webapp.scene.force_nodes import DIGITS, Arrows, linear, quaternion
 from webapp.scene.stage import Shape
-from webapp.tasks.analysing import Findings
+from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING, REACH, Rgb
 
@@ -207,16 +207,16 @@ class AttainableNodes:
         )
 
     def refresh(
-        self, findings: Findings | None, better: AttainableSet | None, target: Array, size: float
+        self, analysis: Analysis | None, better: AttainableSet | None, target: Array, size: float
     ) -> None:
-        """Show the sets of findings, nothing for None, as large as `size` says, or a better one
+        """Show the sets of analysis, nothing for None, as large as `size` says, or a better one
         around the present one; the ball marks what `target` (6,) [N, N m] asks in them."""
-        if findings is None and not (self._now.node.visible or self._whole.node.visible):
+        if analysis is None and not (self._now.node.visible or self._whole.node.visible):
             return
-        now, full = (None, None) if findings is None else (findings.now, findings.whole)
+        now, full = (None, None) if analysis is None else (analysis.now, analysis.whole)
         if now is not None and better is not None:
             now, full = better, now
-        scale = 1.0 if findings is None else set_scale(findings)
+        scale = 1.0 if analysis is None else set_scale(analysis)
         for shape, body in ((self._now, now), (self._whole, full)):
             put(shape.node, visible=body is not None, scale=size)
             if body is not None:
@@ -228,9 +228,9 @@ class AttainableNodes:
         put(self._asked, position=np.asarray(part * scale * size))
 
 
-def set_scale(findings: Findings) -> float:
+def set_scale(analysis: Analysis) -> float:
     """Metres per newton, or per newton metre, of the drawn sets."""
-    bodies: list[AttainableSet] = [s for s in (findings.now, findings.whole) if s is not None]
+    bodies: list[AttainableSet] = [s for s in (analysis.now, analysis.whole) if s is not None]
     reach = max((float(np.linalg.norm(s.vertices, axis=-1).max()) for s in bodies), default=1.0)
     return LARGEST / reach if reach > 1e-9 else 1.0
 

@@ -13,8 +13,17 @@ from finlab.axes import axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
-from webapp.session.looking import DRAWERS, TASKS, WAYS, Desk, Display, SearchRequest
-from webapp.session.state import LEAST, MAX_SPEED, MAX_TARGET, History, State, Steps, chosen, number
+from webapp.session.looking import (
+    CANDIDATES,
+    DRAWERS,
+    MODE_DRAWERS,
+    NULL_SPACE,
+    TASKS,
+    Desk,
+    Display,
+    SearchRequest,
+)
+from webapp.session.state import LEAST, MAX_SPEED, MAX_TARGET, History, State, Steps, number, one_of
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST, PRESETS
 
@@ -31,7 +40,7 @@ class Core:
         self.history = History(self._first)
         self.display = display or Display()
         self.desk = Desk()
-        self.chosen: tuple[str, ...] = ()
+        self.selection_order: tuple[str, ...] = ()
         """The selected actuators, in the order in which they were chosen."""
         self.saved = layout
         """The layout as it was opened or saved last."""
@@ -75,13 +84,13 @@ class Core:
         self.mode = 0
         self.step = None
         self.shifts = ()
-        if not self.chosen:
+        if not self.selection_order:
             return
         old = before.layout.names
         names = self.state.layout.names
         called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
-        now = (name if name in names else called.get(name) for name in self.chosen)
-        self.chosen = tuple(name for name in now if name is not None)
+        now = (name if name in names else called.get(name) for name in self.selection_order)
+        self.selection_order = tuple(name for name in now if name is not None)
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""
@@ -106,27 +115,27 @@ class Core:
     @property
     def selected(self) -> str | None:
         """The selected actuator; of several the one that was chosen last."""
-        return self.chosen[-1] if self.chosen else None
+        return self.selection_order[-1] if self.selection_order else None
 
     @property
     def selection(self) -> tuple[str, ...]:
         """All selected actuators, in the order of the layout."""
-        if not self.chosen:
+        if not self.selection_order:
             return ()
-        return tuple(name for name in self.state.layout.names if name in self.chosen)
+        return tuple(name for name in self.state.layout.names if name in self.selection_order)
 
     def select(self, name: str | None) -> None:
         """Select an actuator, or none."""
         if name is not None:
             self.state.layout.index(name)
-        self.chosen = () if name is None else (name,)
+        self.selection_order = () if name is None else (name,)
         self.history.end_merge()
 
     def select_also(self, name: str) -> None:
         """One more actuator beside those that are selected; one of them is let go."""
         self.state.layout.index(name)
-        others = tuple(other for other in self.chosen if other != name)
-        self.chosen = others if name in self.chosen else (*others, name)
+        others = tuple(other for other in self.selection_order if other != name)
+        self.selection_order = others if name in self.selection_order else (*others, name)
         self.history.end_merge()
 
     def select_next(self) -> None:
@@ -156,7 +165,7 @@ class Core:
 
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
-        self._commit("", replace(self.state, target=PRESETS[chosen(name, "preset", PRESETS)]))
+        self._commit("", replace(self.state, target=PRESETS[one_of(name, "preset", PRESETS)]))
 
     def set_speed(self, value: Any) -> None:
         """The speed ahead through the water [m/s]."""
@@ -169,7 +178,7 @@ class Core:
 
     def keep_least(self, word: str) -> None:
         """Watts or effort, by the method that keeps them least."""
-        self.set_setting("method", LEAST[chosen(word, "least", LEAST)])
+        self.set_setting("method", LEAST[one_of(word, "least", LEAST)])
 
     def toggle_axis(self, axis: int) -> None:
         """An axis of the wrench counts, or is free."""
@@ -214,20 +223,20 @@ class Core:
         """What lies uppermost in the drawer of the open task, folded or not; nothing where it has
         none."""
         opened = self.desk.opened[self.desk.task]
-        return opened if opened != WAYS[0] or self.state.layout.is_of_fins else WAYS[1]
+        return opened if opened != CANDIDATES or self.state.layout.is_of_fins else NULL_SPACE
 
     def show_task(self, name: str) -> None:
         """Open a task."""
-        self.desk = replace(self.desk, task=chosen(name, "task", TASKS))
+        self.desk = replace(self.desk, task=one_of(name, "task", TASKS))
         self.step = None
 
     def show_drawer(self, name: str) -> None:
         """Open the drawer at one of its tabs, and the task to which it belongs."""
         task = next((task for task, names in DRAWERS.items() if name in names), self.desk.task)
-        chosen(name, "drawer", DRAWERS[task])
+        one_of(name, "drawer", DRAWERS[task])
         others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
-        if name in WAYS and name != self.desk.opened[task]:  # the others are no ways of this one
-            self.mode = 0
+        if name in MODE_DRAWERS and name != self.desk.opened[task]:
+            self.mode = 0  # the modes of one drawer are not those of the other
         self.desk = Desk(task, (*others, (task, name)))
         self.step = None
 

@@ -36,7 +36,7 @@ class Session(Core):
         self.guide.stop = None  # nothing comes back
         self._commit("Start over", self._first)
         self.saved = self._first.layout
-        self.chosen = ()
+        self.selection_order = ()
         self.mode = 0
 
     # Robots.
@@ -52,7 +52,7 @@ class Session(Core):
     def new_layout(self, kind: str) -> None:
         """A robot to begin with: one hull and one actuator of a type."""
         self.open_layout(layout_edits.blank(kind), "New design")
-        self.chosen = self.state.layout.names
+        self.selection_order = self.state.layout.names
 
     def accept_layout(self, layout: Layout) -> None:
         """A better layout that was found for this one."""
@@ -149,14 +149,14 @@ class Session(Core):
         """One more actuator of a type; it is selected."""
         layout, name = layout_edits.added(self.state.layout, kind)
         self._edit(f"Add {name}", layout)
-        self.chosen = (name,)
+        self.selection_order = (name,)
 
     def duplicate(self) -> None:
         """A copy of the selected actuator; it is selected."""
         source = self._chosen()[-1]
         layout, name = layout_edits.duplicated(self.state.layout, source)
         self._edit(f"Duplicate {source}", layout)
-        self.chosen = (name,)
+        self.selection_order = (name,)
 
     def mirror(self) -> None:
         """The selected actuator's image on the other side, which is selected; they move
@@ -166,7 +166,7 @@ class Session(Core):
         state = self.state.with_layout(layout)
         links = (*unlinked(unlinked(state.links, source), name), (source, name))
         self._commit(f"Mirror {source}", replace(state, links=links))
-        self.chosen = (name,)
+        self.selection_order = (name,)
 
     def unlink(self) -> None:
         """The selected actuator and its mirror image go their own ways."""
@@ -248,9 +248,9 @@ class Session(Core):
 
     def _chosen(self) -> tuple[str, ...]:
         """The selected actuators, the one that was chosen last at the end."""
-        if not self.chosen:
+        if not self.selection_order:
             raise FinlabError("no actuator is selected; click one, or choose it in the list")
-        return self.chosen
+        return self.selection_order
 
     def _edit(
         self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True

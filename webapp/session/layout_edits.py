@@ -17,7 +17,7 @@ from finlab.layout import Actuator, Body, Fin, Layout
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.swim.hull import hull_of
-from webapp.session.state import Links, chosen, number, numbers
+from webapp.session.state import Links, number, numbers, one_of
 
 UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own
@@ -83,7 +83,7 @@ def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     """The layout with copies of an actuator, so that `count` of them stand evenly around a body
     axis. FinlabError: the actuator stands on the axis, or there is no such axis."""
     part = layout.part(name)
-    axis = np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
+    axis = np.eye(3)["xyz".index(one_of(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
         raise FinlabError(
             f"{name} stands on the {around} axis, so its copies would all be in one place"
@@ -117,7 +117,7 @@ def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
 def added(layout: Layout, kind: str) -> tuple[Layout, str]:
     """The layout with one more actuator on the hull, and its name: at the stern, or where there is
     room. A fin's shaft points away from the hull; the others push or steer ahead."""
-    part: Actuator = KINDS[chosen(kind, "actuator", KINDS)].sample()
+    part: Actuator = KINDS[one_of(kind, "actuator", KINDS)].sample()
     hull = hull_of(layout)
     far = 4.0 * max(hull.half)
     for clear in (CLEAR, STEP_UP, 0.0):
@@ -137,7 +137,7 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
 def blank(kind: str) -> Layout:
     """A robot to begin with: a round hull, and one actuator of a type on its left."""
     part = replace(
-        KINDS[chosen(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0)
+        KINDS[one_of(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0)
     )
     if isinstance(part, Fin):
         part = replace(part, mounting_angle=math.pi / 2)
@@ -182,7 +182,7 @@ def _mirror_name(name: str) -> str:
 
 def shaped(layout: Layout, shape: str, size: Vector3) -> Layout:
     """The layout with a parametric hull of a size [m]; its centre stays where it is."""
-    chosen(shape, "hull", HULL_SHAPES)
+    one_of(shape, "hull", HULL_SHAPES)
     checked = numbers(size, "of the hull [m]", 0.02, 5.0, ("length", "width", "height"))
     return with_hull(layout, Hull(shape=shape, size_m=checked, center_m=hull_of(layout).center))
 
@@ -226,7 +226,7 @@ def balanced(layout: Layout, center: Vector3) -> Layout:
 def with_dynamics(layout: Layout, **values: Any) -> Layout:
     """The layout with other fields of `DYNAMICS` of its body; None forgets one."""
     for key in values:
-        chosen(key, "field of the body", DYNAMICS)
+        one_of(key, "field of the body", DYNAMICS)
     return replace(layout, body=replace(layout.body or Body(), **values))
 
 
@@ -239,7 +239,7 @@ def modelled(part: Actuator, kind: str) -> Actuator:
         raise FinlabError(
             f"a table for {part.name} comes from a file; drop its CSV, or fit measurements"
         )
-    chosen(kind, "model", [model for own in KINDS.values() for model in own.KIND.models])
+    one_of(kind, "model", [model for own in KINDS.values() for model in own.KIND.models])
     return part.with_model(kind) if kind in part.KIND.models else part
 
 

@@ -15,7 +15,7 @@ from finlab.files.schema import checked
 from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
-from webapp.session.state import History, State, chosen, least_of
+from webapp.session.state import History, State, least_of, one_of
 from webapp.session.targets import FIRST
 
 ALIGNED = 0.999
@@ -85,7 +85,7 @@ _course = checked(parse_yaml(_FILE.read_text("utf-8"), _FILE.name), _Course)
 TOUR = _course.tour
 LESSONS = _course.lessons
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
-KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
+KEPT = ("history", "saved", "display", "selection_order", "mode", "desk")
 """What of a session comes back at the end."""
 
 
@@ -104,7 +104,7 @@ class Guide:
     def open(self, name: str) -> None:
         """Prepare the state of a stop; what was there before comes back at the end. FinlabError:
         there is no such stop."""
-        stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
+        stop = BY_NAME[one_of(name, "lesson", BY_NAME)]
         session = self._session
         if self.stop is None:
             self._left = {key: getattr(session, key) for key in KEPT}
@@ -112,7 +112,7 @@ class Guide:
         self.stop = stop
         self.solved = False
         session.saved = stop.state.layout
-        session.chosen = ()
+        session.selection_order = ()
         session.desk = Desk()
         session.show_drawer(stop.drawer)
         session.mode = stop.mode

@@ -10,18 +10,22 @@ from finlab.analysis.moves import azimuth, is_mirrored
 from finlab.errors import FinlabError
 from finlab.forces.attainable import WrenchHalf
 from finlab.layout import Layout
-from webapp.session.state import chosen, number
+from webapp.session.state import number, one_of
 
 TASKS = ("Design", "Allocate", "Simulate", "Export", "Log")
+CANDIDATES = "Candidates"
+"""Tab of the drawer that shows the modes of a network's candidates, of robots of fins alone."""
+NULL_SPACE = "Null space"
+"""Tab of the drawer that shows commands along the null space of an answer."""
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
-    "Allocate": ("Candidates", "Null space", "Comparison"),
+    "Allocate": (CANDIDATES, NULL_SPACE, "Comparison"),
     "Simulate": ("Swim over time",),
     "Export": (),
     "Log": ("Log over time", "Replays"),
 }
-WAYS = DRAWERS["Allocate"][:2]
-"""What shows several ways to do the same; the first is of robots of fins alone."""
+MODE_DRAWERS = (CANDIDATES, NULL_SPACE)
+"""Tabs that show other commands for the wrench of an answer."""
 DRAWN: dict[str, WrenchHalf | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
@@ -62,7 +66,7 @@ class Display:
         if now is None:
             raise FinlabError(f"there is no switch {key!r:.40}")
         if key == "drawn":
-            chosen(value, key, DRAWN)
+            one_of(value, key, DRAWN)
         if isinstance(now, bool) and not isinstance(value, bool):
             raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
         return replace(self, **{key: value})
@@ -95,7 +99,7 @@ class SearchRequest:
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal."""
-        return replace(self, goal=chosen(goal, "goal", GOAL_WORDS))
+        return replace(self, goal=one_of(goal, "goal", GOAL_WORDS))
 
     def with_held_toggled(self, name: str) -> "SearchRequest":
         """An actuator held, or free to move again."""

@@ -107,7 +107,7 @@ class State:
         """An actuator with a fault of its type, see `Kind.faults`; None, and a share of 1, mend
         that."""
         part = self.layout.part(name)
-        chosen(kind, f"fault of {name}, a {part.type}", part.KIND.faults)
+        one_of(kind, f"fault of {name}, a {part.type}", part.KIND.faults)
         checked = None if value is None else _checked_fault(part, kind, value)
         return self._with_damage(self.damage.with_fault(name, kind, checked))
 
@@ -133,11 +133,11 @@ class State:
 
     def with_setting(self, key: str, value: Any) -> "State":
         """The temperature, the method, the policy or the network changed."""
-        chosen(key, "setting", ("temperature", "network", *CHOICES))
+        one_of(key, "setting", ("temperature", "network", *CHOICES))
         if key == "network":  # the solver knows which there are
             return replace(self, network=str(value))
         if key in CHOICES:
-            return replace(self, **{key: chosen(value, key, CHOICES[key])})
+            return replace(self, **{key: one_of(value, key, CHOICES[key])})
         settings = DRAWING.get(self.method, DRAWING["mdn"])  # they say what is wrong with a number
         return replace(self, temperature=replace(settings, temperature=value).temperature)
 
@@ -186,7 +186,7 @@ def least_of(method: str) -> str:
     return "effort" if method in DRAWING else "watts"
 
 
-def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:
+def one_of(value: Any, name: str, choices: Iterable[str]) -> Any:
     """One of some words. FinlabError: it is none of them, and which there are."""
     words = tuple(choices)
     if value not in words:

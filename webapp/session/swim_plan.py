@@ -9,7 +9,7 @@ from finlab.layout import Layout
 from finlab.research.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.swim.control import CONTROLLERS, make_controller, steerable_loss
 from finlab.swim.simulation import SHIPPED, Fault, Trajectory, make_trajectory
-from webapp.session.state import State, chosen, number
+from webapp.session.state import State, number, one_of
 
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
@@ -45,7 +45,7 @@ class SwimSettings:
     def with_value(self, key: str, value: Any) -> "SwimSettings":
         """One field changed. FinlabError: there is no such field, or not with this value."""
         if key == "scenario":
-            day = SCENARIOS[chosen(value, key, tuple(SCENARIOS))]
+            day = SCENARIOS[one_of(value, key, tuple(SCENARIOS))]
             said = replace(self, announced=day.announced, path=day.trajectory)
             return replace(said, scenario=day.name)
         if key == "announced" and not isinstance(value, bool):
@@ -53,7 +53,7 @@ class SwimSettings:
         if key == "speed":
             value = number(value, key, *SPEEDS)
         elif key in CHOICES:
-            chosen(value, key, CHOICES[key])
+            one_of(value, key, CHOICES[key])
         elif key != "announced":
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: value})

@@ -13,22 +13,26 @@ from webapp.session.state import Flow, State
 
 
 @dataclass(frozen=True)
-class Question:
-    """What is to be worked out."""
+class AnalysisQuestion:
+    """Which layout is analysed, and what of it is seen."""
 
     layout: Layout
+    """The layout as it is edited, with the limits that damage has left."""
     lost: tuple[str, ...]
+    """Names of its lost actuators."""
     saved: Layout
-    """Another one to compare with."""
+    """The layout to compare with: as it was opened or saved last."""
     drawn: str
+    """Key of `DRAWN`: which attainable set is drawn."""
     flow: Flow | None = None
+    """Velocity (6,) relative to the water [m/s, rad/s]; None at rest."""
 
 
 @dataclass(frozen=True)
-class Findings:
-    """What came of it."""
+class Analysis:
+    """Score cards and attainable sets of a layout."""
 
-    question: Question
+    question: AnalysisQuestion
     card: ScoreCard
     """What the working fins can do."""
     before: ScoreCard | None
@@ -40,7 +44,7 @@ class Findings:
 
 
 @lru_cache(maxsize=32)
-def find(question: Question) -> Findings:
+def analyse(question: AnalysisQuestion) -> Analysis:
     """Answer a question; takes about a second, but all first pages ask the same."""
     layout = question.layout
     lost = question.lost
@@ -59,7 +63,7 @@ def find(question: Question) -> Findings:
     before = None
     if other and len(lost_in_saved) < saved.n:
         before = score_card(saved, lost_in_saved, flow)
-    return Findings(question, card, before, now, reference)
+    return Analysis(question, card, before, now, reference)
 
 
 @lru_cache(maxsize=32)
@@ -69,14 +73,16 @@ def find_ranges(question: State) -> Ranges:
 
 
 @dataclass(frozen=True)
-class Attained:
-    """Which set of a layout is asked for."""
+class SetQuestion:
+    """Which attainable set of a layout is asked for."""
 
     layout: Layout
     kind: WrenchHalf
+    """Forces or torques."""
     flow: Flow | None
+    """Velocity (6,) relative to the water [m/s, rad/s]; None at rest."""
 
 
-def find_set(question: Attained) -> AttainableSet:
+def find_set(question: SetQuestion) -> AttainableSet:
     """The set of forces, or of torques, that a layout attains."""
     return attainable_set(question.layout, question.kind, flow=question.flow)

@@ -9,12 +9,12 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.session import Session
-from webapp.session.looking import WAYS
+from webapp.session.looking import CANDIDATES, MODE_DRAWERS, NULL_SPACE
 from webapp.session.state import State
 from webapp.tasks.context import Context
+from webapp.tasks.mode_search import ModeSearch, search_modes
 from webapp.tasks.slot import Slot
 from webapp.tasks.solver import NO_MODES, Modes, Reply
-from webapp.tasks.ways import Search, find_ways
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a
@@ -27,7 +27,7 @@ HOLD = 5
 """Steps for which the end is seen before it begins anew."""
 
 
-class Seen(NamedTuple):
+class ShownAnswer(NamedTuple):
     """What is seen of the newest answer, which may be older than the state."""
 
     best: Allocation | None
@@ -49,26 +49,37 @@ class Seen(NamedTuple):
     """How many steps of their refinement the network's proposals have had; None for all."""
 
 
+class Variant(NamedTuple):
+    """An answer with another command."""
+
+    best: Allocation
+    """The answer itself."""
+    command: Array
+    """The other command (n, 3)."""
+    answer: Allocation
+    """The answer with that command."""
+
+
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
     def __init__(self, context: Context) -> None:
         """Answer what the page's session asks."""
         self._session: Session = context.session
-        self._shown: tuple[Allocation, Array, Allocation] | None = None
+        self._last_variant: Variant | None = None
         pool = context.pools.answers
         bell = context.bell
         solver = context.solver
         self.slot: Slot[State, Reply] = Slot(pool, bell, solver.reply, live=True, title="No answer")
-        self.search: Slot[Search, Modes] = Slot(
-            pool, bell, find_ways, rest_s=SEARCH_REST_S, title="No candidates"
+        self.search: Slot[ModeSearch, Modes] = Slot(
+            pool, bell, search_modes, rest_s=SEARCH_REST_S, title="No candidates"
         )
         self._solver = solver
 
     @property
     def modes(self) -> Modes:
-        """The ways to do what an answer does, known after a moment of rest; until then those of the
-        answer before, of which none can be chosen."""
+        """The modes of an answer, known after a moment of rest; until then those of the answer
+        before, of which none can be chosen."""
         return self.search.answer or NO_MODES
 
     @property
@@ -81,7 +92,7 @@ class Answering:
         """True until all modes of the newest answer are known."""
         return self.busy or self.search.busy
 
-    def seen(self) -> Seen:
+    def shown_answer(self) -> ShownAnswer:
         """What is seen of the newest answer now."""
         session = self._session
         search = self.search
@@ -89,18 +100,23 @@ class Answering:
         busy = self.busy
         modes = search.answer or NO_MODES
         mode = session.mode
-        searching = busy or search.answered is not search.question
-        known = search.answered is not None and search.answered.reply is reply
-        best = shown = None if reply is None else reply.answer
+        searching = busy or search.busy
+        is_proved = search.answered is not None and search.answered.reply is reply
+        best = None if reply is None else reply.answer
+        shown = best
         steps = 0 if searching else modes.steps
         step = session.step if steps else None
-        if best is not None and not busy and known and (modes.null is not None or not searching):
-            proposal = modes.proposal_of(mode) if step is not None and step < steps else None
+        # Sliders of the null space are followed while its modes are searched for.
+        can_choose = is_proved and not busy and (modes.null_space is not None or not searching)
+        if best is not None and can_choose:
+            proposal = None
+            if step is not None and step < steps:
+                proposal = modes.proposal_of(mode)
             if step is not None and proposal is not None:
-                shown = self._variant(best, modes.ways[step].command[proposal])
+                shown = self._variant(best, modes.refinement[step].command[proposal])
             elif 0 < mode < len(modes.shown):
                 shown = self._variant(best, modes.shown[mode].mode.command)
-        return Seen(
+        return ShownAnswer(
             best=best,
             shown=shown,
             in_reach=reply is not None and reply.in_reach,
@@ -108,21 +124,22 @@ class Answering:
             error=None if busy else self.slot.error,
             modes=modes,
             searching=searching,
-            proving=busy or not known,
+            proving=busy or not is_proved,
             mode=min(mode, max(len(modes.shown) - 1, 0)),
             step=step,
         )
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
-        known = self._shown
+        last = self._last_variant
         if (
-            known is None
-            or known[0] is not best
-            or not np.array_equal(known[1], command, equal_nan=True)
+            last is None
+            or last.best is not best
+            or not np.array_equal(last.command, command, equal_nan=True)
         ):
-            known = self._shown = (best, command, best.with_command(command))
-        return known[2]
+            last = Variant(best, command, best.with_command(command))
+            self._last_variant = last
+        return last.answer
 
     def ask(self) -> None:
         """Have the present state answered; then have the answer proved, where that is said, and its
@@ -137,15 +154,16 @@ class Answering:
         drawer = session.drawer
         if session.desk.task not in PROVED:
             return
-        kind = "" if drawer is None else drawer
-        if kind not in WAYS:  # a mode that is chosen stays on the robot when the drawer is closed
-            kind = before.kind if before is not None and session.mode > 0 else ""
-        known = before is not None and before.reply is reply
-        if known and not kind:  # it is proved, and its modes are not looked at
+        if drawer not in MODE_DRAWERS:
+            # A mode that is chosen stays on the robot when the drawer is closed.
+            drawer = before.drawer if before is not None and session.mode > 0 else ""
+        is_known = before is not None and before.reply is reply
+        if is_known and not drawer:  # it is proved, and its modes are not looked at
             return
-        shifts = session.shifts if kind == WAYS[1] else ()
+        shifts = session.shifts if drawer == NULL_SPACE else ()
         # A drawer that is opened has rested already.
-        self.search.ask(Search(self._solver, reply, kind, shifts), at_once=known)
+        search = ModeSearch(self._solver, reply, drawer or "", shifts)
+        self.search.ask(search, at_once=is_known)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
@@ -182,7 +200,7 @@ class Refining:
         if (
             modes.proposal_of(session.mode) is None
         ):  # the answer of another method: then the network's best
-            session.mode = min(place for place in modes.ends if place >= 0)
+            session.mode = min(mode for mode in modes.ends if mode >= 0)
         if session.step is None:
             session.step = 0
         self._wait()
@@ -207,8 +225,8 @@ class Refining:
         session = self._session
         steps = self._answering.modes.steps
         self._due = None
-        looked_at = session.opened == WAYS[0]
-        if self._answering.searching or not steps or not looked_at:
+        is_visible = session.opened == CANDIDATES
+        if self._answering.searching or not steps or not is_visible:
             session.step = None
         else:
             if session.step is not None:

@@ -19,10 +19,10 @@ from webapp.handles import Presses
 from webapp.session import Session, files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
+from webapp.tasks.modes_csv import modes_csv
 from webapp.tasks.slot import Deferred
 from webapp.tasks.solver import Modes, Solver
 from webapp.tasks.swimming import Swimming
-from webapp.tasks.ways_file import ways_csv
 from webapp.viser_internals import run_script
 
 KINDS = (
@@ -135,10 +135,10 @@ class Designs:
         layout = self._session.state.layout
         self._export(file_stem(layout.name) + files.GRAPH, lambda: graph_text(layout).encode())
 
-    def ways(self, answer: Allocation, modes: Modes) -> None:
+    def save_modes(self, answer: Allocation, modes: Modes) -> None:
         """Send the candidates of an answer as CSV."""
         name = file_stem(answer.layout.name) + files.CANDIDATES
-        self._export(name, partial(ways_csv, answer, modes))
+        self._export(name, partial(modes_csv, answer, modes))
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""

@@ -6,7 +6,14 @@ from finlab.analysis import AttainableSet
 from finlab.forces.reach import Ranges
 from webapp.session.looking import DRAWN
 from webapp.session.state import State
-from webapp.tasks.analysing import Attained, Findings, Question, find, find_ranges, find_set
+from webapp.tasks.analysing import (
+    Analysis,
+    AnalysisQuestion,
+    SetQuestion,
+    analyse,
+    find_ranges,
+    find_set,
+)
 from webapp.tasks.answering import Answering, Refining
 from webapp.tasks.comparing import Comparison
 from webapp.tasks.context import Context
@@ -14,7 +21,7 @@ from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.log_reading import LogReading
 from webapp.tasks.slot import Slot
-from webapp.tasks.solver import BothWays
+from webapp.tasks.solver import JetComparison
 from webapp.tasks.swimming import Swimming
 
 REST_S = 0.12
@@ -35,10 +42,16 @@ class Jobs:
         self.answering = Answering(context)
         self.refining = Refining(context, self.answering)
         self.ranging: Slot[State, Ranges] = Slot(pools.brief, bell, find_ranges, rest_s=REST_S)
-        self.both: Slot[State, BothWays] = Slot(pools.answers, bell, solver.both, rest_s=REST_S)
-        self.analyst: Slot[Question, Findings] = Slot(pools.brief, bell, find, rest_s=CARD_REST_S)
+        self.jet_comparison: Slot[State, JetComparison] = Slot(
+            pools.answers, bell, solver.jet_comparison, rest_s=REST_S
+        )
+        self.analyst: Slot[AnalysisQuestion, Analysis] = Slot(
+            pools.brief, bell, analyse, rest_s=CARD_REST_S
+        )
         self.improver = Improver(context)
-        self.growing: Slot[Attained, AttainableSet] = Slot(pools.brief, bell, find_set, live=True)
+        self.growing: Slot[SetQuestion, AttainableSet] = Slot(
+            pools.brief, bell, find_set, live=True
+        )
         """What the best layout of a search attains so far."""
         self.fitting = Fitting(context)
         self.log = LogReading(context)
@@ -46,7 +59,9 @@ class Jobs:
         self.swimming = Swimming(context)
         self.first = frozenset[Slot[Any, Any]]([self.answering.slot])
         """What a change of the state waits for before the page is written."""
-        self.beside = frozenset[Slot[Any, Any]]([self.answering.search, self.ranging, self.both])
+        self.beside = frozenset[Slot[Any, Any]](
+            [self.answering.search, self.ranging, self.jet_comparison]
+        )
         """What is told shortly after an answer, all of it together."""
 
     def ask(self) -> None:
@@ -57,7 +72,7 @@ class Jobs:
         if self._robot != robot:
             # What is known of another robot must not stand under this one's name.
             self._robot = robot
-            for of_robot in (self.answering, self.analyst, self.ranging, self.both):
+            for of_robot in (self.answering, self.analyst, self.ranging, self.jet_comparison):
                 of_robot.forget()
         task = session.desk.task
         self.answering.ask()
@@ -67,7 +82,7 @@ class Jobs:
             )
         drawn = session.display.drawn
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
-            question = Question(state.able, state.lost, session.saved, drawn, state.flow)
+            question = AnalysisQuestion(state.able, state.lost, session.saved, drawn, state.flow)
             self.analyst.ask(question)
         kind = DRAWN[drawn]
         if task == "Design" and kind is not None:
@@ -75,9 +90,9 @@ class Jobs:
             if best is None:
                 self.growing.forget()
             else:
-                self.growing.ask(Attained(best, kind, state.flow))
+                self.growing.ask(SetQuestion(best, kind, state.flow))
         if task in ("Design", "Allocate") and state.layout.interaction is not None:
-            self.both.ask(state)
+            self.jet_comparison.ask(state)
 
     @property
     def busy(self) -> bool:
@@ -90,5 +105,5 @@ class Jobs:
         self.refining.stop()
         for slot in (self.comparison, self.improver, self.growing, self.fitting, self.log):
             slot.forget()
-        for of_robot in (self.answering, self.analyst, self.ranging, self.both):
+        for of_robot in (self.answering, self.analyst, self.ranging, self.jet_comparison):
             of_robot.forget()

@@ -22,7 +22,7 @@ from finlab.research.networks.checkpoint import network_features, resolve_checkp
 from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
 from webapp.markup.words import OWN, fins_words
-from webapp.session.state import DRAWING, State, chosen
+from webapp.session.state import DRAWING, State, one_of
 from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from webapp.theme import MODE_COLORS
 
@@ -42,8 +42,8 @@ class NamedMode(NamedTuple):
     name."""
 
 
-class NullWays(NamedTuple):
-    """The null space of an answer, as the page lists it."""
+class NullSpaceDirections(NamedTuple):
+    """Directions of the null space of an answer, as the page lists them."""
 
     names: tuple[str, ...]
     """What each direction is called: the numbers of the actuators that push otherwise along it."""
@@ -62,10 +62,10 @@ class Modes:
     shown: tuple[NamedMode, ...]
     """The first `MAX_SHOWN` of them, the answer first, no two of the same name."""
     count: int
-    ways: tuple[Candidates, ...] = ()
+    refinement: tuple[Candidates, ...] = ()
     """What a network proposed, then the same K after each step of their refinement where that is
     told."""
-    null: "NullWays | None" = None
+    null_space: "NullSpaceDirections | None" = None
     """The null space that these ways lie in, where that is looked at."""
     ends: tuple[int, ...] = ()
     """For each proposal the shown mode at which it ends, -1 where that is none of them."""
@@ -73,7 +73,7 @@ class Modes:
     @property
     def steps(self) -> int:
         """Steps of the refinement."""
-        return max(len(self.ways) - 1, 0)
+        return max(len(self.refinement) - 1, 0)
 
     def proposal_of(self, mode: int) -> int | None:
         """The first proposal that ends at a mode: the likeliest, as those come first."""
@@ -149,12 +149,14 @@ class Reply:
     """Whether any command of the working fins gives what is asked."""
 
 
-class BothWays(NamedTuple):
-    """Answers to a state, with and without jets, both judged with them."""
+class JetComparison(NamedTuple):
+    """Answers to a state whose jets count, both judged with them."""
 
     state: State
-    counted: Allocation
-    blind: Allocation
+    with_jets: Allocation
+    """The answer."""
+    without_jets: Allocation
+    """That of the actuators' own laws alone."""
 
 
 class Solver:
@@ -213,7 +215,7 @@ class Solver:
                 self._checkpoint if method == "mdn" and self.first_network == SHIPPED else None
             )
             if network and network != SHIPPED:
-                checkpoint = self.networks()[chosen(network, "network", self.networks())]
+                checkpoint = self.networks()[one_of(network, "network", self.networks())]
             self._choices[method, network] = self._load(method, checkpoint=checkpoint)
         return self._choices[method, network]
 
@@ -227,19 +229,22 @@ class Solver:
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
 
-    def both(self, state: State) -> BothWays:
+    def jet_comparison(self, state: State) -> JetComparison:
         """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as
         `solve`."""
-        known = state.layout.interaction
-        blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
-        judge = replace(blind.layout, interaction=known)
-        flow = None if state.flow is None else np.array(state.flow)
-        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
-        both = BothWays(state, self.solve(state), blind)
-        _ = [
-            (answer.err_norm, answer.power) for answer in both[1:]
-        ]  # here, not where the page is written
-        return both
+        layout = replace(state.layout, interaction=None)
+        without_jets = self.solve(replace(state, layout=layout))
+        without_jets = replace(
+            without_jets,
+            layout=replace(without_jets.layout, interaction=state.layout.interaction),
+            flow=None if state.flow is None else np.array(state.flow),
+            wrench_expected=None,
+            later=None,
+        )
+        with_jets = self.solve(state)
+        for answer in (with_jets, without_jets):
+            _ = answer.err_norm, answer.power  # here, not where the page is written
+        return JetComparison(state, with_jets, without_jets)
 
     def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes:

@@ -12,12 +12,12 @@ from finlab.layout import Layout, load_layout
 from tests.webapp.stand_in import Direct, context_of, until
 from webapp.panels.modes_tab import mode_table
 from webapp.session import Session
-from webapp.session.looking import WAYS
+from webapp.session.looking import NULL_SPACE
 from webapp.session.state import State
 from webapp.tasks.answering import Answering
-from webapp.tasks.null_ways import MOST, null_modes
+from webapp.tasks.modes_csv import modes_csv
+from webapp.tasks.null_space_modes import MOST, null_space_modes
 from webapp.tasks.solver import Solver
-from webapp.tasks.ways_file import ways_csv
 
 HYBRID = load_layout("turtle_hybrid")
 BLUEROV = load_layout("bluerov2_heavy")
@@ -29,9 +29,9 @@ ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
 )
 def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: Layout) -> None:
     answer = Solver().solve(State(layout, target=ASKED))
-    (alone,) = null_modes(answer, ()).shown
+    (alone,) = null_space_modes(answer, ()).shown
     assert alone.badge == "optimum" and np.array_equal(alone.mode.command, answer.command)
-    modes = null_modes(answer, (0.0, 4.0))
+    modes = null_space_modes(answer, (0.0, 4.0))
     optimum, other, mean = modes.shown
     assert other.mode.err_norm < 1e-6 and other.mode.power > 1.01 * optimum.mode.power
     assert (mean.mode.err_norm > 1e-3) is (layout is not BLUEROV), (
@@ -39,15 +39,18 @@ def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: L
     )
     assert ("class='missing'" in mode_table(modes, 1)) is (layout is not BLUEROV)
     assert ("<th>effort" in mode_table(modes, 1)) is layout.is_of_fins
-    assert modes.null is not None
-    low, high = modes.null.ranges[1]
-    assert low < 0.0 < 4.0 < high and len(modes.null.names) == len(modes.null.ranges) <= MOST
+    assert modes.null_space is not None
+    low, high = modes.null_space.ranges[1]
+    assert (
+        low < 0.0 < 4.0 < high
+        and len(modes.null_space.names) == len(modes.null_space.ranges) <= MOST
+    )
 
 
 def test_a_robot_without_another_way_says_so() -> None:
     layout = load_layout("ucat").without(["back_left", "back_right"])
-    modes = null_modes(Allocator(layout).allocate([0.5, 0, 0, 0, 0, 0]), (1.0,))
-    assert modes.null is not None and modes.null.names == () and len(modes.shown) == 1
+    modes = null_space_modes(Allocator(layout).allocate([0.5, 0, 0, 0, 0, 0]), (1.0,))
+    assert modes.null_space is not None and modes.null_space.names == () and len(modes.shown) == 1
 
 
 def ask(answering: Answering) -> None:
@@ -61,16 +64,16 @@ def ask(answering: Answering) -> None:
 def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
     session = Session(HYBRID)
     answering = Answering(context_of(Direct(), session, Solver()))
-    assert session.drawer == WAYS[1], "the network proposes for fins alone"
+    assert session.drawer == NULL_SPACE, "the network proposes for fins alone"
     ask(answering)
-    best = answering.seen().shown
+    best = answering.shown_answer().shown
     session.shift(0, 5.0)
     ask(answering)
-    seen = answering.seen()
+    seen = answering.shown_answer()
     assert seen.shown is not seen.best is best and seen.shown is not None and best is not None
     assert seen.shown.reachable and seen.shown.power > best.power
     session.show_mode(2)
-    assert not answering.seen().shown.reachable  # type: ignore[union-attr]
+    assert not answering.shown_answer().shown.reachable  # type: ignore[union-attr]
     session.shift(0, 0.0)
     assert session.shifts == () and session.mode == 0
     session.shift(1, 2.0)
@@ -80,7 +83,9 @@ def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
 
 def test_the_table_of_candidates_has_commands_that_give_its_figures() -> None:
     answer = Solver().solve(State(HYBRID, target=ASKED))
-    rows = list(csv.DictReader(io.StringIO(ways_csv(answer, null_modes(answer, (5.0,))).decode())))
+    rows = list(
+        csv.DictReader(io.StringIO(modes_csv(answer, null_space_modes(answer, (5.0,))).decode()))
+    )
     assert [row["origin"] for row in rows] == ["optimum", "null space", "average"]
     for row in rows:
         force = [[float(row[f"{name}.F{axis}_n"]) for axis in "xyz"] for name in HYBRID.names]

@@ -12,7 +12,7 @@ from webapp.tasks.solver import Modes
 COMMON = ("name", "origin", "err_norm", "power_w", "effort")
 
 
-def ways_csv(answer: Allocation, modes: Modes) -> bytes:
+def modes_csv(answer: Allocation, modes: Modes) -> bytes:
     """The modes that are listed, then all that a network proposed, each as refined."""
     rows = [
         _row(
@@ -26,7 +26,7 @@ def ways_csv(answer: Allocation, modes: Modes) -> bytes:
         )
         for each in modes.shown
     ]
-    for drawn in modes.ways[-1:]:
+    for drawn in modes.refinement[-1:]:
         figures = drawn.command, drawn.source, drawn.err_norm, drawn.power, drawn.effort
         rows += [
             _row(answer, command, "candidate", *rest)
