@@ -86,7 +86,7 @@ def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
     ranges = jobs.ranging.question
     search = jobs.answering.search.question
     assert ranges is not None and ranges.target[0] == 0.9 and jobs.analyst.question is None
-    assert search is not None and search.kind == "", (
+    assert search is not None and search.drawer == "", (
         "the answer is proved, its modes are not looked for"
     )
     do(lambda: session.show_task("Design"))

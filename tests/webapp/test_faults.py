@@ -188,7 +188,7 @@ def test_no_figure_of_the_robot_before_stays(
     whole = tab.figures()
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
-        for known in (analysing.find, analysing.find_ranges):
+        for known in (analysing.analyse, analysing.find_ranges):
             known.cache_clear()
         tab.open(OPENED)
         shown = tab.figures()

@@ -96,8 +96,8 @@ def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> 
     for kind, value, none in (("asked", wish, "free"), ("given", got, "–"), ("missing", rest, "–")):
         rounded = 0.0 if value is None else round(value, digits)
         text = f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
-        said = "dim" if kind == "missing" and not rounded else kind
-        parts.append(f"<span class='right {said}'>{none if value is None else text}</span>")
+        style = "dim" if kind == "missing" and not rounded else kind
+        parts.append(f"<span class='right {style}'>{none if value is None else text}</span>")
     return "".join(parts)
 
 

@@ -106,12 +106,12 @@ def fit_card(result: Fitted) -> str:
     name = result.upload.name
     fit = result.fit
     if fit is None:
-        said = html(
+        sentence = html(
             "<b>{} is a finished table.</b> It is on {} as it stands.",
             name,
             result.upload.part.name,
         )
-        return html("<div class='fl said'>{}</div>", said)
+        return html("<div class='fl said'>{}</div>", sentence)
     if isinstance(fit, ThrusterFit):
         return html(
             "<div class='fl'>{}</div>",

@@ -36,8 +36,8 @@ def reach_style(ranges: Ranges | None, able: Layout, *ends: float) -> Markup:
         if ranges is None or not able.commanded[k]:
             continue
         marks = reach_marks(float(ranges.low[k]), float(ranges.high[k]), 2.0 * end)
-        said = ""
+        properties = ""
         for name, (value, words) in zip(("last", "first"), reversed(marks), strict=False):
-            said += f"--{name}: {50.0 + 50.0 * value / end:.1f}%; --{name}-words: '{words}'; "
-        rules.append(f"[data-fl~=axis-{k}] + div {{ {said}}}")
+            properties += f"--{name}: {50.0 + 50.0 * value / end:.1f}%; --{name}-words: '{words}'; "
+        rules.append(f"[data-fl~=axis-{k}] + div {{ {properties}}}")
     return Markup(f"<style>{' '.join(rules)}</style>")

@@ -126,8 +126,8 @@ def answer_sentence(
             share = round(100 * allocation.share)
             remarks = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
             remarks += [*allocation.binding, *(() if searching else allocation.notes)]
-            said = "; ".join(note for note in remarks if not note.endswith(AT_REST))
-            sentences.append(in_app(f"{said[0].upper()}{said[1:]}.") if said else "")
+            sentence = "; ".join(note for note in remarks if not note.endswith(AT_REST))
+            sentences.append(in_app(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
             if doubt := allocation.measure_next:

@@ -198,8 +198,8 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
 
 def righting_sentences(layout: Layout) -> tuple[str, ...]:
     """What there is to say of a robot that nothing rights; nothing where a moment does."""
-    said = righting_words(layout)
-    return () if said is None else (f"{said[0].upper()}{said[1:]}.",)
+    sentence = righting_words(layout)
+    return () if sentence is None else (f"{sentence[0].upper()}{sentence[1:]}.",)
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
@@ -210,12 +210,12 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
     if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
         return None
     goes, way = ("rises", "down") if over > 0.0 else ("sinks", "up")
-    said = f"By its mass and buoyancy this robot {goes} with {three_digits(abs(over))} N"
+    sentence = f"By its mass and buoyancy this robot {goes} with {three_digits(abs(over))} N"
     most = f"{three_digits(float(reach[2]))} N" if reach[2] >= 1e-6 else "nothing"
     if abs(over) < reach[2]:
-        return f"{said}; of the {most} that its working fins can push {way}, that is most."
+        return f"{sentence}; of the {most} that its working fins can push {way}, that is most."
     return (
-        f"{said}, and its working fins can push {way} with {most} at most: it cannot keep its "
+        f"{sentence}, and its working fins can push {way} with {most} at most: it cannot keep its "
         "depth."
     )
 
@@ -245,7 +245,7 @@ def parts_word(layout: Layout) -> str:
 def damage_words(damage: Damage, name: str, turns: bool = True) -> str:
     """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a
     whole one. `turns` says whether what sticks is an angle, else a force."""
-    said: dict[str, Callable[[Any], str]] = {
+    words_of: dict[str, Callable[[Any], str]] = {
         "weak": lambda share: f"weak {100 * share:.0f} %",
         "torn": lambda share: f"torn, {100 * share:.0f} % left",
         "stuck": lambda at: (
@@ -254,4 +254,4 @@ def damage_words(damage: Damage, name: str, turns: bool = True) -> str:
         "running": lambda command: "runs on",
     }
     known = {} if damage == WHOLE else damage.of(name)
-    return ", ".join(said[kind](value) for kind, value in known.items()).replace("-", "−")
+    return ", ".join(words_of[kind](value) for kind, value in known.items()).replace("-", "−")

@@ -181,8 +181,8 @@ def _in_field(box: Box, shown: Any) -> float:
 
 def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) -> str:
     if not selection:
-        said = "Press an actuator in the list or in the view to see all about it."
-        return html("<div class='fl dim'>{}</div>", said)
+        sentence = "Press an actuator in the list or in the view to see all about it."
+        return html("<div class='fl dim'>{}</div>", sentence)
     badges = Markup().join(swatch(layout.index(name)) for name in selection)
     if len(selection) == 1:
         head = "<div class='fl head'>{}<b>{}</b> <span class='dim'>{}</span></div>"

@@ -137,10 +137,10 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
     if isinstance(model, PowerTable):
         (first, *_) = model.rows[0]
         (last, *_) = model.rows[-1]
-        said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
-        return html(f"<div class='fl dim'>{said}</div>", len(model.rows), first, last, model.unit)
-    said = law_words(part)
-    return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
+        template = "<div class='fl dim'><b>table</b> of {} rows, command {:g} to {:g} {}</div>"
+        return html(template, len(model.rows), first, last, model.unit)
+    sentence = law_words(part)
+    return html("<div class='fl dim'>{}{}.</div>", sentence[0].upper(), sentence[1:])
 
 
 def law_words(part: Actuator) -> str:
@@ -166,7 +166,7 @@ def _table_words(fin: Fin, doubts: bool) -> str:
     covers = f"A {degrees(low_a)}° to {degrees(high_a)}°, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
     power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
-    said = (
+    sentence = (
         ""
         if doubt is None or not doubts
         else html("<div class='missing'>This fin is {}.</div>", doubt)
@@ -174,7 +174,7 @@ def _table_words(fin: Fin, doubts: bool) -> str:
     if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
         most_a = fin.limits.amplitude[1]
         most_f = fin.limits.frequency[1]
-        said += html(
+        sentence += html(
             "<div class='missing'>The fin may be asked for {}° and {:.2f} Hz: beyond "
             "what was measured the force counts as at the edge.</div>",
             degrees(most_a),
@@ -182,7 +182,7 @@ def _table_words(fin: Fin, doubts: bool) -> str:
         )
     fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
     origin = f", {fitted.split(',')[0]}" if fitted else " of forces"
-    return html("<b>table</b>{}.{}<div class='dim'>{}; {}.</div>", origin, said, covers, power)
+    return html("<b>table</b>{}.{}<div class='dim'>{}; {}.</div>", origin, sentence, covers, power)
 
 
 class Curves(NamedTuple):

@@ -121,8 +121,8 @@ def _facts(layout: Layout) -> str:
         over = lift / GRAVITY - body.mass_kg
         if contradicts(layout):
             reason = "it is flooded in part" if lift < GRAVITY * water else "other parts lift, too"
-            said = f" The body's buoyancy is that of {three_digits(lift / GRAVITY)} kg"
-            lines[0] += f"{said}: {reason}, or estimate anew."
+            sentence = f" The body's buoyancy is that of {three_digits(lift / GRAVITY)} kg"
+            lines[0] += f"{sentence}: {reason}, or estimate anew."
         rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
         lines.append(
             "By mass and buoyancy below it "

@@ -191,11 +191,11 @@ def _option(method: str) -> str:
 
 def _menu(course: tuple[Stop, ...]) -> str:
     """A button that opens a list of the lessons, or of the tour's stops."""
-    said = {
+    words = {
         LESSONS: ("Lessons", "Each has a task"),
         TOUR: ("Tour", f"The app in {len(TOUR)} stops"),
     }
-    word, about = said[course]
+    word, about = words[course]
     hide = html("popovertarget='fl-{}' popovertargetaction='hide'", word)
     items = [
         button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)

@@ -80,8 +80,8 @@ class Section:
 
     def _fail(self, error: Exception | None) -> None:
         name = self._session.state.layout.name
-        said = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
-        self._say("" if error is None else html(said, name, str(error)))
+        template = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
+        self._say("" if error is None else html(template, name, str(error)))
 
     def _say(self, text: str) -> None:
         put(self._sentence, content=text, visible=bool(text))

@@ -62,11 +62,11 @@ def add_hull(page: Page) -> None:
         session.select(None)  # so that the report is seen, wherever the file was dropped
         layout = session.state.layout
         if layout.body is not None and contradicts(layout):
-            said, water = (
-                three_digits(v) for v in (lift_of(layout.body) / GRAVITY, displaced(layout))
-            )
+            water = three_digits(displaced(layout))
+            buoyancy = three_digits(lift_of(layout.body) / GRAVITY)
             text = (
-                f"This hull encloses {water} kg of water, the body's buoyancy is that of {said} kg."
+                f"This hull encloses {water} kg of water, "
+                f"the body's buoyancy is that of {buoyancy} kg."
             )
             anew = {
                 "All": partial(session.estimate, True),

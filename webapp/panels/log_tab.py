@@ -64,10 +64,10 @@ def _said(judged: "Judgement | None", judging: str | None, judged_error: str | N
     if judging is not None:
         return html("<div class='fl dim'>{} …</div>", judging.capitalize())
     if judged is None:
-        said = (
+        sentence = (
             html("<div class='missing'>{}</div>", in_app(judged_error)) if judged_error else FIRST
         )
-        return html("<div class='fl'>{}</div>", said)
+        return html("<div class='fl'>{}</div>", sentence)
     notes = [
         html("<div class='said dim'>{}</div>", in_app(note))
         for note in (*judged.asks, *judged.notes)
@@ -207,7 +207,7 @@ def replays_table(judged: "Judgement | None") -> str:
         MOTIONS[lost],
         AXIS_UNITS[lost],
     )
-    said = Markup(
+    sentence = Markup(
         "<div class='said'><span class='given'>Green</span>: holds what was lost, at least "
         "power.</div>"
     )
@@ -215,5 +215,5 @@ def replays_table(judged: "Judgement | None") -> str:
         "<div class='fl fl-timeline'><table class='methods'>{}{}</table>{}</div>",
         head,
         rows,
-        said if judged.held_by else "",
+        sentence if judged.held_by else "",
     )

@@ -158,15 +158,15 @@ def step_words(modes: Modes, step: int | None) -> str:
 
 def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
     """Where the answer and its modes come from, or why there is but one."""
-    said = LEARNED
+    sentence = LEARNED
     if method != "paper":
         aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        said = PROPOSED + aside
+        sentence = PROPOSED + aside
         if best is not None and not in_reach:
-            said = BEYOND.format(best.policy.kind)
+            sentence = BEYOND.format(best.policy.kind)
         elif best is not None and not np.nan_to_num(best.target).any():
-            said = NOTHING
-    return html("<div class='fl dim'>{}</div>", said)
+            sentence = NOTHING
+    return html("<div class='fl dim'>{}</div>", sentence)
 
 
 def mode_table(modes: Modes, mode: int) -> str:
@@ -261,7 +261,7 @@ def comparison_table(run: Run, stale: bool) -> str:
         "[ms]</th>"
         "</tr>"
     )
-    said = html(
+    colors = html(
         "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
         "class='near'>Ochre</span>: approximate, another method is exact. <span "
         "class='missing'>Orange</span>: out of reach of all.</div>",
@@ -274,5 +274,5 @@ def comparison_table(run: Run, stale: bool) -> str:
     )
     body = Markup().join(rows)
     return html(
-        "<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note
+        "<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, colors, note
     )

@@ -71,8 +71,8 @@ def _about(modes: Modes) -> str:
     known = modes.null_space
     if known is None:
         return ""
-    said = f"{ABOUT} {known.more} more directions are not shown." if known.more else ABOUT
-    return html("<div class='fl dim'>{}</div>", said if known.names else ALONE)
+    sentence = f"{ABOUT} {known.more} more directions are not shown." if known.more else ABOUT
+    return html("<div class='fl dim'>{}</div>", sentence if known.names else ALONE)
 
 
 def _mean_words(modes: Modes) -> str:

@@ -109,8 +109,8 @@ def add_figures(page: Page) -> None:
 
 def _trim(able: Layout, lost: tuple[str, ...], layout: Layout) -> str:
     trim = trim_sentence(layout, axis_reach(able, lost))
-    said = [*([] if trim is None else [trim]), *righting_sentences(layout)]
-    return html("<div class='fl missing'>{}</div>", " ".join(said)) if said else ""
+    sentences = [*([] if trim is None else [trim]), *righting_sentences(layout)]
+    return html("<div class='fl missing'>{}</div>", " ".join(sentences)) if sentences else ""
 
 
 FIN_LINES = tuple(fin_color(i) for i in range(MAX_ACTUATORS))

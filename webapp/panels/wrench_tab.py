@@ -72,7 +72,7 @@ def add_target(page: Page) -> None:
     board.act(reach)
     board.act(ask, *sliders)
     style = Memoized(reach_style)
-    said: dict[str, Any] = {}
+    hinted: Any = None
 
     def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
         """Show what is within reach on the sliders: the marks of all are one message."""
@@ -82,10 +82,11 @@ def add_target(page: Page) -> None:
 
     def hint(ranges: Ranges | None, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
         """Say what the marks are; they change more often than that."""
+        nonlocal hinted
         if ranges is None:
             return
-        known = able, lost, flow, np.isfinite(ranges.low).tolist()
-        if known == said.get("hints"):
+        hints = able, lost, flow, np.isfinite(ranges.low).tolist()
+        if hints == hinted:
             return
         most = axis_reach(able, lost, flow)  # with the others free
         for k, slider in enumerate(sliders):
@@ -93,11 +94,11 @@ def add_target(page: Page) -> None:
                 slider.hint = _hint(k, ranges.low[k], most[k])
             else:
                 slider.hint = AXIS_WORDS[k].capitalize()
-        said["hints"] = known
+        hinted = hints
 
     page.add_html(mark)
     board.act(hint)
-    page.add_html(_sentence)
+    page.add_html(_ranges_error)
     policies = "Come closest, keep the direction, or serve axes by priority, heave first."
     box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
@@ -145,13 +146,15 @@ def _at_rest(layout: Layout, flow: Flow | None) -> str:
     rudders = layout.by_flow
     if flow is not None or not rudders:
         return ""
-    said = f"{listed(rudders)} give{'s' * (len(rudders) == 1)} nothing: no water flows past at rest"
-    return html("<div class='fl missing'>{}.</div>", said)
+    verb = "gives" if len(rudders) == 1 else "give"
+    sentence = f"{listed(rudders)} {verb} nothing: no water flows past at rest"
+    return html("<div class='fl missing'>{}.</div>", sentence)
 
 
-def _sentence(ranges_error: str | None) -> str:
-    said = "<div class='fl missing'>What is in reach: {}</div>"
-    return "" if ranges_error is None else html(said, ranges_error)
+def _ranges_error(ranges_error: str | None) -> str:
+    """Why the sliders have no marks."""
+    template = "<div class='fl missing'>What is in reach: {}</div>"
+    return "" if ranges_error is None else html(template, ranges_error)
 
 
 def _hint(axis: int, low: float, reach: float) -> str:
@@ -172,9 +175,9 @@ def add_answer(page: Page) -> None:
         shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None
     ) -> Markup:
         """Bars and words are one message; what is proved of an answer changes the words alone."""
-        said = answer_sentence(state, shown, busy, proving or step is not None)
+        sentence = answer_sentence(state, shown, busy, proving or step is not None)
         words = "<div class='fl'><div class='said'>{}</div></div>"
-        return Markup(bars(shown, state.target, state.layout, busy) + html(words, said))
+        return Markup(bars(shown, state.target, state.layout, busy) + html(words, sentence))
 
     page.add_html(write)
 
@@ -205,6 +208,6 @@ def jets_table(jet_comparison: JetComparison | None) -> str:
         row("error", error_digits(with_jets.err_norm), error_digits(without_jets.err_norm)),
         row("power [W]", three_digits(with_jets.power), three_digits(without_jets.power)),
     ]
-    said = rest_sentence(without_jets)
+    sentence = rest_sentence(without_jets)
     words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
-    return html(words, JETS_HEADER, rows, said[0].lower() + said[1:])
+    return html(words, JETS_HEADER, rows, sentence[0].lower() + sentence[1:])

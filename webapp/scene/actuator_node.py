@@ -164,32 +164,30 @@ class ActuatorNode:
         `moved` shows its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that
         holds it."""
         frame = np.array(part.frame)
-        place = np.array(part.position)
+        position = np.array(part.position)
         size, arrows = sizes
         slenderness, scale = shape_of(part, size)
         is_fin = part.KIND.drawn_as == "fin"
         is_pod = part.KIND.drawn_as == "pod"
-        inward = hull.anchor(place) - place
+        inward = hull.anchor(position) - position
         self._moving.show(_moving, part.KIND.drawn_as, slenderness)
         self._mount.show(_mount, part.KIND.drawn_as, bool(inward @ frame[0] >= 0.0))
-        self._spinning.show(
-            _propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1
-        )
+        self._spinning.show(_propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1)
         for shape in (self._moving, self._spinning, self._mount):
             put(shape.node, scale=scale)
         self._pin.show(shapes.pin, size)
         put(self._pin.node, visible=stuck)
         put(self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows)
         if not owned_by_user:
-            put(self._move, position=place)
+            put(self._move, position=position)
             put(self._axes, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))
         put(self._label, text=label, position=np.array([0.0, 0.0, 0.04 * size]))
         if is_fin:
-            place = place - 0.03 * size * frame[0]
+            position = position - 0.03 * size * frame[0]
         elif is_pod:
             column = size * shapes.COLUMN[-1, 0] * frame[0]
-            place = place + (column if inward @ frame[0] >= 0.0 else -column)
-        self._strut.show(_strut, place, hull, 0.008 * size)
+            position = position + (column if inward @ frame[0] >= 0.0 else -column)
+        self._strut.show(_strut, position, hull, 0.008 * size)
         put(self._strut.node, visible=True)
 
     def command(self, alive: bool) -> None:

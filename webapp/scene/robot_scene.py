@@ -98,13 +98,13 @@ class RobotScene:
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
         self._size = view_size(self._session.state.layout)
-        place = self._size * np.array(CAMERAS[one_of(view, "view", CAMERAS)])
+        position = self._size * np.array(CAMERAS[one_of(view, "view", CAMERAS)])
         # Lower than the robot's middle: below it stands the legend.
-        self.aim(place, np.array([0.0, 0.0, -0.02 * self._size]))
+        self.aim(position, np.array([0.0, 0.0, -0.02 * self._size]))
 
-    def aim(self, place: Array, target: Array) -> None:
+    def aim(self, position: Array, target: Array) -> None:
         """Let the camera see from a place (3,) to another one (3,) [m]."""
-        aim_camera(self._client, place, target)
+        aim_camera(self._client, position, target)
 
     @property
     def camera(self) -> tuple[Array, Array]:
@@ -115,7 +115,7 @@ class RobotScene:
         """Bring the selected fin, or the whole robot, into the middle of the view, seen from where
         it is."""
         session = self._session
-        place, target = self.camera
+        position, target = self.camera
         layout = session.state.layout
         hull = hull_of(layout)
         center = np.array(hull.center)
@@ -124,7 +124,7 @@ class RobotScene:
             place_of = layout.position[layout.index(session.selected)]
             center = place_of
             size = 0.55 * min(arrow_size(layout), 2.0 * part_size(layout))
-        way = place - target
+        way = position - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
     def _show_stage(

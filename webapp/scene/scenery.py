@@ -192,10 +192,10 @@ class SwimScene:
         put(self._reference, position=moment.reference)
         path = swimmer.path
         flow = swimmer.shown.flow
-        place = np.array(
+        position = np.array(
             [path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()]
         )
-        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
+        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), position, 0.03)
         places = moment.record[:, PLACE : PLACE + 3]
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         points = (
@@ -222,8 +222,8 @@ class SwimScene:
         along."""
         extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
         distance = max(0.18 * extent, 0.9 * size)
-        place = start + distance * np.array([-0.6, -0.75, 0.8])
-        aim_camera(self._client, place, start + distance * np.array([0.1, 0.0, -0.05]))
+        position = start + distance * np.array([-0.6, -0.75, 0.8])
+        aim_camera(self._client, position, start + distance * np.array([0.1, 0.0, -0.05]))
 
     def _pose(self, pose: Array) -> None:
         put(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))

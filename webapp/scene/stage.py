@@ -26,12 +26,12 @@ WIDE = math.radians(75.0)
 """Angle of the view [rad]."""
 
 
-def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
+def aim_camera(client: viser.ClientHandle, position: Array, target: Array) -> None:
     """Let the camera stand at a place (3,) and look at another one (3,) [m]."""
     with client.atomic():
         client.camera.fov = WIDE
         client.camera.up_direction = (0.0, 0.0, 1.0)
-        client.camera.position = place
+        client.camera.position = position
         client.camera.look_at = target
 
 

@@ -291,13 +291,13 @@ class DirectionHandle:
 
         return dragged
 
-    def show(self, place: Array | None, direction: Array, size: float, color: Rgb) -> None:
+    def show(self, position: Array | None, direction: Array, size: float, color: Rgb) -> None:
         """Show the direction (3,) of what stands at a place (3,) [m]; None hides it."""
-        put(self._root, visible=place is not None)
-        if place is not None:
+        put(self._root, visible=position is not None)
+        if position is not None:
             self._size = size
             self._direction = direction
-            put(self._root, position=place)
+            put(self._root, position=position)
             put(self._needle, scale=size)
             for end, sign in self._ends:
                 put(

@@ -46,8 +46,8 @@ class SwimSettings:
         """One field changed. FinlabError: there is no such field, or not with this value."""
         if key == "scenario":
             day = SCENARIOS[one_of(value, key, tuple(SCENARIOS))]
-            said = replace(self, announced=day.announced, path=day.trajectory)
-            return replace(said, scenario=day.name)
+            settings = replace(self, announced=day.announced, path=day.trajectory)
+            return replace(settings, scenario=day.name)
         if key == "announced" and not isinstance(value, bool):
             raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
         if key == "speed":
