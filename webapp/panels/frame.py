@@ -19,6 +19,7 @@ from webapp.handles import add_html, button, put
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
+from webapp.panels.commands import add_page_commands
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
@@ -72,11 +73,12 @@ class Section:
         """Whether it belongs to what is being done."""
         place = self.place
         opened = place.region != places.DRAWER or place.title == drawer
-        self.group.is_visible = there = task in place.tasks and place.about in about and opened
-        if there:
+        is_visible = task in place.tasks and place.about in about and opened
+        self.group.is_visible = is_visible
+        if is_visible:
             self._met = True
             self._say("")
-        return there
+        return is_visible
 
     def _fail(self, error: Exception | None) -> None:
         name = self._session.state.layout.name
@@ -96,7 +98,7 @@ class Frame:
         gui = page.gui
         gui.main_panel.dock_right()
         gui.set_panel_label("finlab")
-        places.add_keys(page)
+        add_page_commands(page)
         run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         page.board.group()

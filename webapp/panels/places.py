@@ -1,9 +1,7 @@
-"""Tables of the frame: which panel stands where, and what can be done by a key or a command
-(Ctrl+K)."""
+"""Which panel stands where on the page, and when; `Frame` builds them in this order."""
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from webapp.page import Page
 from webapp.panels.actuator_inspector import add_actuator
@@ -31,12 +29,18 @@ from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
 from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_speed, add_target
 from webapp.session.looking import CANDIDATES, NULL_SPACE, TASKS
-from webapp.session.state import LEAST
-from webapp.session.targets import PRESETS
 
-TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
-"""The bar above all; the list at the left; the inspector at the right; the drawer below; over the
-view."""
+TOP = "top"
+"""The bar above all."""
+LEFT = "left"
+"""The list at the left."""
+RIGHT = "right"
+"""The inspector at the right."""
+DRAWER = "drawer"
+"""The drawer below the view."""
+VIEW = "view"
+"""Over the view."""
+REGIONS = (TOP, LEFT, RIGHT, DRAWER, VIEW)
 DESIGN, ALLOCATE, SIMULATE, EXPORT, LOG = TASKS
 
 
@@ -44,11 +48,15 @@ class Place(NamedTuple):
     """Where a panel stands."""
 
     region: str
+    """One of `REGIONS`."""
     tasks: tuple[str, ...]
+    """Tasks in which it can be seen."""
     title: str
     """Its heading; in the drawer the name of its tab, which `DRAWERS` knows; nothing in the bar."""
     make: Callable[[Page], object]
+    """Builds it."""
     folded: bool = False
+    """Whether it is closed at first."""
     about: str = ""
     """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide`
     where a tour or a lesson must be under way; `flow` where an actuator feels it; nothing where it
@@ -91,63 +99,3 @@ PLACES = (
     Place(VIEW, TASKS, "Camera", card(camera)),
     Place(VIEW, TASKS, "Display", add_switches, folded=True),
 )
-
-
-CTRL = "cmd/ctrl"
-CTRL_SHIFT = "cmd/ctrl+shift"
-ALT = "alt"
-
-
-def add_keys(page: Page) -> None:
-    """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow
-    keys."""
-    session = page.session
-    robot = page.scenery.robot
-    swimming = page.jobs.swimming
-
-    def toggle_loss_of_selected() -> None:
-        session.toggle_loss(session.selected or session.state.layout.names[0])
-
-    # What it is called and does and, if any, its key as viser calls that, and a modifier.
-    table: list[tuple[Any, ...]] = [
-        *(
-            (task, partial(session.show_task, task), str(k + 1), ALT)
-            for k, task in enumerate(TASKS)
-        ),
-        ("Fold or open the drawer", session.fold_drawer, "J", CTRL),
-        ("Undo", session.undo, "Z", CTRL),
-        ("Redo", session.redo, "Z", CTRL_SHIFT),
-        ("Select the next fin", session.select_next, "N"),
-        ("Select nothing", partial(session.select, None), "escape"),
-        ("Duplicate the selected fin", session.duplicate, "D", CTRL),
-        ("Mirror the selected fin", session.mirror, "M"),
-        ("Delete the selected fin", session.delete, "delete"),
-        ("Add a fin", partial(session.add, "fin"), "I"),
-        ("New design", page.new),
-        ("Save the design", page.designs.save, "S", CTRL),
-        ("Share the design by a link", page.designs.share),
-        ("Unlink the selected fin from its mirror image", session.unlink),
-        ("Start over", session.start_over),
-        ("Fail or repair the selected fin", toggle_loss_of_selected, "X"),
-        *((f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
-        *((f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
-        ("Swim: pause or go on", lambda: swimming.set_running(not swimming.running), "B"),
-        ("Swim: back to the design", page.scenery.end_swim),
-        ("Frame what is selected", robot.frame, "F"),
-        ("Save the view as a picture", page.scenery.save),
-        *(
-            (f"Camera: {view}", partial(robot.look_from, view), key)
-            for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
-        ),
-        ("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
-        ("Dark or light theme", partial(session.toggle, "dark")),
-        ("Tour: start, or next stop", session.guide.tour, "T"),
-        ("Export the bundle for the robot", page.designs.bundle),
-    ]
-    for label, act, *key_and_modifier in table:
-        key, modifier = (*key_and_modifier, None, None)[:2]
-        handle = page.gui.add_command(label, hotkey=key, modifier=modifier)
-
-        @handle.on_trigger
-        async def _triggered(_event: Any, act: Callable[[], object] = act) -> None:
-            page.do(act)

@@ -1,0 +1,91 @@
+"""What can be done on a page by a key, or from its list of commands (Ctrl+K)."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+from webapp.page import Page
+from webapp.session.looking import TASKS
+from webapp.session.state import LEAST
+from webapp.session.targets import PRESETS
+
+CTRL = "cmd/ctrl"
+CTRL_SHIFT = "cmd/ctrl+shift"
+ALT = "alt"
+CAMERA_KEYS = {"3D": "1", "Top": "2", "Side": "3", "Front": "4"}
+"""Keys of the views of the camera."""
+
+
+class Command(NamedTuple):
+    """One line of the list."""
+
+    label: str
+    act: Callable[[], object]
+    key: Any = None
+    """As viser calls it; None for none."""
+    modifier: Any = None
+    """Keys that are held with it, as viser calls them."""
+
+
+def add_page_commands(page: Page) -> None:
+    """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow
+    keys."""
+    for command in page_commands(page):
+        handle = page.gui.add_command(command.label, hotkey=command.key, modifier=command.modifier)
+
+        @handle.on_trigger
+        async def _triggered(_event: Any, act: Callable[[], object] = command.act) -> None:
+            page.do(act)
+
+
+def page_commands(page: Page) -> list[Command]:
+    """All commands of one page, in the order of the list."""
+    session = page.session
+    robot = page.scenery.robot
+    swimming = page.jobs.swimming
+
+    def toggle_loss_of_selected() -> None:
+        session.toggle_loss(session.selected or session.state.layout.names[0])
+
+    def pause_or_go_on() -> None:
+        swimming.set_running(not swimming.running)
+
+    commands = []
+    for number, task in enumerate(TASKS, 1):
+        commands.append(Command(task, partial(session.show_task, task), str(number), ALT))
+    commands += [
+        Command("Fold or open the drawer", session.fold_drawer, "J", CTRL),
+        Command("Undo", session.undo, "Z", CTRL),
+        Command("Redo", session.redo, "Z", CTRL_SHIFT),
+        Command("Select the next fin", session.select_next, "N"),
+        Command("Select nothing", partial(session.select, None), "escape"),
+        Command("Duplicate the selected fin", session.duplicate, "D", CTRL),
+        Command("Mirror the selected fin", session.mirror, "M"),
+        Command("Delete the selected fin", session.delete, "delete"),
+        Command("Add a fin", partial(session.add, "fin"), "I"),
+        Command("New design", page.new),
+        Command("Save the design", page.designs.save, "S", CTRL),
+        Command("Share the design by a link", page.designs.share),
+        Command("Unlink the selected fin from its mirror image", session.unlink),
+        Command("Start over", session.start_over),
+        Command("Fail or repair the selected fin", toggle_loss_of_selected, "X"),
+    ]
+    for name in PRESETS:
+        commands.append(Command(f"Ask for: {name}", partial(session.set_preset, name)))
+    for word in LEAST:
+        commands.append(Command(f"Keep {word} least", partial(session.keep_least, word)))
+    commands += [
+        Command("Swim: pause or go on", pause_or_go_on, "B"),
+        Command("Swim: back to the design", page.scenery.end_swim),
+        Command("Frame what is selected", robot.frame, "F"),
+        Command("Save the view as a picture", page.scenery.save),
+    ]
+    for view, key in CAMERA_KEYS.items():
+        commands.append(Command(f"Camera: {view}", partial(robot.look_from, view), key))
+    commands += [
+        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        Command("Dark or light theme", partial(session.toggle, "dark")),
+        Command("Tour: start, or next stop", session.guide.tour, "T"),
+        Command("Export the bundle for the robot", page.designs.bundle),
+    ]
+    return commands
