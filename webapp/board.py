@@ -7,6 +7,7 @@ A function names the facts that it is made of as its parameters: `lambda layout,
 import inspect
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 from markupsafe import Markup, escape
@@ -22,23 +23,28 @@ UNKNOWN = object()
 """In place of what was made last, where that is not known."""
 
 
+@dataclass(eq=False)
 class Rule:
     """One property of a handle, or whatever else is done when facts change."""
 
-    def __init__(
-        self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = ""
-    ) -> None:
-        """`make` gives the value of the property `key`; where there is no handle, it does all
-        itself."""
-        self.group = group
-        self.make = make
-        self.handle = handle
-        self.key = key
-        self.names = [
-            p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty
-        ]
-        self.is_due = True
-        self.last = UNKNOWN
+    group: "Group"
+    """Whose rules are written together."""
+    make: Callable[..., Any]
+    """Gives the property's value; where there is no handle, it does all itself."""
+    handle: Any = None
+    """Whose property it is."""
+    key: str = ""
+    """Name of the property."""
+    is_due: bool = True
+    """Whether a fact has changed since it was written."""
+    last: Any = UNKNOWN
+    """What was made last."""
+    names: list[str] = field(init=False)
+    """Facts that it is made of: the parameters of `make` without defaults."""
+
+    def __post_init__(self) -> None:
+        parameters = inspect.signature(self.make).parameters.values()
+        self.names = [each.name for each in parameters if each.default is each.empty]
 
 
 class Group:
@@ -49,8 +55,10 @@ class Group:
         why."""
         self.rules: list[Rule] = []
         self.is_visible = True
+        """Whether anybody can see what the rules show."""
         self.is_due = True
-        self._failed = False
+        """Whether one of them is."""
+        self._is_hidden = False
         self._fail = fail
         self._fault = fault
 
@@ -77,13 +85,13 @@ class Group:
         except Exception as error:
             self.fail(error)
         else:
-            if self._failed:
-                self._failed = False
+            if self._is_hidden:
+                self._is_hidden = False
                 self._fail(None)
 
     def fail(self, error: Exception) -> None:
         """Hide all."""
-        self._failed = True
+        self._is_hidden = True
         self._fail(error)
         self._fault(error)
 
@@ -101,7 +109,7 @@ class Board:
         """What is drawn in the view, after all words."""
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
-        self._seen: Facts | None = None
+        self._to_draw: Facts | None = None
         """What the view shows soon."""
 
     def group(self, fail: Fail = lambda _: None, is_view: bool = False) -> Group:
@@ -143,7 +151,7 @@ class Board:
 
     def fail(self, error: Exception) -> None:
         """There are no facts: nothing is shown."""
-        self._seen = None
+        self._to_draw = None
         for group in self.groups:
             group.fail(error)
 
@@ -151,7 +159,7 @@ class Board:
         """Write what has changed where it can be seen; the rest waits until it can."""
         before = self.facts
         self.facts = facts
-        self._seen = facts
+        self._to_draw = facts
         if before is None:
             for group in self.groups:
                 for rule in group.rules:
@@ -171,5 +179,5 @@ class Board:
 
     def draw(self) -> None:
         """Write what has changed in the view."""
-        if self.view.is_due and self._seen is not None:
-            self.view.write(self._seen)
+        if self.view.is_due and self._to_draw is not None:
+            self.view.write(self._to_draw)

@@ -17,8 +17,10 @@ from finlab.swim.hull.mesh_file import Mesh
 from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
 from webapp.theme import Rgb, fin_color
 
-SHAFT, HEAD_RADIUS, HEAD_LENGTH = 1.0, 2.5, 4.2
-"""Sizes of an arrow, in radii of its shaft."""
+HEAD_RADIUS = 2.5
+"""Radius of an arrow's head, in radii of its shaft."""
+HEAD_LENGTH = 4.2
+"""Length of an arrow's head, in radii of its shaft."""
 THICKNESS = 0.007
 """Radius of the shafts of forces, for arrows of size 1 [m]."""
 DIGITS = 4
@@ -38,28 +40,28 @@ class Arrows:
             name,
             np.zeros((1, 2, 3)),
             np.zeros((1, 3), dtype=np.uint8),
-            shaft_radius=SHAFT * thickness,
+            shaft_radius=thickness,
             head_radius=HEAD_RADIUS * thickness,
             head_length=HEAD_LENGTH * thickness,
             visible=False,
         )
 
-    def show(self, starts: Array, ways: Array, colors: NDArray[np.uint8], size: float) -> None:
+    def show(self, starts: Array, vectors: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
 
         Args:
             starts: where they begin (n, 3) [m].
-            ways: from there to their tips (n, 3) [m].
+            vectors: from there to their tips (n, 3) [m].
             colors: of each (n, 3), in linear light.
             size: factor of the thickness of their shafts.
         """
-        drawn = np.linalg.norm(ways, axis=1) > SHORTEST * size
-        self.node.visible = bool(drawn.any())
-        if not drawn.any():
+        is_drawn = np.linalg.norm(vectors, axis=1) > SHORTEST * size
+        self.node.visible = bool(is_drawn.any())
+        if not is_drawn.any():
             return
-        points = np.stack([starts, starts + ways], axis=1)[drawn] / size
+        points = np.stack([starts, starts + vectors], axis=1)[is_drawn] / size
         self.node.scale = size
-        self.node.colors = colors[drawn]
+        self.node.colors = colors[is_drawn]
         self.node.points = points.round(DIGITS).astype(np.float32)
 
 

@@ -132,8 +132,8 @@ class WrenchNodes:
         asked = size * scale * target[:3]
         delivered = size * scale * got[:3]
         starts = np.stack([np.zeros(3), delivered])
-        ways = np.stack([delivered, size * scale * missing[:3]])
-        self._forces.show(starts, ways, FORCE_COLORS, size)
+        vectors = np.stack([delivered, size * scale * missing[:3]])
+        self._forces.show(starts, vectors, FORCE_COLORS, size)
         length = float(np.linalg.norm(asked))
         self._asked_force.show(asked, length, (round(length, DIGITS), size, size))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
@@ -152,13 +152,19 @@ class UnitMesh:
         self._turn = turn
         self._direction = np.zeros(3)
 
-    def show(self, way: Array, length: float, scale: tuple[float, float, float]) -> None:
-        """Turn it to a vector (3,) of a length, and scale it; one of no length is hidden."""
+    def show(self, vector: Array, length: float, scale: tuple[float, float, float]) -> None:
+        """Turn the mesh to a vector and scale it; one of no length is hidden.
+
+        Args:
+            vector: where it points (3,).
+            length: of that vector.
+            scale: of the mesh along its own axes.
+        """
         self.node.visible = is_seen = scale[0] > SHORTEST
         if not is_seen:
             return
         self.node.scale = scale
-        direction = way / length
+        direction = vector / length
         if abs(direction - self._direction).max() > 1e-4:
             self._direction = direction
             self.node.wxyz = quaternion(self._turn(direction))

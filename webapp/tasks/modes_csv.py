@@ -10,45 +10,57 @@ from finlab.arrays import Array
 from webapp.tasks.solver import Modes
 
 COMMON = ("name", "origin", "err_norm", "power_w", "effort")
+"""Columns that each row has; those of the actuators come after them."""
 
 
 def modes_csv(answer: Allocation, modes: Modes) -> bytes:
-    """The modes that are listed, then all that a network proposed, each as refined."""
-    rows = [
-        _row(
-            answer,
-            each.mode.command,
-            each.name,
-            each.badge,
-            each.mode.err_norm,
-            each.mode.power,
-            each.mode.effort,
-        )
-        for each in modes.shown
-    ]
-    for drawn in modes.refinement[-1:]:
-        figures = drawn.command, drawn.source, drawn.err_norm, drawn.power, drawn.effort
-        rows += [
-            _row(answer, command, "candidate", *rest)
-            for command, *rest in zip(*figures, strict=True)
-        ]
+    """The modes that are listed, then all that a network proposed, each as refined.
+
+    Args:
+        answer: whose modes they are.
+        modes: of it, with what a network proposed.
+
+    Returns:
+        The table as UTF-8, with a line of columns' names.
+    """
+    rows = []
+    for named in modes.shown:
+        mode = named.mode
+        figures = (named.name, named.badge, mode.err_norm, mode.power, mode.effort)
+        rows.append(_row(answer, mode.command, figures))
+    for candidates in modes.refinement[-1:]:
+        for k, command in enumerate(candidates.command):
+            figures = (
+                "candidate",
+                candidates.source[k],
+                candidates.err_norm[k],
+                candidates.power[k],
+                candidates.effort[k],
+            )
+            rows.append(_row(answer, command, figures))
+    columns = dict.fromkeys(COMMON)
+    for row in rows:
+        columns |= dict.fromkeys(row)
     text = io.StringIO(newline="")
-    table = csv.DictWriter(
-        text, [*COMMON, *dict.fromkeys(key for row in rows for key in row if key not in COMMON)]
-    )
+    table = csv.DictWriter(text, list(columns))
     table.writeheader()
     table.writerows(rows)
     return text.getvalue().encode()
 
 
-def _row(answer: Allocation, command: Array, *common: Any) -> dict[str, Any]:
+def _row(answer: Allocation, command: Array, figures: tuple[Any, ...]) -> dict[str, Any]:
+    """A line of the table: `COMMON` figures of a command (n, 3), then commands and forces of each
+    actuator; NaN is left empty."""
     forces = answer.with_command(command).forces
-    row = {key: "" if value != value else value for key, value in zip(COMMON, common, strict=True)}
-    own: Any = command_record(answer.layout, command, forces)["actuators"]
-    for part, force in zip(own, forces, strict=True):
-        row |= {f"{part['name']}.{key}": value for key, value in (part["command"] or {}).items()}
-        row |= {
-            f"{part['name']}.F{axis}_n": float(value)
-            for axis, value in zip("xyz", force, strict=True)
-        }
+    row: dict[str, Any] = {}
+    for column, value in zip(COMMON, figures, strict=True):
+        is_nan = value != value
+        row[column] = "" if is_nan else value
+    records: Any = command_record(answer.layout, command, forces)["actuators"]
+    for record, force in zip(records, forces, strict=True):
+        name = record["name"]
+        for key, value in (record["command"] or {}).items():
+            row[f"{name}.{key}"] = value
+        for axis, value in zip("xyz", force, strict=True):
+            row[f"{name}.F{axis}_n"] = float(value)
     return row
