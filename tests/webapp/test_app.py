@@ -135,11 +135,11 @@ def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) ->
             view.do(lambda layout=layout: view.session.open_layout(layout))
 
     on_loop(server, round_trip)
-    until(lambda: not view.busy)
+    until(lambda: on_loop(server, lambda: view.is_settled))  # answered, and drawn
     before = count()
     for _ in range(10):
         on_loop(server, round_trip)
-    until(lambda: not view.busy)
+    until(lambda: on_loop(server, lambda: view.is_settled))  # answered, and drawn
     assert count() == before
 
 
