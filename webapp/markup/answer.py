@@ -123,7 +123,11 @@ def fin_table(
     for i, fin in enumerate(layout.actuators):
         is_lost = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * is_lost + ["chosen"] * (fin.name == selected))
-        words = damage_words(damage, fin.name, fin.KIND.sticks_at_angle) if is_damaged and not is_lost else ""
+        words = (
+            damage_words(damage, fin.name, fin.KIND.sticks_at_angle)
+            if is_damaged and not is_lost
+            else ""
+        )
         remark = html("<div class='missing damage'>{}</div>", words) if words else ""
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
@@ -147,8 +151,14 @@ def _cells(
     meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
     if not isinstance(part, Fin):
         along = force if part.KIND.sticks_at_angle else command[0]
-        angle = round(math.degrees(command[part.KIND.stuck_number])) if part.KIND.sticks_at_angle else 0
-        remark = f"{part.type}, {angle:+d}°".replace("-", "−") if part.KIND.sticks_at_angle else part.type
+        angle = (
+            round(math.degrees(command[part.KIND.stuck_number])) if part.KIND.sticks_at_angle else 0
+        )
+        remark = (
+            f"{part.type}, {angle:+d}°".replace("-", "−")
+            if part.KIND.sticks_at_angle
+            else part.type
+        )
         words = html("<td colspan='3' class='words'>{}</td>", remark)
         cell = html(
             "<td class='{}'>{}</td>",

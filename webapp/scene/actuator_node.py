@@ -172,7 +172,9 @@ class ActuatorNode:
         inward = hull.anchor(position) - position
         self._moving.show(_moving, part.KIND.drawn_as, slenderness)
         self._mount.show(_mount, part.KIND.drawn_as, bool(inward @ frame[0] >= 0.0))
-        self._spinning.show(_propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1)
+        self._spinning.show(
+            _propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1
+        )
         for shape in (self._moving, self._spinning, self._mount):
             put(shape.node, scale=scale)
         self._pin.show(shapes.pin, size)
