@@ -69,7 +69,8 @@ class RefinedProposals(NamedTuple):
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
     """What the proposals for a single target are called: the components they come from, from 1."""
-    return tuple(f"component {k + 1}" for k in proposal.component[0])
+    names = [f"component {k + 1}" for k in proposal.component[0]]
+    return tuple(names)
 
 
 class Mdn(LearnedMethod):
