@@ -33,7 +33,7 @@ def fit() -> FinFit:
     force[OUTLIERS, 1] += 1.2 * largest
     found = samples(command, force)
     power = LAW.power(command) * (1.0 + 0.03 * np.random.default_rng(3).standard_normal(300))
-    return fit_fin(type(found)(command, force, power, found.places, ()))
+    return fit_fin(type(found)(command, force, power, found.sources, ()))
 
 
 def error_of(fit: FinFit, test: Array = TEST) -> Array:
@@ -119,7 +119,7 @@ def test_one_zero_direction_speaks_for_all() -> None:
     command = commands(120)
     command[:, 2] = 0.3
     told = samples(command, measured(law, command, 0.02))
-    found = fit_fin(type(told)(command, told.force, None, told.places, (), turned=False))
+    found = fit_fin(type(told)(command, told.force, None, told.sources, (), has_directions=False))
     truth = law.force(TEST)
     error = (
         np.linalg.norm(found.predict(TEST)[0] - truth, axis=-1)
@@ -129,7 +129,7 @@ def test_one_zero_direction_speaks_for_all() -> None:
 
 
 def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finlab.fit.fin_fit.MOST_SAMPLES", 100)
+    monkeypatch.setattr("finlab.fit.fin_fit.MAX_SAMPLES", 100)
     command = commands(130)
     found = fit_fin(samples(command, measured(LAW, command)))
     assert len(found.measurements) + len(found.outliers) == 100

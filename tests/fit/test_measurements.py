@@ -28,7 +28,7 @@ def test_a_plain_file_is_read_as_it_stands(tmp_path: Path, columns: Columns) -> 
     found = read(tmp_path, columns)
     np.testing.assert_allclose(found.command[:, 2], columns["phi"], rtol=1e-7)
     np.testing.assert_allclose(found.force[:, 1], columns["Fy"], rtol=1e-7)
-    assert found.places[3] == "cell.csv line 5" and found.notes == () and found.turned
+    assert found.sources[3] == "cell.csv line 5" and found.notes == () and found.has_directions
 
 
 def renamed(columns: Columns, name: str, header: str, factor: float) -> Columns:
@@ -60,8 +60,12 @@ def test_one_zero_direction_is_filled_by_symmetry_and_said(
 ) -> None:
     without = {k: v for k, v in columns.items() if k not in ("phi", "Fx")}
     found = read(tmp_path, without)
-    assert not found.turned and "symmetry" in found.notes[0] and "along the shaft" in found.notes[1]
-    assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).turned
+    assert (
+        not found.has_directions
+        and "symmetry" in found.notes[0]
+        and "along the shaft" in found.notes[1]
+    )
+    assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).has_directions
 
 
 def emptied(columns: Columns, tmp_path: Path) -> Path:
