@@ -126,7 +126,7 @@ def export(
     robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
     left = robot.without(gone) if gone else robot
     if graph is not None:
-        from finlab.deploy.bundle import write_graph
+        from finlab.deploy.robot_graph import write_graph
 
         write_graph(left, graph)
         print(f"{graph}: {robot.counted}, {left.n} nodes")

@@ -93,11 +93,11 @@ class Server:
         try:
             self._loop(transport)
         except EOFError:
-            transport.send(_line(self._rest()))
+            transport.send(_line(self._rest_reply()))
         except Unsent:
             raise
         except BaseException:  # an unforeseen error is raised after the fins rest
-            transport.send(_line(self._rest()))
+            transport.send(_line(self._rest_reply()))
             raise
 
     def _loop(self, transport: StandardStreams) -> None:
@@ -108,7 +108,7 @@ class Server:
                 patience = max(patience - (time.monotonic() - fresh), 0.0)
             line = transport.newest(patience)
             if line is None or self._is_late(fresh, line.since):
-                transport.send(_line(self._rest()))
+                transport.send(_line(self._rest_reply()))
                 fresh = time.monotonic()
             if line is None or self._is_late(line.since, time.monotonic()):
                 continue
@@ -116,7 +116,7 @@ class Server:
             if replies[-1]["status"] == "ok":  # an invalid request does not keep the fins beating
                 now = time.monotonic()
                 if self._is_late(line.since, now):  # the process paused while it solved
-                    replies = [self._rest()]
+                    replies = [self._rest_reply()]
                 fresh = now
             for reply in replies:
                 transport.send(_line(reply))
@@ -142,17 +142,18 @@ class Server:
                 policy=request.policy,
                 flow=request.flow,
             )
-            reply = self._reply(name, "ok", answer.command, answer.forces) | _about(answer)
+            reply = self._reply(name, "ok", answer.command, answer.forces) | _answer_record(answer)
             _line(reply)
         except _REFUSED as error:
             return [_error(name, str(error))]
         except Exception as error:  # the robot goes on, whatever is wrong
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            what = f"{type(error).__name__}, {place.name}, line {place.lineno}: {error!s:.200}"
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            problem = f"{type(error).__name__}, {frame.name}, line {frame.lineno}: {error!s:.200}"
             return [
-                self._rest(),
+                self._rest_reply(),
                 _error(
-                    name, f"the target could not be answered ({what}); the robot rests, ask again"
+                    name,
+                    f"the target could not be answered ({problem}); the robot rests, ask again",
                 ),
             ]
         self._lost = tuple(request.lost)
@@ -160,13 +161,13 @@ class Server:
         self._sent_at = time.monotonic()
         return [reply]
 
-    def _rest(self) -> dict[str, Any]:
-        now = self._sent.command if isinstance(self._sent, Allocation) else self._sent
-        rest = self._robot.neutral(self._lost, now)
+    def _rest_reply(self) -> dict[str, Any]:
+        sent = self._sent.command if isinstance(self._sent, Allocation) else self._sent
+        neutral = self._robot.neutral(self._lost, sent)
         if self._sent is not None:  # what follows begins at rest
-            self._sent = rest
+            self._sent = neutral
             self._sent_at = time.monotonic()
-        return self._reply(None, "neutral", rest)
+        return self._reply(None, "neutral", neutral)
 
     def _reply(
         self, name: Any, status: str, command: Array, forces: Array | None = None
@@ -178,7 +179,7 @@ class Server:
         return {"id": name, "status": status, **command_record(layout, command, forces)}
 
 
-def _about(answer: Allocation) -> dict[str, Any]:
+def _answer_record(answer: Allocation) -> dict[str, Any]:
     return {
         "target": plain_target(answer.target),
         "wrench": answer.wrench.tolist(),
