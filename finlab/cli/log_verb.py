@@ -46,7 +46,7 @@ def log(
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
     from finlab.log import judge, read_log
-    from finlab.log.words import judgement_text, picture
+    from finlab.log.judgement_text import judgement_text, picture
     from finlab.research.evaluation.plots import check_picture, write_picture
 
     shared_options.check_json_file(json)
