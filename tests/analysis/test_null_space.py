@@ -56,7 +56,7 @@ def test_it_has_as_many_directions_as_forces_beyond_the_rank() -> None:
         left = layout_effectiveness(layout.without(lost) if lost else layout)[layout.commanded]
         space = NullSpace(answer)
         assert len(space.basis) == left.shape[1] - np.linalg.matrix_rank(left), name
-        assert not any(set(lost) & set(space.takers(k)) for k in range(len(space.basis)))
+        assert not any(set(lost) & set(space.participants(k)) for k in range(len(space.basis)))
         moved = space.commands(np.ones((1, len(space.basis))) * 0.1)[0]
         assert [bool(np.isnan(row).all()) for row in moved] == [
             part in lost for part in layout.names

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from finlab.analysis import (
-    AXES,
     GOALS,
     Bounds,
     Progress,
@@ -16,8 +15,6 @@ from finlab.analysis import (
     mirror_pairs,
     optimize_layout,
 )
-from finlab.analysis.moves import Moves
-from finlab.analysis.slopes import Directions, Hill, Power
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
@@ -182,40 +179,6 @@ def test_what_a_robot_pushes_alone_is_not_given_for_the_weakest_direction(shippe
     found = optimize_layout(left, left.names, rounds=6)
     assert found.improved and found.axes == ("surge", "sway", "heave", "roll", "yaw")
     assert set(found.axes) <= set(found.card_after.authority.alone)
-
-
-def slopes_are_differences(hill: Hill, moves: Moves, rel: float) -> None:
-    """Along a random change, slopes agree with differences of the goal."""
-    random = np.random.default_rng(3)
-    width = moves.upper - moves.lower
-    vector = random.uniform(moves.lower, moves.upper)
-    way = random.standard_normal(len(width))
-    way *= width / np.linalg.norm(way)
-    look = hill.look(vector)
-    for _ in range(8):
-        look = hill.look(vector, look)
-    values, slopes = hill.slopes(look)
-    ends = [hill.look(vector + sign * 1e-4 * way, look).value for sign in (1.0, -1.0)]
-    slope = float(slopes[values.argmin()] @ (way / width))
-    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=rel, abs=1e-3 * abs(look.value))
-
-
-@pytest.mark.parametrize(
-    "name", ["bluerov2_heavy", "A", "turtle_hybrid", "catamaran", "fish", "hexa"]
-)
-def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
-    layout = shipped(name)
-    moves = Moves(
-        layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators}
-    )
-    axes = [axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts]
-    near = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]]
-    far = [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
-    slopes_are_differences(Directions(moves, axes, False), moves, 0.02)
-    slopes_are_differences(Power(moves, near, None), moves, 0.02)
-    slopes_are_differences(
-        Power(moves, far, None), moves, 0.1
-    )  # the nearest point by other weights
 
 
 @pytest.mark.parametrize(("goal", "least"), [("weakest_direction", 112.0), ("mission_power", -1.2)])

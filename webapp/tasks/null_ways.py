@@ -44,7 +44,7 @@ def null_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
 
 def _words(answer: Allocation, space: NullSpace, direction: int) -> tuple[str, str]:
     """What a direction is called, by numbers of actuators, and their shares in it by name."""
-    shares = space.takers(direction)
+    shares = space.participants(direction)
     most = sorted(shares, key=lambda name: -shares[name])
     numbers = sorted(
         answer.layout.index(name) + 1 for name in most[:MOST_NAMED] if shares[name] > NAMED
