@@ -1,5 +1,4 @@
-"""Pictures of robots, forces, attainable sets, ranges and swims; matplotlib is imported when one is
-drawn."""
+"""Draws robots, attainable sets, paths and ranges by matplotlib, which is imported on first use."""
 
 from __future__ import annotations
 
@@ -15,18 +14,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Okabe and Ito's, which most people can tell apart."""
-THIN = 0.15
-"""Least side of a drawn space, as a share of its longest."""
-ARROW = 0.35
-"""Longest arrow, as a share of the robot."""
-SHARPNESS = {"box": 0.2}
+"""Colours of Okabe and Ito, which people with impaired colour vision can tell apart, too."""
+MIN_SIDE = 0.15
+"""Least side of the axes' box, as a share of its longest side."""
+ARROW_LENGTH = 0.35
+"""Length of the longest arrow, as a share of the robot's size."""
+SUPERELLIPSOID_EXPONENT = {"box": 0.2}
 """Exponent of the superellipsoid that stands for a hull; 1 is an ellipsoid."""
 
 
-def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
-    """Returns a picture as the content of a file: png, svg or pdf, of `dpi` pixels per inch. Text
-    in it is no formula: it may be a stranger's. Raises ImportError: matplotlib is not installed."""
+def render(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
+    """Returns a figure as the content of a file.
+
+    Text in it is no formula: it may be a stranger's.
+
+    Args:
+        picture: draws the figure.
+        form: png, svg or pdf.
+        dpi: pixels per inch.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
     import matplotlib
 
     content = io.BytesIO()
@@ -36,13 +45,21 @@ def drawn(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
 
 
 def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
-    """Returns a robot (a `finlab.Layout`) in the body frame, with an arrow at each actuator: where
-    it points, or its force (n, 3) [N]."""
-    place = layout.position
-    arrow = np.array([part.direction for part in layout.actuators]) if forces is None else forces
-    most = float(np.linalg.norm(arrow, axis=-1).max())
+    """Returns a figure of a robot in the body frame, with an arrow at each actuator.
+
+    Args:
+        layout: a `finlab.Layout`.
+        forces: the forces (n, 3) [N] that the arrows show; the actuators' directions when None.
+    """
+    position = layout.position
+    arrow = (
+        np.array([actuator.direction for actuator in layout.actuators])
+        if forces is None
+        else forces
+    )
+    longest = float(np.linalg.norm(arrow, axis=-1).max())
     hull = None if layout.body is None else layout.body.hull
-    points = [place]
+    points = [position]
     if hull is not None and hull.size_m is not None:
         sides = np.array(hull.size_m)
         center = np.array(hull.center_m)
@@ -52,17 +69,19 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
         ball = np.stack(
             [np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1
         )
-        skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** SHARPNESS.get(hull.shape, 1.0)
+        skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** SUPERELLIPSOID_EXPONENT.get(
+            hull.shape, 1.0
+        )
         points.append(skin.reshape(-1, 3))
     size = max(float(np.ptp(np.concatenate(points), axis=0).max()), 1e-2)
-    arrow = arrow * ARROW * size / max(most, 1e-12)
-    words = layout.name if forces is None else f"{layout.name}\nlongest arrow {most:.3g} N"
-    figure, axes = _space(words, np.concatenate([*points, place + arrow]), "m")
+    arrow = arrow * ARROW_LENGTH * size / max(longest, 1e-12)
+    words = layout.name if forces is None else f"{layout.name}\nlongest arrow {longest:.3g} N"
+    figure, axes = _space(words, np.concatenate([*points, position + arrow]), "m")
     if len(points) > 1:
         axes.plot_surface(*np.moveaxis(skin, -1, 0), color=COLORS[0], alpha=0.12)
-    for k, (name, at, towards) in enumerate(zip(layout.names, place, arrow, strict=True)):
-        axes.quiver(*at, *towards, color=COLORS[k % len(COLORS)], linewidth=2.0)
-        axes.text(*at, name, fontsize="small")
+    for k, (name, point, vector) in enumerate(zip(layout.names, position, arrow, strict=True)):
+        axes.quiver(*point, *vector, color=COLORS[k % len(COLORS)], linewidth=2.0)
+        axes.text(*point, name, fontsize="small")
     return figure
 
 
@@ -81,21 +100,33 @@ def body_picture(title: str, unit: str, body: Any) -> Figure:
 
 
 def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, Array]) -> Figure:
-    """Returns a path (N, 3) beside its reference (N, 3), with marked places (3,) by their words
-    [m]."""
+    """Returns a figure of a path and its reference.
+
+    Args:
+        title: the figure's title.
+        reference: points (N, 3) [m].
+        path: points (N, 3) [m].
+        marks: points (3,) [m] that are marked, by their labels.
+    """
     figure, axes = _space(title, np.concatenate([reference, path]), "m")
     axes.plot(*reference.T, color="0.6", linewidth=3.0, label="reference")
     axes.plot(*path.T, color=COLORS[0], label="robot")
-    for words, at in marks.items():
-        axes.plot(*at[:, None], "kx")
-        axes.text(*at, words, fontsize="small")
+    for words, point in marks.items():
+        axes.plot(*point[:, None], "kx")
+        axes.text(*point, words, fontsize="small")
     axes.legend(frameon=False)
     return figure
 
 
 def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) -> Figure:
-    """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at
-    NaN."""
+    """Returns a figure of the range of each axis as a bar, none at NaN.
+
+    Args:
+        title: the figure's title.
+        names: names of the six axes.
+        low: least wrench (6,) [N, N m].
+        high: largest wrench (6,) [N, N m].
+    """
     figure, axes = panels((6.0, 2.4), 1, 2)
     width = np.nan_to_num(high - low)
     low = np.nan_to_num(low)
@@ -109,17 +140,23 @@ def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) ->
 
 
 def panels(
-    size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any
+    size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Returns a figure of this size [inches] and its panels (rows, columns), with grids; `how` goes
-    to matplotlib's `subplots`."""
+    """Returns a figure and its axes (rows, columns), with grids.
+
+    Args:
+        size: width and height [inches].
+        rows: rows of axes.
+        columns: columns of axes.
+        **options: further arguments of matplotlib's `subplots`.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout="constrained")
-    axes: Any = figure.subplots(rows, columns, squeeze=False, **how)
-    for each in axes.flat:
-        each.grid(alpha=0.3)
-        each.set_axisbelow(True)
+    axes: Any = figure.subplots(rows, columns, squeeze=False, **options)
+    for panel in axes.flat:
+        panel.grid(alpha=0.3)
+        panel.set_axisbelow(True)
     return figure, axes
 
 
@@ -132,9 +169,9 @@ def _space(title: str, points: Array, unit: str) -> tuple[Figure, Any]:
     low = points.min(axis=0)
     high = points.max(axis=0)
     middle = (low + high) / 2
-    span = np.maximum(high - low, max(THIN * float((high - low).max()), 1e-9))
-    ends = zip(middle - 0.55 * span, middle + 0.55 * span, strict=True)
-    axes.set(**dict(zip(("xlim", "ylim", "zlim"), ends, strict=True)))
+    span = np.maximum(high - low, max(MIN_SIDE * float((high - low).max()), 1e-9))
+    limits = zip(middle - 0.55 * span, middle + 0.55 * span, strict=True)
+    axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)))
     axes.set_box_aspect(span)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
     axes.set_title(title)

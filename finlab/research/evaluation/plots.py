@@ -11,7 +11,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.assets import install
-from finlab.display.pictures import COLORS, drawn, panels
+from finlab.display.pictures import COLORS, panels, render
 from finlab.errors import DataError
 from finlab.research.evaluation.document import Row
 from finlab.swim.simulation.log import RunLog
@@ -49,7 +49,7 @@ def write_picture(
     picture: Callable[[Sequence[Row]], Figure], rows: Sequence[Row], path: Path
 ) -> None:
     """Draw rows into a file, in the format of its ending; see `check_picture`."""
-    write_whole(path, drawn(lambda: picture(rows), path.suffix[1:].lower(), DPI), DataError)
+    write_whole(path, render(lambda: picture(rows), path.suffix[1:].lower(), DPI), DataError)
 
 
 def temperature_picture(rows: Sequence[Row]) -> Figure:
