@@ -167,13 +167,8 @@ def optimize_layout(
     before = measured(layout)
     search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled, mapped)
     if not moves.changes_forces:
-        sloped: SlopedGoal
-        if goal == "mission_power":
-            sloped = MissionPower(moves.smooth, mission, water)
-        else:
-            counted = axes or commanded_axes(layout)
-            sloped = WeakestDirection(moves.smooth, counted, goal == "worst_single_failure")
-        search.climb(sloped, seed)
+        counted = axes or commanded_axes(layout)
+        search.climb(_sloped_goal(goal, moves.smooth, counted, mission, water), seed)
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
@@ -198,6 +193,15 @@ def optimize_layout(
         card_before=card,
         card_after=score_card(best, flow=water) if improved else card,
     )
+
+
+def _sloped_goal(
+    goal: str, moves: Moves, axes: Sequence[MotionAxis], mission: ArrayLike, flow: Array | None
+) -> SlopedGoal:
+    """The goal of a name with its slopes; arguments as those of `optimize_layout`."""
+    if goal == "mission_power":
+        return MissionPower(moves, mission, flow)
+    return WeakestDirection(moves, axes, after_loss=goal == "worst_single_failure")
 
 
 class _Search:

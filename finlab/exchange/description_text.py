@@ -110,12 +110,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
             if dead_band:
                 values["deadband"] = dead_band
             texts.append(_plugin(form, "Thruster", values))
-    derivatives: dict[str, float] = {}
-    for field, tags in DERIVATIVES.items():
-        for tag, value in zip(tags.split(), getattr(body, field) or (), strict=False):
-            derivatives[tag] = -value
-    if derivatives:
-        texts.append(_plugin(form, "Hydrodynamics", {"link_name": ROOT, **derivatives}))
+    texts.append(_hydrodynamics(body, form))
     if mass is None:
         exchange.note("The layout has no mass: no link has one, and simulators want one.")
     exchange.note(
@@ -129,6 +124,18 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     root = ElementTree.fromstring(text)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _hydrodynamics(body: Body, form: Mapping[str, str]) -> str:
+    """The plugin with the body's added mass and damping, as derivatives after Fossen, which are
+    negative; empty where the body has neither."""
+    derivatives: dict[str, float] = {}
+    for field, tags in DERIVATIVES.items():
+        for tag, value in zip(tags.split(), getattr(body, field) or (), strict=False):
+            derivatives[tag] = -value
+    if not derivatives:
+        return ""
+    return _plugin(form, "Hydrodynamics", {"link_name": ROOT, **derivatives})
 
 
 def _base_text(body: Body, n_links: int, form: Mapping[str, str]) -> str:

@@ -134,21 +134,27 @@ class Exchange:
         Raises:
             LayoutError: there is no thruster.
         """
+        names = {thruster.name for thruster in thrusters_in(layout)}
         kinds = {
             actuator.name: actuator.type
             for actuator in layout.actuators
-            if not isinstance(actuator, Thruster)
+            if actuator.name not in names
         }
         if len(kinds) == layout.n:
             raise LayoutError(
                 f"layout {layout.name} has no thruster, and {form} has a place for these alone"
             )
         if kinds:
-            names = ", ".join(f"{name} ({kind})" for name, kind in kinds.items())
-            self.note(f"{form} has a place for thrusters alone; left out are {names}.")
+            left_out = ", ".join(f"{name} ({kind})" for name, kind in kinds.items())
+            self.note(f"{form} has a place for thrusters alone; left out are {left_out}.")
         properties = ", ".join(("power", "dead bands", "rates", *not_written))
         self.note(f"{form} has no place for {properties}.")
         return layout.without(kinds) if kinds else layout
+
+
+def thrusters_in(layout: Layout) -> tuple[Thruster, ...]:
+    """Returns the actuators of a layout that are thrusters, in order."""
+    return tuple(actuator for actuator in layout.actuators if isinstance(actuator, Thruster))
 
 
 def vector(values: Array) -> Vector:

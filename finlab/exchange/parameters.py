@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from finlab.errors import LayoutError
-from finlab.exchange.exchange import TO_FRD, Exchange
+from finlab.exchange.exchange import TO_FRD, Exchange, thrusters_in
 from finlab.exchange.matrix_table import is_number
-from finlab.layout import Layout, Thruster
+from finlab.layout import Layout
 
 MAX_LINE_LENGTH = 500
 """Most characters of a line that are parsed."""
@@ -152,8 +152,7 @@ def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
     Raises:
         LayoutError: there is no thruster, or there are too many.
     """
-    actuators = exchange.thrusters_of(layout, "PX4").actuators
-    thrusters = [actuator for actuator in actuators if isinstance(actuator, Thruster)]
+    thrusters = thrusters_in(exchange.thrusters_of(layout, "PX4"))
     if len(thrusters) > MAX_ROTORS:
         raise LayoutError(
             f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(thrusters)}"

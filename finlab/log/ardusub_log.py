@@ -8,11 +8,12 @@ less full (ArduSub, `AP_Motors6DOF`).
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
@@ -21,6 +22,8 @@ from finlab.log.recorded import TRUNCATED, Event, LogRecord, Series, silenced
 
 MAGIC = b"\xa3\x95"
 """The first bytes of each message, and so of a file."""
+HEAD_BYTES = 3
+"""Bytes before the values of a message: MAGIC and its kind."""
 REST_US = 1500.0
 """Pulse of a motor at rest [us]."""
 FULL_US = 400.0
@@ -43,45 +46,25 @@ Columns = dict[str, Any]
 
 
 def read_dataflash(path: Path) -> LogRecord:
-    """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
-    tables, complete = _read_tables(path)
+    """Reads a log of ArduSub.
+
+    Args:
+        path: the file.
+
+    Raises:
+        DataError: it lacks demands, or is of another vehicle.
+        Exception: of any class, where the file is damaged.
+    """
+    tables, is_complete = _read_tables(path)
     messages = [*_message_rows(tables, "MSG", "time", "Message")]
-    if vehicle := next(
-        (match for _, words in messages if (match := OTHER_VEHICLE.match(words))), None
-    ):
-        raise DataError(
-            f"{path}: is a log of {vehicle[0]}, expected one of ArduSub, whose demands are known"
-        )
-    if (rates := tables.get("RATE")) is None:
-        present = ", ".join(sorted(tables)) or "nothing"
-        lacks = f"holds no RATE, expected the demands of ArduSub; it has {present}"
-        raise DataError(f"{path}: {lacks}; set LOG_BITMASK so that it logs attitude rates")
+    rates = _checked_rates(path, tables, [words for _, words in messages])
     parameters = {
         name: float(value) for name, value in _message_rows(tables, "PARM", "Name", "Value")
     }
-    time = rates["time"]
-    throttle = rates.get("AOut")
-    sticks = tables.get("RCIN", {})
-    if throttle is None and (control := tables.get("CTUN")):
-        throttle = _values_at(control, "ThO", time)[:, 0]
-    heave = (
-        np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
-    )
-    channels = {
-        name: int(parameters.get(f"RCMAP_{name}", usual)) for name, usual in STICK_CHANNELS.items()
-    }
-    forward, lateral = (_stick(sticks, parameters, channel, time) for channel in channels.values())
-    setpoints = [forward, -lateral, heave, rates["ROut"], -rates["POut"], -rates["YOut"]]
-    record = LogRecord("ardusub", Series.of(time, np.stack(setpoints, axis=1)))
-    if not complete:
+    record = LogRecord("ardusub", _demands(tables, rates, parameters))
+    if not is_complete:
         record.notes.append(TRUNCATED)
-    missing = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
-    for name in missing:
-        how = f"log RCIN, channel {channels[name]} (LOG_BITMASK)"
-        record.asks.append(f"It holds no {name.lower()} demand: that axis is not judged; {how}.")
-    if len(missing) < len(channels):
-        how = "modes that steer them log none"
-        record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {how}.")
+    _note_sticks(record, tables, parameters)
     _read_outputs(record, tables, parameters)
     frame = {
         name: value for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))
@@ -89,14 +72,70 @@ def read_dataflash(path: Path) -> LogRecord:
     if record.describe(read_parameters_of_ardusub, frame, path.stem):
         guesses = "guesses are taken; name the robot by --robot LAYOUT"
         record.lacking.append(f"A frame of ArduSub has no arms and no newtons: {guesses}.")
-    record.events += [
-        Event(time_of, words) for time_of, words in messages if REPORTED.search(words)
-    ]
-    record.events += [
-        Event(time_of, f"error {code} of ArduPilot's subsystem {subsystem}")
-        for time_of, subsystem, code in _message_rows(tables, "ERR", "time", "Subsys", "ECode")
-    ]
+    for time, words in messages:
+        if REPORTED.search(words):
+            record.events.append(Event(time, words))
+    for time, subsystem, code in _message_rows(tables, "ERR", "time", "Subsys", "ECode"):
+        words = f"error {code} of ArduPilot's subsystem {subsystem}"
+        record.events.append(Event(time, words))
     return record
+
+
+def _checked_rates(path: Path, tables: dict[str, Columns], messages: list[str]) -> Columns:
+    """The columns of RATE; an error where the log is of another vehicle, or has none."""
+    for words in messages:
+        vehicle = OTHER_VEHICLE.match(words)
+        if vehicle:
+            raise DataError(
+                f"{path}: is a log of {vehicle[0]}, expected one of ArduSub, whose demands are "
+                "known"
+            )
+    if "RATE" not in tables:
+        present = ", ".join(sorted(tables)) or "nothing"
+        lacks = f"holds no RATE, expected the demands of ArduSub; it has {present}"
+        raise DataError(f"{path}: {lacks}; set LOG_BITMASK so that it logs attitude rates")
+    return tables["RATE"]
+
+
+def _stick_channels(parameters: dict[str, float]) -> dict[str, int]:
+    """The channel of each demand of the pilot."""
+    return {
+        name: int(parameters.get(f"RCMAP_{name}", default))
+        for name, default in STICK_CHANNELS.items()
+    }
+
+
+def _demands(tables: dict[str, Columns], rates: Columns, parameters: dict[str, float]) -> Series:
+    """Demands (N, 6), FLU, -1 to 1, at the times of RATE; ArduSub's roll is FLU's, its pitch and
+    yaw have the other sign, and its throttle goes from 0 to 1."""
+    time = rates["time"]
+    throttle = rates.get("AOut")
+    if throttle is None and "CTUN" in tables:
+        throttle = _values_at(tables["CTUN"], "ThO", time)[:, 0]
+    heave = np.zeros(len(time))
+    if throttle is not None:
+        heave = 2.0 * np.asarray(throttle, np.float64) - 1.0
+    channels = _stick_channels(parameters)
+    sticks = tables.get("RCIN", {})
+    forward = _stick(sticks, parameters, channels["FORWARD"], time)
+    lateral = _stick(sticks, parameters, channels["LATERAL"], time)
+    setpoints = [forward, -lateral, heave, rates["ROut"], -rates["POut"], -rates["YOut"]]
+    return Series.of(time, np.stack(setpoints, axis=1))
+
+
+def _note_sticks(
+    record: LogRecord, tables: dict[str, Columns], parameters: dict[str, float]
+) -> None:
+    """Adds sentences on the demands of the pilot, and on those that the log lacks."""
+    channels = _stick_channels(parameters)
+    sticks = tables.get("RCIN", {})
+    missing = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
+    for name in missing:
+        remedy = f"log RCIN, channel {channels[name]} (LOG_BITMASK)"
+        record.asks.append(f"It holds no {name.lower()} demand: that axis is not judged; {remedy}.")
+    if len(missing) < len(channels):
+        reason = "modes that steer them log none"
+        record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {reason}.")
 
 
 def _message_rows(
@@ -109,8 +148,10 @@ def _message_rows(
 
 
 def _read_tables(path: Path) -> tuple[dict[str, Columns], bool]:
-    """Columns of the wanted messages by their names, and whether the last message is whole.
-    pymavlink says where they lie, numpy reads them all at once."""
+    """Columns of the MESSAGES by name, and whether the last message of the file is whole.
+
+    pymavlink finds where messages lie; numpy reads all of one kind at once.
+    """
     from pymavlink import DFReader
 
     class Index(silenced(DFReader).DFReader_binary):  # type: ignore[misc]  # it ships no types
@@ -122,39 +163,55 @@ def _read_tables(path: Path) -> tuple[dict[str, Columns], bool]:
     tables = {}
     with Index(str(path)) as log:
         content = np.frombuffer(bytes(log.data_map), np.uint8)
-        message_ends = [
-            log.offsets[row_type][-1] + format.len
-            for row_type, format in log.formats.items()
-            if log.offsets[row_type]
-        ]
+        message_ends = []
+        for kind, message in log.formats.items():
+            if log.offsets[kind]:
+                message_ends.append(log.offsets[kind][-1] + message.len)
         for name in MESSAGES:
-            if (format := log.formats.get(log.name_to_id.get(name))) is None:
+            message = log.formats.get(log.name_to_id.get(name))
+            if message is None:
                 continue
-            codes = [DFReader.FORMAT_TO_STRUCT[letter] for letter in format.format]
-            dtypes = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
-            row_type = np.dtype([*zip(format.columns, dtypes, strict=True)])
-            starts = np.asarray(log.offsets[format.type], np.intp) + 3
-            starts = starts[starts + row_type.itemsize <= len(content)]
-            rows = content[starts[:, None] + np.arange(row_type.itemsize)].view(row_type)[:, 0]
-            if len(rows):
-                units = zip(format.columns, codes, strict=True)
-                tables[name] = {
-                    column: rows[column] * unit if unit else rows[column]
-                    for column, (_, unit, _) in units
-                }
-                tables[name]["time"] = tables[name]["TimeUS"] * 1e-6
+            codes = [DFReader.FORMAT_TO_STRUCT[letter] for letter in message.format]
+            table = _read_columns(content, message.columns, codes, log.offsets[message.type])
+            if table:
+                table["time"] = table["TimeUS"] * 1e-6
+                tables[name] = table
     return tables, max(message_ends, default=0) <= len(content)
 
 
+def _read_columns(
+    content: NDArray[np.uint8], names: Sequence[str], codes: Sequence[Any], offsets: Sequence[int]
+) -> Columns:
+    """Columns of one kind of message; empty where no whole message is in the file.
+
+    Args:
+        content: the bytes of the file.
+        names: names of the columns.
+        codes: of each its code of `struct`, its unit or None, and its type.
+        offsets: where the messages begin.
+    """
+    dtypes = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
+    row_type = np.dtype([*zip(names, dtypes, strict=True)])
+    starts = np.asarray(offsets, np.intp) + HEAD_BYTES
+    starts = starts[starts + row_type.itemsize <= len(content)]
+    rows = content[starts[:, None] + np.arange(row_type.itemsize)].view(row_type)[:, 0]
+    if not len(rows):
+        return {}
+    columns = {}
+    for name, (_, unit, _) in zip(names, codes, strict=True):
+        columns[name] = rows[name] * unit if unit else rows[name]
+    return columns
+
+
 def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Array) -> Array:
-    """What a stick of the pilot asked for at times (N,), -1 to 1; NaN where its channel is not
+    """The demand of a stick of the pilot at times (N,), -1 to 1; NaN where its channel is not
     logged."""
-    if (pulses := sticks.get(f"C{channel}")) is None:
+    pulses = sticks.get(f"C{channel}")
+    if pulses is None:
         return np.full(len(time), np.nan)
-    minimum, trim, maximum = (
-        parameters.get(f"RC{channel}_{key}", value)
-        for key, value in (("MIN", 1100), ("TRIM", 1500), ("MAX", 1900))
-    )
+    minimum = parameters.get(f"RC{channel}_MIN", 1100)
+    trim = parameters.get(f"RC{channel}_TRIM", 1500)
+    maximum = parameters.get(f"RC{channel}_MAX", 1900)
     pulse_points = np.maximum.accumulate([minimum, trim, maximum])
     share = np.interp(np.where(pulses > 0, pulses, trim), pulse_points, [-1.0, 0.0, 1.0])
     sign = -1.0 if parameters.get(f"RC{channel}_REVERSED", 0) else 1.0
@@ -164,9 +221,10 @@ def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Ar
 def _read_outputs(
     record: LogRecord, tables: dict[str, Columns], parameters: dict[str, float]
 ) -> None:
-    """Shares of full output of the motors, as their frame says which way they push, and what ESCs
-    say."""
-    if (pulses := tables.get("RCOU")) is None:
+    """Adds the motors' shares of full output, signed as their frame has them, and their speeds by
+    ESCs."""
+    pulses = tables.get("RCOU")
+    if pulses is None:
         return
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}
     if not any(FIRST_MOTOR <= function < FIRST_MOTOR + MOTORS for function in functions):
@@ -179,7 +237,8 @@ def _read_outputs(
     speeds = []
     for motor in range(MOTORS):
         channel = functions.get(FIRST_MOTOR + motor, 0)
-        if (pulse := pulses.get(f"C{channel}")) is None:
+        pulse = pulses.get(f"C{channel}")
+        if pulse is None:
             break
         sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
         shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
@@ -192,5 +251,5 @@ def _read_outputs(
 
 
 def _values_at(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:
-    """What a column held at times (N,), as (N, 1)."""
+    """The last values of a column at times (N,), as (N, 1)."""
     return Series.of(table["time"][rows], table[column][rows][:, None]).at(time)

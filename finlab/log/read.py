@@ -212,16 +212,14 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
     asks = [*record.asks]
     demand = record.demand.at(time) * np.where(robot.commanded, unit, np.nan)
     is_kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MAX_DEMAND).any(axis=1)
-    command = unmet = None
+    command = None
+    unmet = None
     if record.outputs is not None:
         command = commands_of(record, record.outputs.values, robot, signs)
-        for i, k in _stopped_thrusters(command, record.turns, time, robot):
-            words = "stood still from here on although it was told to push"
-            record.events.append(Event(float(time[k]), words, i))
-            command[k:, i] = np.nan
-        idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
-        is_kept &= ~idle
-        if idle.any():
+        record.events += _stop_thrusters(command, record.turns, time, robot)
+        is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
+        is_kept &= ~is_idle
+        if is_idle.any():
             notes.append("Times at which no output moved, such as before arming, are left out.")
     else:
         asks.append(
@@ -239,13 +237,10 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
             f"{source}: holds {len(time):,} samples, expected up to {MAX_SAMPLES:,}; cut it"
         )
     step = np.diff(time, append=time[-1] + np.median(np.diff(time)))
-    if (gap_s := float(np.maximum(step - GAP_S, 0.0)[is_kept].sum())) > 0.0:
-        notes.append(f"Gaps between samples, {gap_s:.0f} s beyond {GAP_S:g} s each, are left out.")
-    if jump_s := max(series.max_jump_back, record.demand.max_jump_back):
-        notes.append(
-            f"Its clock jumps back, by up to {jump_s:.3g} s; samples were sorted by their times."
-        )
-    if undriven := [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]:
+    jump_s = max(series.max_jump_back, record.demand.max_jump_back)
+    notes += _notes_on_time(step[is_kept], jump_s)
+    undriven = [axis for axis, size in zip(AXES, unit, strict=True) if np.isnan(size)]
+    if undriven:
         notes.append(
             f"No thruster drives {', '.join(undriven)}; what was asked there is not judged."
         )
@@ -262,6 +257,37 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
+
+
+def _notes_on_time(step: Array, jump_s: float) -> list[str]:
+    """Sentences on gaps between samples and on a clock that jumps back.
+
+    Args:
+        step: times from each sample to the next (N,) [s].
+        jump_s: largest step of the clock backwards [s].
+    """
+    notes = []
+    gap_s = float(np.maximum(step - GAP_S, 0.0).sum())
+    if gap_s > 0.0:
+        notes.append(f"Gaps between samples, {gap_s:.0f} s beyond {GAP_S:g} s each, are left out.")
+    if jump_s:
+        notes.append(
+            f"Its clock jumps back, by up to {jump_s:.3g} s; samples were sorted by their times."
+        )
+    return notes
+
+
+def _stop_thrusters(
+    command: Array, turns: Series | None, time: Array, robot: Layout
+) -> list[Event]:
+    """Sets commands (N, n, 3) of thrusters that stopped turning to NaN from then on; returns the
+    events."""
+    events = []
+    for i, k in _stopped_thrusters(command, turns, time, robot):
+        words = "stood still from here on although it was told to push"
+        events.append(Event(float(time[k]), words, i))
+        command[k:, i] = np.nan
+    return events
 
 
 def _stopped_thrusters(
