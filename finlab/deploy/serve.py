@@ -40,15 +40,16 @@ from finlab.files.guarded import decoded
 from finlab.files.schema import checked
 from finlab.physics import plant_of
 
-RECENT_S = 0.5  # age [s] up to which the last commands bind the next ones by the servos' rates
-
-MAX_ID = 1_000  # longest `id`, as JSON [characters]
+RECENT_S = 0.5
+"""Age up to which the last commands limit the next ones by the drives' rates [s]."""
+MAX_ID = 1_000
+"""Longest `id`, as JSON [characters]."""
 _REFUSED = (CommandError, LayoutError, AllocationError)
-"""What is wrong with a request; anything else is a fault of the robot's files or of ours."""
+"""Errors of a request; any other one is a fault of the robot's files or of finlab."""
 
 
 class Request(Struct, forbid_unknown_fields=True):
-    """What a request may hold. The allocator checks its arrays."""
+    """The content of a request. The allocator checks its arrays."""
 
     wrench: Any
     id: Any = None
@@ -101,7 +102,8 @@ class Server:
             raise
 
     def _loop(self, transport: StandardStreams) -> None:
-        fresh = time.monotonic()  # when the last good target came
+        """Answers requests until they end; rests the robot where none comes in time."""
+        fresh = time.monotonic()  # when the last good target arrived
         while True:
             patience = self._watchdog
             if patience is not None:
@@ -122,11 +124,15 @@ class Server:
                 transport.send(_line(reply))
 
     def _is_late(self, since: float, now: float) -> bool:
+        """Whether more time than the watchdog allows lies between two times [s]."""
         return now - since > (math.inf if self._watchdog is None else self._watchdog)
 
     def answers(self, line: bytes) -> list[dict[str, Any]]:
-        """The answer to one request, as plain values; where it is good and the solve failed, rest
-        comes first, and then the error."""
+        """Returns the replies to one request as plain values.
+
+        It is one reply; where a valid request could not be answered, the neutral command comes
+        before the error.
+        """
         name: Any = None
         fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
