@@ -23,7 +23,7 @@ measured = wrench + 0.02 * wrench.std(axis=0) * rng.normal(size=wrench.shape)
 
 # %%
 fit = fit_constants(Samples(believed, command, measured))
-print(f"laws alone miss {fit.laws:.3f} of the yardstick, with jets {fit.left:.3f}")
+print(f"laws alone miss {fit.laws:.3f} of the wrench scale, with jets {fit.left:.3f}")
 print(fit.jets)
 
 # %%

@@ -202,7 +202,7 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
+        "The reference is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
         "and tables: "
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
         f"error up to {TRACKED_ERROR:g} by the plant. Effort is the paper's J_en."

@@ -53,7 +53,7 @@ CALLS_THE_CORE = {
     "tests/allocation/test_contract.py": 1,
     "tests/allocation/dual": 1,
     "tests/allocation": 2,
-    "tests/interaction": 2,
+    "tests/interaction": 1,
     "tests/forces": 2,
 }
 """Tests of what calls the core in C, and how many imports they are off a C file at most."""
@@ -248,13 +248,16 @@ def distance_by_name(test: str, source: str) -> int:
     """Returns the distance of a test file by its name and folder.
 
     It is 0 where it is called after the changed file and its folder mirrors that file's,
-    FOLDER_DISTANCE where the folder alone does, and 99 elsewhere; of C files see CALLS_THE_CORE.
+    FOLDER_DISTANCE where the folder alone does, and 99 elsewhere. Of C files, whose tests stand in
+    several folders, the name is enough; for other tests of them see CALLS_THE_CORE.
 
     Args:
         test: the test file.
         source: the changed file.
     """
     if source.endswith((".c", ".h")):
+        if Path(test).stem == f"test_{Path(source).stem}" and not test.startswith("tests/webapp/"):
+            return 0
         distances = [
             distance
             for prefix, distance in CALLS_THE_CORE.items()

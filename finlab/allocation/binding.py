@@ -38,8 +38,8 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
         row = command[..., i, :]
         low = np.array(part.lower)
         high = np.array(part.upper)
-        pushes = not part.BY_FLOW
-        angle = -1 if part.ANGLE is None else part.ANGLE
+        pushes = not part.KIND.driven_by_flow
+        angle = -1 if part.KIND.aiming_number is None else part.KIND.aiming_number
         angle = angle if pushes else 0  # all that a foil is told
         slack = WITHIN * (high - low) + ROUNDING
         at_low = row <= low + slack
@@ -79,8 +79,10 @@ def rate_words(layout: Layout, previous: Array, command: Array, period_s: float)
     for part, before, now in zip(layout.actuators, previous, command, strict=True):
         step = np.array(part.rates) * period_s
         change = np.abs(now - before)
-        if part.ANGLE is not None:
-            change[part.ANGLE] = abs(float(wrapped(now[part.ANGLE] - before[part.ANGLE])))
+        if part.KIND.aiming_number is not None:
+            change[part.KIND.aiming_number] = abs(
+                float(wrapped(now[part.KIND.aiming_number] - before[part.KIND.aiming_number]))
+            )
         if (np.isfinite(step) & (change >= (1.0 - WITHIN) * step)).any():
             words.append(f"rate of {part.name}")
     return tuple(words)
@@ -94,8 +96,8 @@ def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
         band = getattr(part, "dead_band", 0.0)
         if (
             band > 0.0
-            and part.THRUST is not None
-            and abs(row[part.THRUST]) <= (1.0 + WITHIN) * band
+            and part.KIND.force_number is not None
+            and abs(row[part.KIND.force_number]) <= (1.0 + WITHIN) * band
         ):
             words.append(f"dead band of {part.name}")
     return tuple(words)

@@ -213,7 +213,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
     notes = _made(layout, layout.stamps)
-    foils = [part for part in layout.actuators if part.BY_FLOW]
+    foils = [part for part in layout.actuators if part.KIND.driven_by_flow]
     if flow is None and not foils:
         return notes
     if flow is None:
@@ -231,7 +231,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         )
         return (*notes, taken) if guessed else notes
     if not foils:
-        kind = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
+        kind = next(name for name, kind in KINDS.items() if kind.KIND.driven_by_flow)
         return (
             *notes,
             f"the flow is without effect: layout {layout.name} has no {kind}, and what speed "
@@ -239,7 +239,9 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
             "water takes from other actuators is not known",
         )
     models = {
-        part.name: getattr(part, "model", None) for part in layout.actuators if not part.BY_FLOW
+        part.name: getattr(part, "model", None)
+        for part in layout.actuators
+        if not part.KIND.driven_by_flow
     }
     tables = ", ".join(name for name, model in models.items() if model and model.type == "table")
     speed = (f"the tables of {tables} hold forces at rest; what speed changes is not known",)

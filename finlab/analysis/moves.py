@@ -113,7 +113,7 @@ def is_mirrored(first: Actuator, second: Actuator, tolerance: float = MIRROR_TOL
         tolerance: largest difference of positions [m] and directions [rad]. Shafts of fins have to
             point the same way, other axes may point either way.
     """
-    count = len(first.AXES)
+    count = len(first.KIND.axes)
     image = np.array(first.frame)[:count] * MIRROR
     axes = np.array(second.frame)[:count]
     distance = np.abs(np.subtract(second.position, MIRROR * first.position)).max()

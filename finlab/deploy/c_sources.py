@@ -184,7 +184,7 @@ def _rows_of_commands(layout: Layout, prefix: str) -> str:
     """An enumeration of the rows of commands, with the meaning of their numbers."""
     lines = []
     for name, actuator in zip(layout.names, layout.actuators, strict=True):
-        numbers = ", ".join(f"{label} [{unit}]" for label, unit in actuator.NUMBERS)
+        numbers = ", ".join(number.label for number in actuator.KIND.numbers)
         lines.append(f"  {prefix}_{_identifier(name).upper()}, /* {name}: {numbers} */")
     rows = "\n".join(lines)
     return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"

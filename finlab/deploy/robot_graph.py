@@ -40,11 +40,11 @@ def features_of(actuator: Actuator) -> dict[str, float]:
         for name, axis in zip(("first axis", "second axis"), actuator.frame, strict=False):
             for letter, value in zip("xyz", axis, strict=True):
                 features[f"{name} {letter}"] = float(value)
-    for (name, unit), low, high in zip(
-        actuator.NUMBERS, actuator.lower, actuator.upper, strict=False
+    for number, low, high in zip(
+        actuator.KIND.numbers, actuator.lower, actuator.upper, strict=False
     ):
-        features[f"{name}_min [{unit}]"] = float(low)
-        features[f"{name}_max [{unit}]"] = float(high)
+        features[f"{number.name}_min [{number.unit}]"] = float(low)
+        features[f"{number.name}_max [{number.unit}]"] = float(high)
     return features
 
 

@@ -10,7 +10,7 @@ from html import escape
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from finlab.axes import Vector
+from finlab.axes import Vector3
 from finlab.exchange.description_body import DERIVATIVES
 from finlab.exchange.exchange import Exchange
 from finlab.layout import Actuator, Body, Layout
@@ -60,9 +60,9 @@ class _Link(NamedTuple):
     name: str
     parent: str
     """The link that its joint is mounted on."""
-    position: Vector
+    position: Vector3
     """(3,) [m] in the frame of that link."""
-    axis: Vector
+    axis: Vector3
     """The axis (3,) of the joint, of length 1."""
     limits: tuple[float, float] | None
     """Least and greatest angle [rad]; None where it turns freely."""
@@ -100,11 +100,11 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         axis = _text(link.axis)
         texts.append(form["joint"].format(**fields, kind=kind, axis=axis, limit=limit))
     for actuator in layout.actuators:
-        if actuator.THRUST is not None:
+        if actuator.KIND.force_number is not None:
             values: dict[str, str | float] = {
                 "joint_name": f"{actuator.name}_joint",
-                "min_thrust_cmd": actuator.lower[actuator.THRUST],
-                "max_thrust_cmd": actuator.upper[actuator.THRUST],
+                "min_thrust_cmd": actuator.lower[actuator.KIND.force_number],
+                "max_thrust_cmd": actuator.upper[actuator.KIND.force_number],
             }
             dead_band = getattr(actuator, "dead_band", 0.0)
             if dead_band:
@@ -116,7 +116,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     exchange.note(
         "A robot description has no place for power, reaction torques, rates and buoyancy."
     )
-    if any(actuator.THRUST is None for actuator in layout.actuators):
+    if any(actuator.KIND.force_number is None for actuator in layout.actuators):
         exchange.note(
             "Others than thrusters are joints that push nothing; --fins names the fins among them."
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
-from finlab.axes import Vector
+from finlab.axes import Vector3
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Thruster
 
@@ -157,7 +157,7 @@ def thrusters_in(layout: Layout) -> tuple[Thruster, ...]:
     return tuple(actuator for actuator in layout.actuators if isinstance(actuator, Thruster))
 
 
-def vector(values: Array) -> Vector:
+def vector(values: Array) -> Vector3:
     """Returns an array (3,) as a tuple of floats; rounding errors of 0 become 0."""
     x, y, z = (0.0 if abs(value) < 1e-15 else float(value) for value in values)
     return x, y, z

@@ -27,7 +27,8 @@ from msgspec import Meta, inspect
 
 from finlab.errors import FinlabError, LayoutError
 
-Kind = TypeVar("Kind")
+Checkable = TypeVar("Checkable")
+"""A type that plain values are checked against."""
 
 _MESSAGE_AND_PATH = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
 """A message of msgspec and the path that it names, such as `$.actuators[2].name`."""
@@ -55,11 +56,11 @@ def shown(value: Any) -> str:
 
 def checked(
     values: Any,
-    kind: type[Kind],
+    kind: type[Checkable],
     error: type[FinlabError] = LayoutError,
     source: str = "",
     key: str = "",
-) -> Kind:
+) -> Checkable:
     """Returns plain values, such as those of a file, as a value of a type.
 
     Args:
@@ -355,9 +356,7 @@ def form(
         if kind is not None and name in may_be_left_out
     ]
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
-    first_paragraph = " ".join((cls.__doc__ or "").split("\n\n")[0].split())
-    summary = first_paragraph.replace(" Checked on construction.", "")
-    namespace: dict[str, Any] = {"__doc__": summary, "stands_for": cls}
+    namespace: dict[str, Any] = {"__doc__": _summary(cls), "stands_for": cls}
     if tag is None and issubclass(cls, Checked) and cls.type:
         tag = ("type", cls.type)
     key, value = tag or (None, None)
@@ -370,6 +369,14 @@ def form(
         tag_field=key,
         tag=value,
     )
+
+
+def _summary(cls: type) -> str:
+    """The first paragraph of a class's docstring on one line, for the schema; without the sentence
+    that its values are checked, which is of no use to who writes a file."""
+    paragraph = (cls.__doc__ or "").split("\n\n")[0]
+    words = " ".join(paragraph.split())
+    return words.replace(" Checked on construction.", "")
 
 
 def given(part: Any) -> dict[str, Any]:

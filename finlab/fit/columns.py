@@ -248,7 +248,7 @@ def command_columns(layout: Layout) -> list[list[str]]:
     """Returns for each actuator the columns of its command, `NAME.number`, such as `bow.force`."""
     columns = []
     for actuator in layout.actuators:
-        columns.append([f"{actuator.name}.{name}" for name, _ in actuator.NUMBERS])
+        columns.append([f"{actuator.name}.{number.name}" for number in actuator.KIND.numbers])
     return columns
 
 

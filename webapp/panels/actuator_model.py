@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
+from finlab.actuators.fin.fin_laws import PLANAR_LAWS
 from finlab.actuators.fin.fin_model import DOUBT
 from finlab.actuators.fin.table_law import TableLaw
 from finlab.actuators.thrust_model import PowerTable
@@ -31,6 +32,7 @@ LAWS = {
     "power_law": "power that grows with a power of the force",
     "foil": "lift and drag of a foil; at rest it gives nothing",
 }
+"""Model -> what it is, in words of the app; see `law_words`."""
 HEIGHT = 140
 """Height of a plot [px]."""
 SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
@@ -54,7 +56,7 @@ def add_model(page: Page) -> None:
     """The choice of a formula, and what is said of it."""
 
     def options(part: Actuator) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*part.MODELS, part.model_type)))
+        return tuple(dict.fromkeys((*part.KIND.models, part.model_type)))
 
     def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
         part = part_shown(selected, layout)
@@ -63,7 +65,7 @@ def add_model(page: Page) -> None:
 
     about = "The formula that gives force and power; a table comes from a file, below."
     kinds = page.board.show(
-        page.gui.add_dropdown("Model", NOMINAL.MODELS, hint=about), options=of_part(options)
+        page.gui.add_dropdown("Model", NOMINAL.KIND.models, hint=about), options=of_part(options)
     )
     page.board.show(kinds, visible=of_part(lambda part: len(options(part)) > 1))
     page.bind(kinds, page.session.choose_model, of_part(lambda part: part.model_type))
@@ -137,8 +139,20 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
         (last, *_) = model.rows[-1]
         said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
         return html(f"<div class='fl dim'>{said}</div>", len(model.rows), first, last, model.unit)
-    said = LAWS.get(part.model_type, f"a law of its own kind, {part.type}")
+    said = law_words(part)
     return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
+
+
+def law_words(part: Actuator) -> str:
+    """What the formula of an actuator is, without a full stop: the words of `LAWS`, else, of a fin
+    law, the summary of its class."""
+    kind = part.model_type
+    if kind in LAWS:
+        return LAWS[kind]
+    if isinstance(part, Fin) and kind in PLANAR_LAWS:
+        summary = (PLANAR_LAWS[kind].__doc__ or f"the law {kind}").split("\n\n")[0]
+        return " ".join(summary.split()).removesuffix(".")
+    return f"a law of its own kind, {part.type}"
 
 
 def _table_words(fin: Fin, doubts: bool) -> str:
@@ -221,7 +235,7 @@ def curves(part: Actuator) -> Sequence[Curves]:
             Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True)))
             for up, y in kinds
         ]
-    if part.BY_FLOW:
+    if part.KIND.driven_by_flow:
         across = np.linspace(part.lower[0], part.upper[0], POINTS)
         command = np.zeros((POINTS, 1, 3))
         command[:, 0, 0] = across
@@ -237,9 +251,11 @@ def curves(part: Actuator) -> Sequence[Curves]:
         word = f"command [{model.unit}]" if model.unit else "command"
         pairs = (("force [N]", force), ("power [W]", power))
         return [Curves(word, across, up, (("", y),)) for up, y in pairs]
-    if part.THRUST is None:
+    if part.KIND.force_number is None:
         return []
-    across = np.linspace(part.lower[part.THRUST], part.upper[part.THRUST], POINTS)
+    across = np.linspace(
+        part.lower[part.KIND.force_number], part.upper[part.KIND.force_number], POINTS
+    )
     command = np.zeros((POINTS, 1, 3))
-    command[:, 0, part.THRUST] = across
+    command[:, 0, part.KIND.force_number] = across
     return [Curves("force [N]", across, "power [W]", (("", plant.power(command)[:, 0]),))]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.actuator import Places
+from finlab.actuators.actuator import Indices
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import DualRobot
@@ -115,7 +115,7 @@ class Compiled:
         axes."""
         return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
-    def radial_worth(self, group: Group, places: Places, worth: Worth) -> Array | None:
+    def radial_worth(self, group: Group, places: Indices, worth: Worth) -> Array | None:
         """Returns what forces are worth by the laws of a group at some places; see
         `Group.radial_worth`. Where all actuators are alike, one answers for all."""
         ahead = worth.price_ahead[:, places]

@@ -15,7 +15,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.jets import Jets
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 
 FITTED_CONSTANTS = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
 """Fields of `Jets` that are fitted."""
@@ -53,7 +53,7 @@ def fit_constants(samples: Samples) -> JetFit:
     if len(samples.wrench) < MIN_SAMPLES:
         raise DataError(f"expected at least {MIN_SAMPLES} samples, got {len(samples.wrench)}")
     force, missed, scale = left_by_laws(samples)
-    geometry = places_of(samples.layout)
+    geometry = jet_geometry_of(samples.layout)
     start = np.log([getattr(Jets(), name) for name in FITTED_CONSTANTS])
 
     def jets_at(logarithms: Array) -> Jets:
