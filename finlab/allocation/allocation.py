@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +20,13 @@ from finlab.layout.layout import Layout
 from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
+if TYPE_CHECKING:
+    from finlab.allocation.question import AnsweredQuestion
+
 Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
 CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
-
-
-class Later(Protocol):
-    """What an answer computes when it is first read."""
-
-    @property
-    def plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators, lost ones included, in the question's
-        flow."""
-        ...
-
-    def notes(self) -> tuple[str, ...]: ...
-    def candidates(self) -> Candidates | None: ...
-    def samples(self) -> Candidates | None: ...
-    def bound(self) -> Array | None: ...
-    def calm_power(self) -> Array | None: ...
 
 
 def read_only(array: Array) -> Array:
@@ -89,8 +76,8 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
-    later: Later | None = field(default=None, compare=False)
-    """Gives the lazy properties; None in copies, which have them all."""
+    answered: "AnsweredQuestion | None" = field(default=None, compare=False)
+    """Computes the lazy properties; None in copies, which have them all."""
 
     def __post_init__(self) -> None:
         for name, value in self.__dict__.items():
@@ -145,7 +132,7 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def _general_notes(self) -> tuple[str, ...]:
-        return () if self.later is None else self.later.notes()
+        return () if self.answered is None else self.answered.notes()
 
     def _doubts(self) -> tuple[str, ...]:
         """Sentences about this very answer."""
@@ -190,7 +177,7 @@ class Answer(PlainData, Generic[Number]):
     def bound(self) -> Number | None:
         """Power [W] that no answer for the same wrench can undercut; None for methods that prove
         none."""
-        bound = None if self.later is None else self.later.bound()
+        bound = None if self.answered is None else self.answered.bound()
         return None if bound is None else self._number(bound)
 
     def _number(self, values: Array) -> Number:
@@ -201,7 +188,7 @@ class Answer(PlainData, Generic[Number]):
 
     @property
     def _plant(self) -> Plant:
-        return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
+        return plant_of(self.layout).at(self.flow) if self.answered is None else self.answered.plant
 
     def _by_parts(self, judge: Callable[[Plant, Array], Array]) -> Array:
         """Figures of commands, a few at a time."""
@@ -219,7 +206,7 @@ class Answer(PlainData, Generic[Number]):
     def __getstate__(self) -> dict[str, Any]:
         for name in (*self.LAZY, "_general_notes"):
             getattr(self, name)
-        return {**self.__dict__, "later": None}
+        return {**self.__dict__, "answered": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
@@ -303,18 +290,18 @@ class Allocation(Answer[float]):
         """Part of the power [W] that goes into less turning, as the setting `calm` weighs it: what
         an answer for the same wrench in the same tick takes less where turning costs nothing. 0
         outside of ticks."""
-        part = None if self.later is None else self.later.calm_power()
+        part = None if self.answered is None else self.answered.calm_power()
         return 0.0 if part is None else self._number(part)
 
     @cached_property
     def candidates(self) -> Candidates | None:
         """Refined candidates, best first; None for methods that have a single answer."""
-        return None if self.later is None else _kept(self.later.candidates())
+        return None if self.answered is None else _kept(self.answered.candidates())
 
     @cached_property
     def samples(self) -> Candidates | None:
         """Raw candidates before refinement, best first; None for methods that draw none."""
-        return None if self.later is None else _kept(self.later.samples())
+        return None if self.answered is None else _kept(self.answered.samples())
 
     def _doubts(self) -> tuple[str, ...]:
         return doubts(self)
@@ -358,7 +345,7 @@ class Allocation(Answer[float]):
         """The same question with another command (n, 3) in place of the answer, judged by the
         plant."""
         other = replace(self, command=command, wrench_expected=None)
-        if self.later is None:
+        if self.answered is None:
             kept = ("bound", "calm_power", "candidates", "samples", "_general_notes")
             other.__dict__.update({name: getattr(self, name) for name in kept})
         return other

@@ -233,7 +233,7 @@ class Solver:
         blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
         judge = replace(blind.layout, interaction=known)
         flow = None if state.flow is None else np.array(state.flow)
-        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
+        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, answered=None)
         both = BothWays(state, self.solve(state), blind)
         _ = [
             (answer.err_norm, answer.power) for answer in both[1:]

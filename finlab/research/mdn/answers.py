@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.rates import Box
+from finlab.allocation.rates import CommandBox
 from finlab.arrays import AnyArray, Array
 from finlab.physics.objective import ZERO_DIRECTION, EffortMeter, effort_scale
 from finlab.physics.plant import Plant
@@ -49,7 +49,7 @@ class EffortRobot(NamedTuple):
     exact: float = EXACT
     """Normalized error up to which an answer is exact."""
 
-    def within(self, box: Box) -> "EffortRobot":
+    def within(self, box: CommandBox) -> "EffortRobot":
         """The same robot, each fin kept within what may follow a previous command."""
         fins = self.forces.fins
         free = box.free[:, 2]

@@ -163,7 +163,7 @@ class FaultMonitor:
         own = (np.isfinite(wanted[:, :1]) & ~(wanted == command)).any(axis=1) | self._coming_back
         rests = np.isnan(self._sent[:, :1])
         box = self._rates.box(np.where(rests, self._model.motion.command, self._sent))
-        result = np.where(own[:, None], box.clipped(wanted), wanted)
+        result = np.where(own[:, None], box.clip(wanted), wanted)
         self._coming_back = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
         return result
