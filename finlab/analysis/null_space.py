@@ -54,7 +54,7 @@ class NullSpace:
         moves: NDArray[np.bool_] = np.repeat(
             np.ptp(robot.ends, axis=1, keepdims=True) > 0.0, 2, axis=1
         )
-        moves[robot.lines, 1] = False
+        moves[robot.is_line, 1] = False
         columns = (robot.effectiveness / answer.scale)[moves]
         moves[moves] = np.abs(columns).max(axis=1) > 0.0
         basis = _sparse(null_space((robot.effectiveness / answer.scale)[moves].T, rcond=EXACT))
@@ -118,7 +118,7 @@ class NullSpace:
         command = self._begin(shift)
         got = self._compiled.forces_along(self._plant.force(command))
         free = np.where(
-            self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0
+            self._compiled.robot.is_line[:, None], [1.0, 0.0], 1.0
         )  # drag comes with the lift
         off = np.linalg.norm((got - wanted) * free, axis=-1)
         return np.asarray((off <= HELD * self._most).all(axis=1))

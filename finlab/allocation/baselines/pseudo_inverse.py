@@ -51,11 +51,11 @@ class PseudoInverse:
         """What each offers."""
         self.held, kept = held_of(plant)
         """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
-        self.beside = compiled.beside + kept
+        self.beside = compiled.wrench_at_rest + kept
         """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is held."""
         along = (
             compiled.robot.effectiveness
-            * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
+            * ~(compiled.robot.is_line[:, None] & [False, True])[..., None]
         )
         along[self.held] = 0.0
         self.effectiveness: Array = along.reshape(-1, 6).T

@@ -58,7 +58,7 @@ class EffortRobot(NamedTuple):
         half = np.where(free, np.pi, 0.5 * (upper - lower))
         arcs = replace(fins, middle=middle + fins.deflection(middle), half=half)
         forces = self.forces._replace(fins=arcs)
-        commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
+        commands = self.commands.in_tick(box)
         return self._replace(forces=forces, commands=commands)
 
 
