@@ -361,7 +361,7 @@ class Allocator:
         seed: int,
         free: Sequence[str] = (),
     ) -> CheckedQuestion:
-        """Checks the arguments of a question, and prepares the state of the robot that they name."""
+        """Checks the arguments of a question, and prepares the robot in the state they name."""
         checked_policy = as_policy(policy)
         check_seed(seed)
         checked_flow = check_flow(flow)

@@ -77,9 +77,7 @@ class CommandProblem:
             sigma=None if plant.interaction is None else sigma,
         )
 
-    def restricted(
-        self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None
-    ) -> Self:
+    def restricted(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
         """Returns the problem of some actuators and some axes.
 
         Args:
@@ -201,9 +199,7 @@ def refine(
     # turn or a rounding error.
     known_jacobian = None if steps else _NO_JACOBIAN
     start = _iterate(problem, target, problem.feasible(command), known_jacobian)
-    best = levenberg_marquardt(
-        start, after_step, steps, Damping(FIRST_DAMPING), enough=enough**2
-    )
+    best = levenberg_marquardt(start, after_step, steps, Damping(FIRST_DAMPING), enough=enough**2)
     return RefinedCommands(best.command, best.wrench, np.sqrt(best.cost))
 
 
@@ -240,9 +236,7 @@ def _iterate(
     return _Iterate(command, wrench, residual, cost, jacobian)
 
 
-def _step(
-    problem: CommandProblem, at: _Iterate, jacobian: AnyArray, damping: AnyArray
-) -> AnyArray:
+def _step(problem: CommandProblem, at: _Iterate, jacobian: AnyArray, damping: AnyArray) -> AnyArray:
     """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit.
 
     Commands that a first step takes out of their limits are held, and a second step is found by the

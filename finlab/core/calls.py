@@ -105,7 +105,11 @@ NOMINAL = Conditions()
 
 
 class PolicyFields(Protocol):
-    """A `finlab.allocation.Policy`, as far as the core has to know it; hashable."""
+    """A `finlab.allocation.Policy`, as far as the core has to know it."""
+
+    def __hash__(self) -> int:
+        """Policies are values: equal ones have one record."""
+        ...
 
     @property
     def kind(self) -> str:
@@ -176,9 +180,7 @@ class _Question:
         """Writes what is asked for, (6,) [N, N m]."""
         self._wrench[0] = wrench
 
-    def write(
-        self, policy: PolicyFields | None, lam: Array | None, conditions: Conditions
-    ) -> None:
+    def write(self, policy: PolicyFields | None, lam: Array | None, conditions: Conditions) -> None:
         """Writes all but the wrench.
 
         Args:
@@ -310,18 +312,12 @@ class Core:
     def _call(self) -> int:
         """Answers the question that is written; returns an error code."""
         code: int = self._core.fl_answer_one(
-            self._block_address,
-            self._work_address,
-            self._question.address,
-            self._answer.address,
+            self._block_address, self._work_address, self._question.address, self._answer.address
         )
         return code
 
     def answer_many(
-        self,
-        wrenches: Array,
-        policy: PolicyFields | None,
-        conditions: Conditions = NOMINAL,
+        self, wrenches: Array, policy: PolicyFields | None, conditions: Conditions = NOMINAL
     ) -> CoreAnswer:
         """Answers many wrenches, one after the other in C.
 

@@ -9,9 +9,10 @@ import ctypes
 import math
 from collections.abc import Callable
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.core.calls import NOMINAL, Conditions, Core, CoreAnswer, PolicyFields
@@ -36,16 +37,16 @@ class WrenchOffset(NamedTuple):
 
     frames: Array
     """Axes (n, 3, 3) of the laws' forces in the body frame, in rows."""
-    counts: Array
-    """1 of axes (6,) of the wrench that count, else 0."""
+    counts: NDArray[np.bool_]
+    """Axes (6,) of the wrench that count."""
     inflow: Array | None
     """Velocities (n, 3) [m/s] of the actuators' positions through the water, body frame; None at
     rest."""
     jets: Array | None
     """Numbers for the core's own formula of jets; None where `effect` is asked."""
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
-    """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its derivatives
-    (n, 3, 6) by the forces."""
+    """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its
+    derivatives (n, 3, 6) by the forces."""
 
 
 class OuterResult(NamedTuple):
@@ -65,7 +66,7 @@ class OuterResult(NamedTuple):
 
 
 class _FlWhole(ctypes.Structure):
-    """The `fl_whole` of finlab/core/src/internal.h: a robot, and the wrench offset of its forces."""
+    """The `fl_whole` of finlab/core/src/internal.h: a robot, and the offset of its forces."""
 
     _fields_ = [
         ("effect", ctypes.c_void_p),
@@ -93,10 +94,9 @@ class CoupledCore(Core):
         """Held while outer iterations run: their beginning and end are the same for all threads."""
         self._raised: BaseException | None = None
         """Raised by the callback, for `_call` to raise again."""
+        callback: Any = library().fl_jets
         if wrench_offset.jets is None:
             callback = _OFFSET_CALLBACK(self._effect)
-        else:
-            callback = library().fl_jets
         frames = np.ascontiguousarray(wrench_offset.frames)
         self._pointed_at = (wrench_offset.jets, wrench_offset.inflow, block, frames, callback)
         """What the struct points at, which has to live as long."""

@@ -12,7 +12,6 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
-from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
@@ -23,6 +22,7 @@ from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
 from webapp.markup.words import OWN, fins_words
 from webapp.session.state import DRAWING, State, chosen
+from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)

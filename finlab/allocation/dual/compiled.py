@@ -12,7 +12,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.actuator import Places
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
 from finlab.allocation.dual.robot import CommandLimits, DualRobot

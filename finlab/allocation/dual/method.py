@@ -165,11 +165,7 @@ class Dual(Method):
         return target if self.turns_ahead else super().in_time(target, reference)
 
     def solve_under(
-        self,
-        conditions: Conditions,
-        targets: Array,
-        policy: Policy,
-        lam: Array | None = None,
+        self, conditions: Conditions, targets: Array, policy: Policy, lam: Array | None = None
     ) -> Solution:
         """Solves for targets in the flow of this method.
 
@@ -463,8 +459,8 @@ class Dual(Method):
         return np.asarray(bound * (1.0 - ROUNDING))
 
     def _bound_by_laws(self, wrench: Array, lam: Array, conditions: Conditions) -> Array:
-        """Lower bounds (N,) [W] by the laws' conjugates, at multipliers (N, 6) or at none, whichever
-        prove more."""
+        """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
+        proves more."""
         at_rest = power_bound(self.compiled, wrench, np.zeros_like(lam), conditions)
         return np.maximum(power_bound(self.compiled, wrench, lam, conditions), at_rest)
 

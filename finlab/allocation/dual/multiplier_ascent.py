@@ -2,8 +2,8 @@
 give, as with measured tables.
 
 Of each actuator i, commands u_k are sampled around the answer, with powers P_ik and normalized
-wrenches w_ik. The dual of these samples (Eq. 3, its conjugates maxima over k) has kinks; smoothed at
-a temperature tau [W] by the logarithm of a sum of exponentials it is
+wrenches w_ik. The dual of these samples (Eq. 3, its conjugates maxima over k) has kinks; smoothed
+at a temperature tau [W] by the logarithm of a sum of exponentials it is
 
     g_tau(lambda) = lambda^T w - tau sum_i log sum_k exp((lambda^T w_ik - P_ik) / tau),
 
@@ -59,8 +59,7 @@ def raised_multipliers(
     commands = (command + reach * change).clip(low, high)
     commands[0] = command
     sampled = _SampledDual(
-        wrench=np.einsum("kna,naw->nkw", plant.force(commands), plant.effectiveness)
-        / wrench_scale,
+        wrench=np.einsum("kna,naw->nkw", plant.force(commands), plant.effectiveness) / wrench_scale,
         power=plant.power(commands).T,
         target=wrench / wrench_scale,
     )

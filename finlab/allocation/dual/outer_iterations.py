@@ -3,11 +3,11 @@ at the last forces.
 
 With y the forces and o(y) the wrench offset that they cause (Eq. 18), an iteration takes o(y) for
 its value and slope at the last forces. Its answer is exact and cheapest on that linear model;
-Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is no
-cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope of the
-whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex programming).
-The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where they begin:
-the whole model is not convex, so several starts are tried.
+Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is
+no cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope
+of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
+programming). The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where
+they begin: the whole model is not convex, so several starts are tried.
 """
 
 from typing import NamedTuple, Protocol
@@ -124,11 +124,7 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
 
 
 def solve_outer(
-    method: OuterMethod,
-    targets: Array,
-    policy: Policy,
-    conditions: Conditions,
-    lam: Array | None,
+    method: OuterMethod, targets: Array, policy: Policy, conditions: Conditions, lam: Array | None
 ) -> Solution:
     """Solves for targets, one after the other, by outer iterations.
 
@@ -168,11 +164,7 @@ def solve_outer(
 
 
 def _best_of_starts(
-    method: OuterMethod,
-    target: Array,
-    policy: Policy,
-    conditions: Conditions,
-    lam: Array | None,
+    method: OuterMethod, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
 ) -> CoreAnswer:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""

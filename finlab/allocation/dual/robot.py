@@ -27,7 +27,6 @@ from finlab.core.calls import MAGIC, Core
 from finlab.core.fields import numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
 
-
 _FORMS = ("thruster", "pod", "fin", "foil")
 """How forces become commands, in the order of FL_THRUSTER ... in finlab/core/finlab.h."""
 _NO_FORCE = 1e-12
