@@ -14,7 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
-from finlab.allocation.checks import (
+from finlab.allocation.method import Checkpoint, Method, Networks
+from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
+from finlab.allocation.question import (
+    AnsweredQuestion,
+    CheckedQuestion,
+    RobotState,
     check_flow,
     check_layout,
     check_previous,
@@ -24,13 +29,6 @@ from finlab.allocation.checks import (
     check_wrenches,
     damage_of,
     free_mask,
-)
-from finlab.allocation.method import Checkpoint, Method, Networks
-from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
-from finlab.allocation.question import (
-    AnsweredQuestion,
-    CheckedQuestion,
-    RobotState,
     without_lost,
     working_actuators,
 )

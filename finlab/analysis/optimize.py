@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
-from finlab.allocation.checks import check_flow
+from finlab.allocation.question import check_flow
 from finlab.analysis.authority import MotionAxis, commanded_axes, named_axes
 from finlab.analysis.climb import LEAST, PENALTY, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.allocation.checks import check_flow
+from finlab.allocation.question import check_flow
 from finlab.analysis.authority import (
     AXES,
     Authority,

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 import finlab
 from finlab import core
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.checks import check_flow
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy, PolicyName
+from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocation, Allocator
-from finlab.allocation.checks import MAX_WRENCH
+from finlab.allocation.question import MAX_WRENCH
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.interaction.jets import Jets
