@@ -48,10 +48,10 @@ class CoreAnswer(NamedTuple):
     wrench_served: Array
     """Wrenches (N, 6) [N, N m] that the forces give: those asked for, or those that the policy
     gives in their place."""
-    gap_bound: Array
+    gap_power_bound: Array
     """Power (N,) [W] that gaps in the sets of forces are proved to need, the least dual value of
     the cuts that were left out; 0 where there is no gap."""
-    is_reachable: NDArray[np.bool_]
+    is_attainable: NDArray[np.bool_]
     """Which wrenches (N,) that were asked for are within reach."""
     command: Array
     """Commands (N, n, 3) that give the forces, as near as the grids of the laws are."""
@@ -66,7 +66,7 @@ class Conjugates(NamedTuple):
     """Conjugates of the costs of n actuators at N multipliers (Eq. 4), by the core's tables; the
     fields of `fl_actuator_worth`."""
 
-    price: Array
+    price_ahead: Array
     """Price v (N, n) [W/N] along the direction of the force; 0 where an actuator pushes in
     reverse."""
     price_reverse: Array
@@ -95,7 +95,7 @@ class Conditions(NamedTuple):
     ticks: int = 1
     """How many ticks after `command_previous` the commands are for; the rates allow as many times
     the change."""
-    angle_wanted: Array | None = None
+    angles_wanted: Array | None = None
     """Angles (n,) [rad] from which turning of pods costs, in place of those of `command_previous`;
     NaN of an actuator without; None for none."""
 
@@ -162,19 +162,19 @@ class _Question:
         self._free_pointer = record["free"]
         self._calm = record["calm"]
         self._ticks = record["ticks"]
-        self._angle_wanted_pointer = record["toward"]
+        self._angles_wanted_pointer = record["toward"]
 
         self._policy: Record | None = None
         self._lam = np.zeros(6)
         self._previous = np.zeros((count, 3))
         self._lost = np.zeros(count, np.uint8)
         self._free = np.zeros(6, np.uint8)
-        self._angle_wanted = np.zeros(count)
+        self._angles_wanted = np.zeros(count)
         self._lam_address = self._lam.ctypes.data
         self._previous_address = self._previous.ctypes.data
         self._lost_address = self._lost.ctypes.data
         self._free_address = self._free.ctypes.data
-        self._angle_wanted_address = self._angle_wanted.ctypes.data
+        self._angles_wanted_address = self._angles_wanted.ctypes.data
 
     def write_wrench(self, wrench: Array) -> None:
         """Writes what is asked for, (6,) [N, N m]."""
@@ -200,10 +200,10 @@ class _Question:
         """Writes what holds of the robot."""
         self._calm[0] = conditions.calm
         self._ticks[0] = conditions.ticks
-        self._angle_wanted_pointer[0] = 0
-        if conditions.angle_wanted is not None:
-            self._angle_wanted[:] = conditions.angle_wanted
-            self._angle_wanted_pointer[0] = self._angle_wanted_address
+        self._angles_wanted_pointer[0] = 0
+        if conditions.angles_wanted is not None:
+            self._angles_wanted[:] = conditions.angles_wanted
+            self._angles_wanted_pointer[0] = self._angles_wanted_address
         self._previous_pointer[0] = 0
         if conditions.command_previous is not None:
             self._previous[:] = conditions.command_previous
@@ -229,10 +229,10 @@ class _Answer:
         self._force = record["force"][:, :count]
         self._lam = record["price"]
         self._wrench_served = record["aim"]
-        self._gap_bound = record["value"]
+        self._gap_power_bound = record["value"]
         self._error = record["error"]
         self._command = record["command"][:, :count]
-        self._is_reachable = record["within"]
+        self._is_attainable = record["within"]
         self._is_truncated = record["ended"]
 
     def read(self) -> CoreAnswer:
@@ -241,8 +241,8 @@ class _Answer:
             force=self._force.copy(),
             lam=self._lam.copy(),
             wrench_served=self._wrench_served.copy(),
-            gap_bound=self._gap_bound.copy(),
-            is_reachable=self._is_reachable.astype(bool),
+            gap_power_bound=self._gap_power_bound.copy(),
+            is_attainable=self._is_attainable.astype(bool),
             command=self._command.copy(),
             error=self._error.copy(),
             is_truncated=bool(self._is_truncated[0]),
@@ -337,9 +337,9 @@ class Core:
         force = np.empty((count, self._count, 2))
         lam = np.empty((count, 6))
         wrench_served = np.empty((count, 6))
-        gap_bound = np.empty(count)
+        gap_power_bound = np.empty(count)
         command = np.empty((count, self._count, 3))
-        is_reachable = np.empty(count, np.bool_)
+        is_attainable = np.empty(count, np.bool_)
         error = np.empty(count)
         with self._lock:
             self._question.write(policy, None, conditions)
@@ -352,15 +352,15 @@ class Core:
                 force.ctypes.data,
                 lam.ctypes.data,
                 wrench_served.ctypes.data,
-                gap_bound.ctypes.data,
+                gap_power_bound.ctypes.data,
                 command.ctypes.data,
-                is_reachable.ctypes.data,
+                is_attainable.ctypes.data,
                 error.ctypes.data,
             )
         is_truncated = code < 0
         _raise_refusal(max(code, 0))
         return CoreAnswer(
-            force, lam, wrench_served, gap_bound, is_reachable, command, error, is_truncated
+            force, lam, wrench_served, gap_power_bound, is_attainable, command, error, is_truncated
         )
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
@@ -390,7 +390,7 @@ class Core:
             )
         return command
 
-    def dual_at(self, wrench: Array, lam_reduced: Array) -> tuple[Array, float]:
+    def dual_value(self, wrench: Array, lam_reduced: Array) -> tuple[Array, float]:
         """Evaluates the dual function (Eq. 3) at reduced multipliers.
 
         Args:
@@ -439,7 +439,7 @@ class Core:
             )
         _raise_refusal(error)
         return Conjugates(
-            price=records["price"],
+            price_ahead=records["price"],
             price_reverse=records["price_back"],
             conjugate=records["conjugate"],
             force_min=records["low"][:1],

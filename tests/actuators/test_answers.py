@@ -73,7 +73,7 @@ def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
 def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
     """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
     inner = robot.basis.T @ (robot.axis_scale * price)
-    force, value = robot.core.dual_at(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
+    force, value = robot.core.dual_value(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
     return force, -value
 
 

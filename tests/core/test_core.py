@@ -85,13 +85,13 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
         # Prices are where to begin: those of no use are left out.
         assert heavy.answer_one(
             wrench, None, np.where(np.arange(6) == 2, bad, prices)
-        ).is_reachable[0]
+        ).is_attainable[0]
     with pytest.raises(CommandError, match="argument"):
         heavy.answer_one(
             wrench, None, conditions=Conditions(command_previous=np.full((8, 3), np.inf))
         )
     nothing_known = Conditions(command_previous=np.full((8, 3), np.nan))
-    assert heavy.answer_one(wrench, None, conditions=nothing_known).is_reachable[0]
+    assert heavy.answer_one(wrench, None, conditions=nothing_known).is_attainable[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -106,7 +106,7 @@ def test_one_and_many_are_the_same(kind: str) -> None:
         single = core.answer_one(target, policy)
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.wrench_served[row], single.wrench_served[0])
-        assert many.is_reachable[row] == single.is_reachable[0]
+        assert many.is_attainable[row] == single.is_attainable[0]
 
 
 def test_threads_share_one_robot(heavy: Core) -> None:

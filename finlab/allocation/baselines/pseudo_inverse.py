@@ -51,7 +51,7 @@ class PseudoInverse:
         """What each offers."""
         self.held, kept = held_of(plant)
         """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
-        self.beside = compiled.wrench_at_rest + kept
+        self.beside = compiled.wrench_offset + kept
         """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is held."""
         along = (
             compiled.robot.effectiveness

@@ -74,5 +74,5 @@ def conditions_ahead(method: PodMethod, reference: Array, conditions: Conditions
     largest_turn = ticks * method.period_s * method.layout.rates[:, 0]
     ignored_turn = IGNORED_SHARE * largest_turn
     wanted_turn = np.sign(turn) * np.maximum(np.abs(turn) - ignored_turn, 0.0)
-    angle_wanted = np.where(method.turning_pods, angle_previous + SHARE_NOW * wanted_turn, np.nan)
-    return conditions._replace(angle_wanted=angle_wanted, calm=CALM_FACTOR * conditions.calm)
+    angles_wanted = np.where(method.turning_pods, angle_previous + SHARE_NOW * wanted_turn, np.nan)
+    return conditions._replace(angles_wanted=angles_wanted, calm=CALM_FACTOR * conditions.calm)

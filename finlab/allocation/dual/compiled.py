@@ -89,21 +89,21 @@ class Compiled:
         """Makes the robot of the core from the responses of all groups."""
         responses: list[Any] = [None] * self.count
         forms: list[Any] = [None] * self.count
-        self.squared_force_cost = np.zeros(self.count)
+        self.uncertainty_cost = np.zeros(self.count)
         """What a squared force costs beside its power (n,) [W/N^2]."""
         for places, group in self.groups:
             for place, response, form in zip(places, group.responses, group.forms, strict=True):
                 if self.miss_cost is not None:
                     squared_effectiveness = response.effectiveness**2
                     cost = (squared_effectiveness @ self.miss_cost[place]).sum()
-                    self.squared_force_cost[place] = cost
-                cost = float(self.squared_force_cost[place])
+                    self.uncertainty_cost[place] = cost
+                cost = float(self.uncertainty_cost[place])
                 # Of a foil the core adds the cost itself, since the drag has a price of its own.
                 drags = isinstance(response, Line) and response.drag is not None
                 dearer = with_square(response, cost) if cost and not drags else response
                 responses[place] = dearer
                 forms[place] = form
-        self.wrench_at_rest = self.wrench_at_rest_of(np.ones(self.count, bool))
+        self.wrench_offset = self.wrench_offset_of(np.ones(self.count, bool))
         """Wrench (6,) [N, N m] at forces of 0, such as the drag of foils without lift."""
         self.robot = DualRobot(
             responses,
@@ -111,13 +111,13 @@ class Compiled:
             self._limits,
             self._effectiveness,
             self._wrench_scale,
-            self.wrench_at_rest,
-            self.squared_force_cost,
+            self.wrench_offset,
+            self.uncertainty_cost,
             self._counts,
         )
         """The robot as the core reads it."""
 
-    def wrench_at_rest_of(self, works: NDArray[np.bool_]) -> Array:
+    def wrench_offset_of(self, works: NDArray[np.bool_]) -> Array:
         """Returns the wrench (6,) [N, N m] at forces of 0 of the actuators that work (n,)."""
         wrench = np.zeros(6)
         for places, group in self.groups:
@@ -175,7 +175,7 @@ class Compiled:
             for all, where the tables say the same as the laws.
         """
         places, group = self.groups[index]
-        price = by_tables.price[:, places]
+        price = by_tables.price_ahead[:, places]
         price_reverse = by_tables.price_reverse[:, places]
         single = self._single_of_group.get(index)
         if single is not None:
@@ -249,10 +249,10 @@ def power_bound(
             if by_laws is not None:
                 is_said = ~np.isnan(by_laws)
                 conjugate[:, places] = np.where(is_said, by_laws, conjugate[:, places])
-    wrench_at_rest = compiled.wrench_at_rest
+    wrench_offset = compiled.wrench_offset
     if conditions.lost is not None:
         conjugate[:, conditions.lost] = 0.0
-        wrench_at_rest = compiled.wrench_at_rest_of(~conditions.lost)
-    paid = lam * (wrench - wrench_at_rest)
+        wrench_offset = compiled.wrench_offset_of(~conditions.lost)
+    paid = lam * (wrench - wrench_offset)
     rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(conjugate).sum(axis=1))
     return np.asarray(paid.sum(axis=1) - conjugate.sum(axis=1) - rounding)

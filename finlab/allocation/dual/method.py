@@ -185,8 +185,8 @@ class Dual(Method):
             return solve_outer(self, targets, policy, conditions, lam)
         answer = self.forces(targets, policy, lam, conditions)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
-        all_reachable = 0 not in answer.is_reachable.tobytes()
-        unreachable = [] if all_reachable else np.flatnonzero(~answer.is_reachable).tolist()
+        all_reachable = 0 not in answer.is_attainable.tobytes()
+        unreachable = [] if all_reachable else np.flatnonzero(~answer.is_attainable).tolist()
         wrench_served = targets if all_reachable else answer.wrench_served
         notes = {_TRUNCATED} if answer.is_truncated else set()
         command = self.exact(answer, conditions)
@@ -196,7 +196,7 @@ class Dual(Method):
         if unreachable:
             notes |= self.undriven_notes(targets[unreachable], conditions)
         return self.solution(
-            command, wrench_served, answer.lam, answer.gap_bound, notes, conditions
+            command, wrench_served, answer.lam, answer.gap_power_bound, notes, conditions
         )
 
     def solution(
@@ -204,7 +204,7 @@ class Dual(Method):
         command: Array,
         wrench_served: Array,
         lam: Array,
-        gap_bound: Array,
+        gap_power_bound: Array,
         notes: set[str],
         conditions: Conditions,
     ) -> Solution:
@@ -214,7 +214,7 @@ class Dual(Method):
             command: (N, n, 3); its rows of lost actuators become NaN.
             wrench_served: (N, 6) [N, N m] that the commands give.
             lam: multipliers (N, 6) [W/N, W/(N m)], which prove the bound.
-            gap_bound: power (N,) [W] that gaps are proved to need.
+            gap_power_bound: power (N,) [W] that gaps are proved to need.
             notes: sentences, of which empty ones are left out.
             conditions: under which the commands were found.
 
@@ -224,7 +224,7 @@ class Dual(Method):
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
         bound: Callable[[Array], Array] = partial(
-            self.bound, wrench_served, lam, gap_bound, conditions
+            self.bound, wrench_served, lam, gap_power_bound, conditions
         )
         return Solution(
             command,
@@ -316,7 +316,7 @@ class Dual(Method):
             command[row] = tried_command[0]
             wrench_served[row] = tried[0]
             answer.lam[row] = tried_answer.lam[0]
-            answer.gap_bound[row] = tried_answer.gap_bound[0]
+            answer.gap_power_bound[row] = tried_answer.gap_power_bound[0]
         if is_kept:
             return ""
         cancelling = self._cancelling_command(conditions)
@@ -325,7 +325,7 @@ class Dual(Method):
         command[row] = cancelling
         wrench_served[row] = 0.0
         answer.lam[row] = 0.0
-        answer.gap_bound[row] = 0.0
+        answer.gap_power_bound[row] = 0.0
         return ""
 
     def _cancelling_command(self, conditions: Conditions) -> Array | None:
@@ -412,7 +412,7 @@ class Dual(Method):
         self,
         wrench_served: Array,
         lam: Array,
-        gap_bound: Array,
+        gap_power_bound: Array,
         conditions: Conditions,
         command: Array,
     ) -> Array:
@@ -421,7 +421,7 @@ class Dual(Method):
         Args:
             wrench_served: (N, 6) [N, N m] for which the core found forces.
             lam: its multipliers (N, 6) [W/N, W/(N m)].
-            gap_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for these
+            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for these
                 wrenches, by the core's tables.
             conditions: under which they were found.
             command: (N, n, 3), whose wrenches count: they are the served ones to rounding, or as
@@ -443,7 +443,7 @@ class Dual(Method):
         bound = self._bound_by_laws(wrench, lam, conditions)
         if not self._reads_tables:
             is_served = _norms((wrench - wrench_served) / self.scale) <= NEARLY
-            with_gaps = np.maximum(bound, self._bound_of_gaps(gap_bound, power))
+            with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
             bound = np.where(is_served, with_gaps, bound)
         elif works.all():
             # The multipliers are those of the smooth shapes that stand for measured tables.
@@ -464,10 +464,10 @@ class Dual(Method):
         at_rest = power_bound(self.compiled, wrench, np.zeros_like(lam), conditions)
         return np.maximum(power_bound(self.compiled, wrench, lam, conditions), at_rest)
 
-    def _bound_of_gaps(self, gap_bound: Array, power: Array) -> Array:
+    def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
         """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
         share of full power, and at the least forces by more; never above the power (N,)."""
-        by_laws = (1.0 - TABLE_ERROR) * gap_bound - self._least_table_error
+        by_laws = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
         return np.minimum(by_laws, power)
 
     @cached_property
@@ -543,7 +543,7 @@ class Dual(Method):
         # Where the core's grids say what the laws say, it has done all that steps can do.
         error = _norms(missing)
         off_by_grids = error > answer.error + EXACT
-        off_within_reach = answer.is_reachable & (error > NEARLY)
+        off_within_reach = answer.is_attainable & (error > NEARLY)
         rough = np.flatnonzero(off_by_grids | off_within_reach)
         if not len(rough):
             return command
@@ -552,7 +552,7 @@ class Dual(Method):
         if conditions.command_previous is not None:
             box = self.rates.box(conditions.command_previous)
             return box.clip_feasible(command, self.plant)
-        unmet = (refined.error > NEARLY) & answer.is_reachable[rough]
+        unmet = (refined.error > NEARLY) & answer.is_attainable[rough]
         for row in rough[unmet].tolist():
             # Such as idle fins in line, or a least force: no small change of these commands helps.
             starts = self._starts_around(command[row])

@@ -90,7 +90,7 @@ class OuterMethod(Protocol):
         command: Array,
         wrench_served: Array,
         lam: Array,
-        gap_bound: Array,
+        gap_power_bound: Array,
         notes: set[str],
         conditions: Conditions,
     ) -> Solution:
@@ -146,7 +146,7 @@ def solve_outer(
         answer = _best_of_starts(method, target, policy, conditions, lam)
         command = method.exact(answer, conditions)
         wrench_served = answer.wrench_served
-        if policy.kind == "direction" and not answer.is_reachable.all():
+        if policy.kind == "direction" and not answer.is_attainable.all():
             command, wrench_served = _on_the_ray(method, target[None], command, conditions)
         if method.error(command, target[None], conditions)[0] > NEARLY:
             notes |= method.undriven_notes(target[None], conditions)

@@ -61,8 +61,8 @@ class DualRobot:
         limits: CommandLimits,
         effectiveness: Array,
         wrench_scale: Array,
-        wrench_at_rest: Array | None = None,
-        squared_force_cost: Array | None = None,
+        wrench_offset: Array | None = None,
+        uncertainty_cost: Array | None = None,
         counts: Array | None = None,
     ) -> None:
         """Prepares a robot for the core.
@@ -73,9 +73,9 @@ class DualRobot:
             limits: of the commands.
             effectiveness: wrench (n, 3, 6) per newton along the actuators' own axes [1, m].
             wrench_scale: (6,) [N, N m], by which errors are normalized.
-            wrench_at_rest: wrench (6,) [N, N m] at forces of 0, such as the drag of foils; None for
+            wrench_offset: wrench (6,) [N, N m] at forces of 0, such as the drag of foils; None for
                 none.
-            squared_force_cost: what a squared force of each foil costs beside its power (n,)
+            uncertainty_cost: what a squared force of each foil costs beside its power (n,)
                 [W/N^2]; None for nothing.
             counts: 1 of axes (6,) that the robot commands, else 0; None where it commands all.
         """
@@ -84,20 +84,20 @@ class DualRobot:
         self._forms = forms
         self._limits = limits
         self._wrench_scale = wrench_scale
-        self._wrench_at_rest = np.zeros(6) if wrench_at_rest is None else wrench_at_rest
+        self._wrench_offset = np.zeros(6) if wrench_offset is None else wrench_offset
         self._counts = np.ones(6) if counts is None else counts
         no_cost = np.zeros(n)
-        self._squared_force_cost = no_cost if squared_force_cost is None else squared_force_cost
+        self._uncertainty_cost = no_cost if uncertainty_cost is None else uncertainty_cost
         self.ends = np.array([response.ends for response in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.is_line = np.array([isinstance(response, Line) for response in responses])
         """Which have one direction (n,)."""
         self.is_pod = np.array([form.kind == "pod" for form in forms])
         """Which push at an angle of their own (n,)."""
-        self.drag_speed = np.array([_drag_speed(response) for response in responses])
+        self.flow_speed = np.array([_flow_speed(response) for response in responses])
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
         self._largest_force = self._largest_forces()
-        self.force_max = self._largest_force + _NO_FORCE
+        self.row_force_max = self._largest_force + _NO_FORCE
         """Largest force (n, 2) [N] along each direction, never 0."""
         self._secant = self._usual_secants()
         tables = _Tables(tables_begin(n))
@@ -129,8 +129,8 @@ class DualRobot:
         """Forces over prices (n, 2) [N^2/W] at the largest force, by half of it; of drag, which
         grows with the square of lift, by the square of its share."""
         usual_price = np.array([[_usual_price(response)] for response in self.responses])
-        secant = self.force_max[:, :1] / usual_price
-        share = self.force_max / self.force_max[:, :1]
+        secant = self.row_force_max[:, :1] / usual_price
+        share = self.row_force_max / self.row_force_max[:, :1]
         exponent = [0.0, 2.0]
         return np.asarray(secant * share**exponent)
 
@@ -166,12 +166,12 @@ class DualRobot:
 
     def _drag(self, i: int, force: float) -> float:
         """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
-        if self.drag_speed[i] == 0.0:
+        if self.flow_speed[i] == 0.0:
             return 0.0
         response = self.responses[i]
         power = power_of(response, np.array(force))
         power_at_rest = response.table.rest
-        return float((power - power_at_rest) / self.drag_speed[i])
+        return float((power - power_at_rest) / self.flow_speed[i])
 
     def _block(self) -> Array:
         """The robot as the core reads it: head, actuators, then the tables."""
@@ -184,18 +184,18 @@ class DualRobot:
         head["scale"] = self.axis_scale
         head["yard"] = self._wrench_scale
         head["counts"] = self._counts
-        head["beside"] = self._wrench_at_rest
+        head["beside"] = self._wrench_offset
         head["basis"][:, :rank] = self.basis
 
         actuators = np.zeros(len(self.responses), struct("fl_actuator"))
         actuators["low"] = self.ends[:, 0]
         actuators["high"] = self.ends[:, 1]
-        actuators["speed"] = self.drag_speed
+        actuators["speed"] = self.flow_speed
         actuators["gain"] = self._secant
-        actuators["most"] = self.force_max
+        actuators["most"] = self.row_force_max
         actuators["matrix"][..., :rank] = (self.effectiveness / self.axis_scale) @ self.basis
         actuators["own"] = self._effectiveness_normalized
-        actuators["doubt"] = self._squared_force_cost
+        actuators["doubt"] = self._uncertainty_cost
         limits = self._limits
         actuators["lower"] = limits.lower
         actuators["upper"] = limits.upper
@@ -301,7 +301,7 @@ class _Tables:
         return np.concatenate(self._numbers)
 
 
-def _drag_speed(response: Response) -> float:
+def _flow_speed(response: Response) -> float:
     """Power per newton of drag [m/s] of a foil; 0 of all else."""
     if isinstance(response, Line) and response.drag is not None:
         return response.speed

@@ -117,8 +117,8 @@ def test_costly_reverse_is_within_reach() -> None:
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
     answer = robot.core.answer_one(wrench, None)
     lam_reduced = np.append(robot.basis.T @ (robot.axis_scale * answer.lam[0]), np.zeros(3))
-    assert answer.is_reachable[0]
-    dual_value = robot.core.dual_at(wrench, lam_reduced)[1]
+    assert answer.is_attainable[0]
+    dual_value = robot.core.dual_value(wrench, lam_reduced)[1]
     np.testing.assert_allclose(dual_value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
     np.testing.assert_allclose(answer.command[0, :, 0], -9.0, atol=1e-9)
 
