@@ -60,7 +60,7 @@ def words_of_rooms() -> frozenset[str]:
 def test_the_tables_are_read() -> None:
     names = names_of_glossary()
     assert len(names) > 40
-    assert {"residual", "lam", "block"} <= set(names)
+    assert {"residual", "conjugate", "block"} <= set(names)
 
 
 @pytest.mark.parametrize("name", [name for name in names_of_glossary() if name not in PENDING])

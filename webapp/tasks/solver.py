@@ -265,7 +265,7 @@ class Solver:
             own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
             badge = "optimum" if is_proved(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
-        return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
+        return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""

@@ -41,31 +41,41 @@ NARROW = 1e-6
 
 
 class ForceProgram:
-    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint,
-    normalized by `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
+    """Power over the forces of one robot in CasADi, the wrench as a constraint, the target as its
+    parameter."""
 
     def __init__(
         self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]
     ) -> None:
+        """Makes the program and its solver.
+
+        Args:
+            casadi: the module, which is an extra.
+            inverse: gives starts, and commands of forces.
+            sigma: what wrenches (6,) are divided by [N, N m].
+            options: of IPOPT.
+        """
         self._inverse = inverse
         n = inverse.plant.n
-        self._most = np.maximum(inverse.largest, 1e-9)
+        self._largest = np.maximum(inverse.largest, 1e-9)
         share = casadi.MX.sym("share", 2 * n)
         target = casadi.MX.sym("target", 6)
-        per = np.repeat(self._most, 2)
-        wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
-        self._parts: list[_Line | _Plane | _Held] = []
-        for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
+        per = np.repeat(self._largest, 2)
+        wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.wrench_offset)
+        self._parts: list[_Line | _Plane | _Fixed] = []
+        for response, index in zip(inverse.responses, inverse.group_indices, strict=True):
+            i = index.actuator
             own = share[2 * i : 2 * i + 2]
-            most = float(self._most[i])
-            if inverse.held[i]:
-                self._parts.append(_Held())
+            if inverse.is_fixed[i]:
+                self._parts.append(_Fixed())
             elif isinstance(response, Plane):
                 self._parts.append(_Plane(casadi, response, own))
             else:
-                line = _Line(casadi, response, own, most, inverse.groups[group][1], place)
+                _, group = inverse.groups[index.group]
+                largest = float(self._largest[i])
+                line = _Line(casadi, response, own, largest, group, index.in_group)
                 self._parts.append(line)
-                wrench += line.beside
+                wrench += line.wrench_offset
         self.convex = all(part.convex for part in self._parts)
         """Whether one start is enough, as far as actuators can rest."""
         cost: Any = sum(part.cost for part in self._parts)
@@ -82,25 +92,32 @@ class ForceProgram:
         self._bounds = dict(zip(("lbg", "ubg", "lbx", "ubx"), (*between, *ends), strict=True))
 
     def command(self, target: Array, start: Array) -> Array:
-        """The command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
-        most = self._most[:, None]
-        answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
-        force = np.array(answer["x"], np.float64).reshape(start.shape) * most
-        return np.asarray(
-            self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0]
-        )
+        """Returns the command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
+        largest = self._largest[:, None]
+        answer = self._solver(x0=(start / largest).ravel(), p=target, **self._bounds)
+        force = np.array(answer["x"], np.float64).reshape(start.shape) * largest
+        if not np.isfinite(force).all():
+            force = start
+        return np.asarray(self._inverse.command_of(force[None])[0])
 
     def starts(self, target: Array, n_random: int, seed: int) -> Array:
-        """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
+        """Returns forces (S, n, 2) [N] at which IPOPT begins: the pseudo-inverse's, and where one
+        start is not enough, random ones.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            n_random: how many of these.
+            seed: of the random ones.
+        """
         first = self._inverse.force(target[None])
         if self.convex:
             return first
         rng = np.random.default_rng(seed)
         drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
-        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._most[:, None]])
+        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._largest[:, None]])
 
 
-class _Held:
+class _Fixed:
     """One actuator that has one command alone: what it gives is beside the forces, its variables
     are 0."""
 
@@ -140,8 +157,10 @@ class _Line:
         at_rest = group.beside_of(force)
         force[:, place, 0] = most * grid
         extra = group.beside_of(force) - at_rest
-        self.beside: Any = _spline(casadi, grid, extra.ravel())(share[0]) if extra.any() else 0.0
-        """Wrench (6,) in CasADi that comes on top."""
+        self.wrench_offset: Any = 0.0
+        """Wrench (6,) in CasADi that comes on top, such as the drag of a foil."""
+        if extra.any():
+            self.wrench_offset = _spline(casadi, grid, extra.ravel())(share[0])
         self.convex = not extra.any()
         """Whether the wrench is linear in the force."""
 
@@ -209,8 +228,10 @@ def _spline(casadi: Any, grid: Array, values: Array) -> Any:
     return casadi.interpolant("spline", "bspline", [grid.tolist()], values)
 
 
-POLISH, APPROACH = 3, 30
-"""Levenberg-Marquardt steps from where IPOPT ends onto the target, or as near as they come."""
+POLISH = 3
+"""Levenberg-Marquardt steps onto the target from where IPOPT ends."""
+APPROACH = 30
+"""Levenberg-Marquardt steps from there where a few do not meet it: as near as they come."""
 SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
     f"ipopt.{name}": value
     for name, value in {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}.items()

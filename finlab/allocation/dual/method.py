@@ -421,8 +421,8 @@ class Dual(Method):
         Args:
             wrench_served: (N, 6) [N, N m] for which the core found forces.
             lam: its multipliers (N, 6) [W/N, W/(N m)].
-            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for these
-                wrenches, by the core's tables.
+            gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for
+                these wrenches, by the core's tables.
             conditions: under which they were found.
             command: (N, n, 3), whose wrenches count: they are the served ones to rounding, or as
                 near as the laws come.
