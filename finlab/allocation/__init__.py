@@ -28,6 +28,7 @@ _MODULE_OF_NAME = {
     "PolicyName": "policy",
     "Solution": "solution",
 }
+"""Where each public name stands."""
 
 __all__ = [
     "METHODS",

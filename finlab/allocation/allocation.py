@@ -141,6 +141,7 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def _general_notes(self) -> tuple[str, ...]:
+        """Sentences about the robot and the method."""
         return () if self.answered is None else self.answered.notes()
 
     def _doubts(self) -> tuple[str, ...]:
@@ -197,6 +198,7 @@ class Answer(PlainData, Generic[Number]):
 
     @property
     def _plant(self) -> Plant:
+        """What judges the commands, in the flow of the question."""
         return plant_of(self.layout).at(self.flow) if self.answered is None else self.answered.plant
 
     def _judged(self, figure: Callable[[Plant, Array], Array]) -> Array:
@@ -210,6 +212,7 @@ class Answer(PlainData, Generic[Number]):
         return read_only(np.concatenate(parts))
 
     def _equal_names(self) -> list[str]:
+        """Fields, and what is computed of them: two answers are equal if they say the same."""
         return [*super()._equal_names(), *self.LAZY]
 
     def __getstate__(self) -> dict[str, Any]:
@@ -317,6 +320,7 @@ class Allocation(Answer[float]):
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
     def _doubts(self) -> tuple[str, ...]:
+        """Sentences about its forces, and about whether another one takes less power."""
         return doubts(self)
 
     @cached_property
@@ -367,7 +371,15 @@ class Allocation(Answer[float]):
         return other
 
     def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
-        """Returns the same answer with other candidates, refined ones and raw ones."""
+        """Puts other candidates in place of those of the answer.
+
+        Args:
+            candidates: refined ones; None for none.
+            samples: raw ones; None for none.
+
+        Returns:
+            The same answer with these.
+        """
         return self.of(**{**self.__dict__, "candidates": candidates, "samples": samples})
 
     def __repr__(self) -> str:

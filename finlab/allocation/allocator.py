@@ -139,6 +139,7 @@ class Allocator:
         return made
 
     def _prepare(self, layout: Layout, choice: methods.MethodChoice) -> None:
+        """Prepares the undamaged robot; all constructors end here."""
         self._layout = layout
         self._choice = choice
         self._scale = yardstick(layout)

@@ -133,7 +133,16 @@ class Method(ABC):
     def networks_in(
         cls, files: Mapping[str, bytes], source: str, name: str | None
     ) -> Networks | None:
-        """Returns the networks that came with a bundle; None for methods without."""
+        """Reads the networks that came with a bundle.
+
+        Args:
+            files: of the networks, by name; none where they come with finlab.
+            source: what errors call the bundle.
+            name: of the checkpoint; None for the shipped one.
+
+        Returns:
+            The networks; None for methods without.
+        """
         return None
 
     @classmethod
@@ -284,6 +293,7 @@ class LeastErrorMethod(Method):
         """Solve for targets (N, 6); see `Method.solve`."""
 
     def solve(self, targets: Array, *, flow: Array | None = None, **question: Any) -> Solution:
+        """Solves for targets in a flow; see `Method.solve`. The policy is the plain one."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
         in_flow = self.at(flow)

@@ -64,7 +64,15 @@ def working_actuators(damaged: Layout, damage: Damage) -> NDArray[np.bool_]:
 
 
 def without_lost(damaged: Layout, damage: Damage) -> Layout:
-    """Returns the robot of the actuators that are not lost; itself where none is."""
+    """Takes the lost actuators out of a robot.
+
+    Args:
+        damaged: the robot, with the limits that damage has left.
+        damage: what is known of it.
+
+    Returns:
+        The robot of the actuators that are not lost; itself where none is.
+    """
     return damaged.without(damage.lost) if damage.lost else damaged
 
 
@@ -102,8 +110,15 @@ class RobotState:
         return among_all(command, self.works)
 
     def with_free_axes(self, wrench: Array, value: float) -> Array:
-        """Returns wrenches (..., 6) [N, N m] with a value along the free axes: methods take 0
-        there, results show NaN."""
+        """Marks the free axes of wrenches.
+
+        Args:
+            wrench: (..., 6) [N, N m].
+            value: along the free axes: methods take 0 there, results show NaN.
+
+        Returns:
+            Wrenches (..., 6); the same array where no axis is free.
+        """
         return wrench if self.free is None else np.where(self.free, value, wrench)
 
 
@@ -317,7 +332,9 @@ def check_reference(reference: ArrayLike) -> Array:
 
 
 _ONE_WRENCH = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m"
+"""What is expected of one wrench, in words."""
 _MANY_WRENCHES = "an array of shape (N, 6) in N and N m"
+"""What is expected of many wrenches, in words."""
 
 
 def _wrenches(wrenches: ArrayLike, argument: str) -> Array:
@@ -329,6 +346,7 @@ def _wrenches(wrenches: ArrayLike, argument: str) -> Array:
 
 
 def _wrong_shape(argument: str, expected: str, array: Array) -> CommandError:
+    """The error of an argument whose array has another shape than is expected."""
     return CommandError(f"{argument}: expected {expected}, got an array of shape {array.shape}")
 
 

@@ -41,8 +41,15 @@ class PlainData:
 
 
 def equal(a: Any, b: Any) -> bool:
-    """Returns whether two values are equal: arrays element by element, tuples part by part, NaN to
-    NaN."""
+    """Compares two values, of which either may be an array.
+
+    Args:
+        a: any value.
+        b: any other.
+
+    Returns:
+        Whether they are equal: arrays element by element, tuples part by part, NaN to NaN.
+    """
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         may_hold_nan = a.dtype.kind == b.dtype.kind == "f"
         return np.array_equal(a, b, equal_nan=may_hold_nan)
@@ -89,11 +96,10 @@ class Candidates(PlainData):
 
     def followed_by(self, others: "Candidates") -> "Candidates":
         """Returns these, then others."""
-        both = {
-            name: np.concatenate([getattr(self, name), getattr(others, name)])
-            for name in CANDIDATE_ARRAYS
-        }
-        return Candidates(**both, source=self.source + others.source)
+        arrays = {}
+        for name in CANDIDATE_ARRAYS:
+            arrays[name] = np.concatenate([getattr(self, name), getattr(others, name)])
+        return Candidates(**arrays, source=self.source + others.source)
 
 
 class Solution(NamedTuple):

@@ -153,6 +153,7 @@ class CoupledCore(Core):
             return OuterResult(answer._replace(force=self._force.copy()), *self._end.tolist())
 
     def _call(self) -> int:
+        """Runs the iterations for the question that is written; returns an error code."""
         error: int = self._core.fl_settle(
             ctypes.addressof(self._whole),
             self._block_address,
@@ -185,6 +186,7 @@ class CoupledCore(Core):
 
 
 def _address_of(array: Array | None) -> int | None:
+    """The address of an array's numbers; None for none."""
     return None if array is None else array.ctypes.data
 
 

@@ -71,6 +71,7 @@ class Px4(LeastErrorMethod):
     settings: Px4Settings
 
     def prepare(self) -> None:
+        """Makes the mix of PX4's pseudo-inverse."""
         lower = self.plant.lower[:, 0]
         upper = self.plant.upper[:, 0]
         is_fixed, self._wrench_of_fixed = fixed_actuators_of(self.plant)
@@ -86,6 +87,7 @@ class Px4(LeastErrorMethod):
         self.setpoint_unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Mixes, desaturates and clips."""
         from_others = targets - self._wrench_of_fixed
         setpoint = self.setpoint_scale * SIGNS * from_others[:, ROWS]
         output_by_axis = setpoint[:, None, :] * self.mix
@@ -183,6 +185,7 @@ class ArduSub(LeastErrorMethod):
     takes = "thrusters"
 
     def prepare(self) -> None:
+        """Finds the factors of the frame that the thrusters make."""
         effectiveness = self.plant.effectiveness[:, 0, COLUMNS] * SUB_SIGNS
         is_fixed, self._wrench_of_fixed = fixed_actuators_of(self.plant)
         self.factors = np.zeros(effectiveness.shape)
@@ -203,6 +206,7 @@ class ArduSub(LeastErrorMethod):
         )
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Multiplies, scales by groups and clips."""
         lower = self.plant.lower[:, 0]
         upper = self.plant.upper[:, 0]
         force = np.zeros((len(targets), self.plant.n))

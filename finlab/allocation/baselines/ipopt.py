@@ -92,7 +92,16 @@ class ForceProgram:
         self._bounds = dict(zip(("lbg", "ubg", "lbx", "ubx"), (*between, *ends), strict=True))
 
     def command(self, target: Array, start: Array) -> Array:
-        """Returns the command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
+        """Solves for one target from one start.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            start: forces (n, 2) [N].
+
+        Returns:
+            The command (n, 3) of the forces where IPOPT ends; of the start where these are not
+            finite.
+        """
         largest = self._largest[:, None]
         answer = self._solver(x0=(start / largest).ravel(), p=target, **self._bounds)
         force = np.array(answer["x"], np.float64).reshape(start.shape) * largest
@@ -232,10 +241,15 @@ POLISH = 3
 """Levenberg-Marquardt steps onto the target from where IPOPT ends."""
 APPROACH = 30
 """Levenberg-Marquardt steps from there where a few do not meet it: as near as they come."""
-SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
-    f"ipopt.{name}": value
-    for name, value in {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}.items()
+SOLVER_OPTIONS = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 200,
+    "ipopt.tol": 1e-9,
 }
+"""Options of CasADi and IPOPT: silent, and an end that is not optimal is no error."""
 
 
 @dataclass(frozen=True)
@@ -262,10 +276,12 @@ class Ipopt(ModelBased):
     settings: IpoptSettings
 
     def prepare(self) -> None:
+        """Imports CasADi, before anything is asked."""
         super().prepare()
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves for one target after the other."""
         answers = [self._answer(target, seed) for target in targets]
         return np.array(answers).reshape(len(targets), self.plant.n, 3)
 
@@ -284,11 +300,13 @@ class Ipopt(ModelBased):
 
     @cached_property
     def _program(self) -> ForceProgram:
+        """The program of this robot, made when it is first asked."""
         options = SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
         return ForceProgram(self._casadi, self._inverse, self.sigma, options)
 
 
 def import_casadi() -> Any:
+    """Returns the module `casadi`. Raises AllocationError: it is not installed."""
     try:
         import casadi
     except ImportError as error:

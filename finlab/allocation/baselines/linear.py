@@ -56,9 +56,11 @@ class Qp(ModelBased):
 
     @cached_property
     def _map(self) -> LinearMap:
+        """The linear map of this robot, made when it is first asked."""
         return LinearMap(self.plant, self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves one box problem for each target."""
         linear = self._map
         plant = self.plant
         n_free = int(linear.free.sum())
@@ -98,6 +100,7 @@ class PaperSqp(ModelBased):
     settings: PaperSqpSettings
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Descends from one start after the other, until one ends on the target."""
         plant = self.plant
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
         starts = [0.5 * (plant.lower + plant.upper), *random]

@@ -146,6 +146,7 @@ class ModelBased(LeastErrorMethod):
     settings_class: ClassVar[type[Settings]] = Settings
 
     def prepare(self) -> None:
+        """Reads what is kept least."""
         self.objective: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
         if self.objective == "effort":
@@ -183,6 +184,7 @@ class ModelBased(LeastErrorMethod):
         return np.array(refined.command[best_first[0]])
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Solves for targets, whatever the command before."""
         return Solution(self.plant.feasible(self._commands(targets, seed)))
 
 
@@ -202,6 +204,7 @@ class Analytic(ModelBased):
     takes = "any actuator"
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Returns the pseudo-inverse's commands."""
         return self._inverse.command(targets)
 
 
@@ -235,6 +238,7 @@ class FixedFrequency(ModelBased):
 
     @cached_property
     def _inverse(self) -> PseudoInverse:
+        """The pseudo-inverse of the robot whose fins all beat at the frequency."""
         layout = self.layout
         fins = []
         for fin in layout.actuators:
@@ -245,6 +249,7 @@ class FixedFrequency(ModelBased):
         return PseudoInverse(plant.at(self.plant.flow), self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Scales the pseudo-inverse's forces down together, and stops fins that give too little."""
         inverse = self._inverse
         lower = self.plant.lower
         force = inverse.force(targets)

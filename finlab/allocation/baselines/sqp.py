@@ -62,11 +62,13 @@ class Sqp(ModelBased):
 
     @cached_property
     def _program(self) -> tuple[CommandProblem, Solve]:
+        """What brings starts onto a target, and what makes them cheap there."""
         meter = cost_meter(self.objective, self.plant)
         solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps)
         return CommandProblem.of(self.plant, self.sigma), solve
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves for one target after the other."""
         problem, solve = self._program
         plant = self.plant
         answer = self._inverse.command(targets)

@@ -79,6 +79,7 @@ class Dual(Method):
     settings: DualSettings
 
     def prepare(self) -> None:
+        """Compiles the robot for the core."""
         miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
         self.compiled = Compiled(
             self.layout, self.plant, self.scale, self.settings.period_s, miss_cost
@@ -100,6 +101,7 @@ class Dual(Method):
         return coupled_core(self.plant, self.compiled)
 
     def at(self, flow: Array | None) -> Self:
+        """Returns the method in a flow; see `Method.at`. The last flow's is kept."""
         if flow is None:
             return self
         key = flow.tobytes()
@@ -161,6 +163,7 @@ class Dual(Method):
         return self.settings.calm > 0.0 and bool(self.turning_pods.any())
 
     def in_time(self, target: Array, reference: Array) -> Array:
+        """Returns which wrench is answered; see `Method.in_time`."""
         # Turning is what makes pods late, and they turn ahead: what is asked for is given at once.
         return target if self.turns_ahead else super().in_time(target, reference)
 
@@ -391,6 +394,7 @@ class Dual(Method):
 
     @cached_property
     def undriven(self) -> tuple[str, ...]:
+        """Names of the axes of a wrench that no actuator gives."""
         return axes_in(~self._driven(NOMINAL))
 
     def _driven(self, conditions: Conditions) -> NDArray[np.bool_]:

@@ -42,6 +42,7 @@ CHEAPER = 10.0 * CLOSE
 """Share of the power by which an answer has to be cheaper for others like it to be tried."""
 
 _PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
+"""Signs of two: the same, and opposite."""
 WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 """Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
 
