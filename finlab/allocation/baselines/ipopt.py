@@ -65,15 +65,15 @@ class ForceProgram:
         self._parts: list[_Line | _Plane | _Fixed] = []
         for response, index in zip(inverse.responses, inverse.group_indices, strict=True):
             i = index.actuator
-            own = share[2 * i : 2 * i + 2]
+            share_of_actuator = share[2 * i : 2 * i + 2]
             if inverse.is_fixed[i]:
                 self._parts.append(_Fixed())
             elif isinstance(response, Plane):
-                self._parts.append(_Plane(casadi, response, own))
+                self._parts.append(_Plane(casadi, response, share_of_actuator))
             else:
                 _, group = inverse.groups[index.group]
                 largest = float(self._largest[i])
-                line = _Line(casadi, response, own, largest, group, index.in_group)
+                line = _Line(casadi, response, share_of_actuator, largest, group, index.in_group)
                 self._parts.append(line)
                 wrench += line.wrench_offset
         self.convex = all(part.convex for part in self._parts)
@@ -122,8 +122,12 @@ class ForceProgram:
         if self.convex:
             return first
         rng = np.random.default_rng(seed)
-        drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
-        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._largest[:, None]])
+        random_starts = np.array(
+            [[part.random(rng) for part in self._parts] for _ in range(n_random)]
+        )
+        return np.concatenate(
+            [first, random_starts.reshape(-1, *first.shape[1:]) * self._largest[:, None]]
+        )
 
 
 class _Fixed:

@@ -63,9 +63,9 @@ class Compiled:
         self._single_of_group: dict[int, Group] = {}
         """Of each group all of whose responses are by the same tables, by its index: the first of
         its actuators as a group of its own, which answers for all."""
-        for index, (places, group) in enumerate(self.groups):
+        for index, (indices, group) in enumerate(self.groups):
             if _shares_tables(group):
-                first = slice(places[0], places[0] + 1)
+                first = slice(indices[0], indices[0] + 1)
                 single = groups_of(layout.actuators[first], plant.effectiveness[first])
                 self._single_of_group[index] = single[0][1]
         self._compile()
@@ -91,18 +91,18 @@ class Compiled:
         forms: list[Any] = [None] * self.count
         self.uncertainty_cost = np.zeros(self.count)
         """What a squared force costs beside its power (n,) [W/N^2]."""
-        for places, group in self.groups:
-            for place, response, form in zip(places, group.responses, group.forms, strict=True):
+        for indices, group in self.groups:
+            for i, response, form in zip(indices, group.responses, group.forms, strict=True):
                 if self.miss_cost is not None:
                     squared_effectiveness = response.effectiveness**2
-                    cost = (squared_effectiveness @ self.miss_cost[place]).sum()
-                    self.uncertainty_cost[place] = cost
-                cost = float(self.uncertainty_cost[place])
+                    cost = (squared_effectiveness @ self.miss_cost[i]).sum()
+                    self.uncertainty_cost[i] = cost
+                cost = float(self.uncertainty_cost[i])
                 # Of a foil the core adds the cost itself, since the drag has a price of its own.
                 drags = isinstance(response, Line) and response.drag is not None
                 dearer = with_square(response, cost) if cost and not drags else response
-                responses[place] = dearer
-                forms[place] = form
+                responses[i] = dearer
+                forms[i] = form
         self.wrench_offset = self.wrench_offset_of(np.ones(self.count, bool))
         """Wrench (6,) [N, N m] at forces of 0, such as the drag of foils without lift."""
         self.robot = DualRobot(
@@ -120,8 +120,8 @@ class Compiled:
     def wrench_offset_of(self, works: NDArray[np.bool_]) -> Array:
         """Returns the wrench (6,) [N, N m] at forces of 0 of the actuators that work (n,)."""
         wrench = np.zeros(6)
-        for places, group in self.groups:
-            wrench = wrench + group.beside[works[places]].sum(axis=0)
+        for indices, group in self.groups:
+            wrench = wrench + group.beside[works[indices]].sum(axis=0)
         return wrench * self._counts
 
     def at(self, inflow: Array | None) -> "Compiled":
@@ -139,10 +139,10 @@ class Compiled:
         other = copy(self)
         other.groups = []
         other._single_of_group = {}
-        for index, (places, group) in enumerate(self.groups):
-            inflow_of_group = None if inflow is None else inflow[places]
+        for index, (indices, group) in enumerate(self.groups):
+            inflow_of_group = None if inflow is None else inflow[indices]
             moved = group.at(inflow_of_group)
-            other.groups.append((places, moved))
+            other.groups.append((indices, moved))
             if moved is group and index in self._single_of_group:
                 other._single_of_group[index] = self._single_of_group[index]
         other._compile()
@@ -153,9 +153,9 @@ class Compiled:
         """Directions (n, 2, 3) of each actuator's forces in its own axes."""
         directions = np.zeros((self.count, 2, 6))
         own_axes = np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))
-        for places, group in groups_of(self._actuators, own_axes):
-            for place, response in zip(places, group.responses, strict=True):
-                directions[place] = response.rows
+        for indices, group in groups_of(self._actuators, own_axes):
+            for i, response in zip(indices, group.responses, strict=True):
+                directions[i] = response.rows
         return directions[..., :3]
 
     def forces_along(self, force: Array) -> Array:
@@ -174,16 +174,16 @@ class Compiled:
             Conjugates (N, m) [W] of the group's m actuators, or upper bounds of them; NaN, or None
             for all, where the tables say the same as the laws.
         """
-        places, group = self.groups[index]
-        price = by_tables.price_ahead[:, places]
-        price_reverse = by_tables.price_reverse[:, places]
+        indices, group = self.groups[index]
+        price = by_tables.price_ahead[:, indices]
+        price_reverse = by_tables.price_reverse[:, indices]
         single = self._single_of_group.get(index)
         if single is not None:
             # Identical tables: one actuator, within all that its limits allow, answers for all.
             bound = single.radial_worth(price.reshape(-1, 1), price_reverse.reshape(-1, 1), None)
             return None if bound is None else bound.reshape(price.shape)
         force_limits = np.stack(
-            [by_tables.force_min[0, places], by_tables.force_max[0, places]], axis=-1
+            [by_tables.force_min[0, indices], by_tables.force_max[0, indices]], axis=-1
         )
         return group.radial_worth(price, price_reverse, force_limits)
 
@@ -242,13 +242,13 @@ def power_bound(
     """
     by_tables = compiled.robot.core.conjugates(lam, conditions)
     conjugate = by_tables.conjugate.copy()
-    for index, (places, group) in enumerate(compiled.groups):
+    for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)
         in_all_directions = group.worth(lam)
         for by_laws in (along_price, in_all_directions):
             if by_laws is not None:
                 is_said = ~np.isnan(by_laws)
-                conjugate[:, places] = np.where(is_said, by_laws, conjugate[:, places])
+                conjugate[:, indices] = np.where(is_said, by_laws, conjugate[:, indices])
     wrench_offset = compiled.wrench_offset
     if conditions.lost is not None:
         conjugate[:, conditions.lost] = 0.0
