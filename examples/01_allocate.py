@@ -1,6 +1,8 @@
-# %% [markdown] # A wrench becomes commands A layout and a target wrench go in, one command per fin
-# comes out: half amplitude, frequency and zero direction. You will see layout A of the paper, its
-# four commands, and their power beside the least that any answer takes.
+# %% [markdown]
+# # A wrench becomes commands
+# A layout and a target wrench go in, one command per fin comes out: half amplitude, frequency and zero
+# direction. You will see layout A of the paper, its four commands, and their power beside the least that any
+# answer takes.
 
 # %%
 import finlab

@@ -1,6 +1,7 @@
-# %% [markdown] # A robot loses fins and goes on Nothing is trained again. You will see one target
-# for four fins, for three and for two, what the loss of each single fin costs, and a swim on which
-# a fin breaks.
+# %% [markdown]
+# # A robot loses fins and goes on
+# Nothing is trained again. You will see one target for four fins, for three and for two, what the loss of
+# each single fin costs, and a swim on which a fin breaks.
 
 # %%
 import finlab
@@ -21,15 +22,15 @@ for lost in ([], ["front_right"], ["front_right", "back_left"]):
 # %%
 score_card(layout)
 
-# %% [markdown] After 8 s of this circle a fin stops. The controller asks for the same wrench; the
-# allocator takes it from the other three.
+# %% [markdown]
+# After 8 s of this circle a fin stops. The controller asks for the same wrench; the allocator takes it from
+# the other three.
 
 # %%
 swim = ClosedLoop(
     layout, allocator, make_trajectory("circle", 40.0), failures=[("front_right", 8.0)]
 ).run()
 print(
-    f"{swim.n_ticks} ticks, at the end {abs(swim.position[-1] - swim.reference[-1]).max():.2f} m "
-    "off"
+    f"{swim.n_ticks} ticks, at the end {abs(swim.position[-1] - swim.reference[-1]).max():.2f} m off"
 )
 swim

@@ -1,6 +1,7 @@
-# %% [markdown] # Methods side by side Every method answers through the same interface, and the
-# fins' own laws judge them all. You will see error, power, effort and time of six methods on one
-# target, and a picture of two of them.
+# %% [markdown]
+# # Methods side by side
+# Every method answers through the same interface, and the fins' own laws judge them all. You will see error,
+# power, effort and time of six methods on one target, and a picture of two of them.
 
 # %%
 import matplotlib.pyplot as plt

@@ -1,6 +1,7 @@
-# %% [markdown] # A robot of your own Describe a robot in Python, see what it can push, save it as a
-# layout file, and allocate with it. You will see a robot of three thrusters, the file, the forces
-# that it can give, and one answer.
+# %% [markdown]
+# # A robot of your own
+# Describe a robot in Python, see what it can push, save it as a layout file, and allocate with it. You will
+# see a robot of three thrusters, the file, the forces that it can give, and one answer.
 
 # %%
 from pathlib import Path
@@ -30,8 +31,9 @@ with TemporaryDirectory() as folder:
     print(path.read_text())
     layout = finlab.load_layout(path)
 
-# %% [markdown] Forces that it can give with no torque about z: a sheet in surge and heave. Of two
-# thrusters side by side both have to push alike.
+# %% [markdown]
+# Forces that it can give with no torque about z: a sheet in surge and heave. Of two thrusters side by side
+# both have to push alike.
 
 # %%
 attainable_set(layout, "force")

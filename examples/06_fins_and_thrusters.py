@@ -1,6 +1,7 @@
-# %% [markdown] # Fins and thrusters in one robot Light loads go to the fins, heavy ones to the
-# thrusters. You will see what more and more lift takes beside the least that any answer takes, and
-# what becomes of a lift out of reach by two policies.
+# %% [markdown]
+# # Fins and thrusters in one robot
+# Light loads go to the fins, heavy ones to the thrusters. You will see what more and more lift takes beside
+# the least that any answer takes, and what becomes of a lift out of reach by two policies.
 
 # %%
 import matplotlib.pyplot as plt

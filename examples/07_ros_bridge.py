@@ -1,6 +1,7 @@
-# %% [markdown] # A bridge to ROS 2 Wrenches come in, fin commands go out, by a robot's bundle.
-# Without ROS a stand-in plays the topics. You will see what the bridge publishes for three
-# wrenches, and the last answer.
+# %% [markdown]
+# # A bridge to ROS 2
+# Wrenches come in, fin commands go out, by a robot's bundle. Without ROS a stand-in plays the topics. You
+# will see what the bridge publishes for three wrenches, and the last answer.
 
 # %%
 from collections.abc import Callable

@@ -1,6 +1,7 @@
-# %% [markdown] # From a load cell to an exact allocation A noisy file becomes a fin that no formula
-# describes. You will see what the fit is worth, and a command for each fin of layout A, were they
-# all such fins.
+# %% [markdown]
+# # From a load cell to an exact allocation
+# A noisy file becomes a fin that no formula describes. You will see what the fit is worth, and a command for
+# each fin of layout A, were they all such fins.
 
 # %%
 from dataclasses import replace

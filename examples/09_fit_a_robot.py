@@ -1,6 +1,7 @@
-# %% [markdown] # A robot that is not built as drawn From a swim to where its fins and its centre of
-# gravity really are. You will see what the fit is worth, and what an allocation for the drawn robot
-# and for the fitted one gives.
+# %% [markdown]
+# # A robot that is not built as drawn
+# From a swim to where its fins and its centre of gravity really are. You will see what the fit is worth, and
+# what an allocation for the drawn robot and for the fitted one gives.
 
 # %%
 import math
@@ -17,8 +18,9 @@ from finlab.swim.simulation.excite import excitation
 drawn = finlab.load_layout("A")
 built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))
 
-# %% [markdown] A real robot writes a CSV file in place of this simulated log;
-# `10_swim_from_rosbag.py` makes one of a rosbag.
+# %% [markdown]
+# A real robot writes a CSV file in place of this simulated log; `10_swim_from_rosbag.py` makes one of a
+# rosbag.
 
 # %%
 with TemporaryDirectory() as folder:

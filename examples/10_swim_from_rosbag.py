@@ -1,9 +1,8 @@
 """From a rosbag to a CSV file that `finlab fit robot` reads; `pip install rosbags`, no ROS.
 
-You will see how it is called, or, given a bag (ROS 1 or 2) and a file to write, how many rows were
-written. Odometry is taken from nav_msgs/Odometry (pose in the world, z up; twist in the body
-frame), commands from a std_msgs/Float64MultiArray with A [rad], f [Hz], phi [rad] of each fin in
-order: change TOPICS to yours.
+You will see how it is called, or, given a bag (ROS 1 or 2) and a file to write, how many rows were written.
+Odometry is taken from nav_msgs/Odometry (pose in the world, z up; twist in the body frame), commands from a
+std_msgs/Float64MultiArray with A [rad], f [Hz], phi [rad] of each fin in order: change TOPICS to yours.
 """
 
 import csv

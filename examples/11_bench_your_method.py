@@ -1,6 +1,7 @@
-# %% [markdown] # Your own method on the benchmark SciPy's least squares on the commands, in fifteen
-# lines. You will see how much it delivers of what is asked of robots that it has never seen, at
-# what power and in what time, beside method `dual`.
+# %% [markdown]
+# # Your own method on the benchmark
+# SciPy's least squares on the commands, in fifteen lines. You will see how much it delivers of what is asked
+# of robots that it has never seen, at what power and in what time, beside method `dual`.
 
 # %%
 from typing import Any

@@ -1,7 +1,8 @@
-# %% [markdown] # What method `dual` does, in thirty lines of numpy The robot has two thrusters at
-# the stern and an azimuth at the bow. Each actuator answers a price [W/N] with the force that is
-# worth most; Newton finds the right prices. You will see the forces of a surge, a sway and a yaw at
-# the least watts, and what another answer could save.
+# %% [markdown]
+# # What method `dual` does, in thirty lines of numpy
+# The robot has two thrusters at the stern and an azimuth at the bow. Each actuator answers a price [W/N] with
+# the force that is worth most; Newton finds the right prices. You will see the forces of a surge, a sway and
+# a yaw at the least watts, and what another answer could save.
 
 # %%
 import matplotlib.pyplot as plt
@@ -11,8 +12,7 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 
 B = np.array([[1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-0.4, 0.4, 0.0, 0.9]])
-"""Wrench (Fx, Fy, Tz) of 1 N of the thrusters at y = 0.4 and -0.4 m, and of the azimuth at x = 0.9
-m."""
+"""Wrench (Fx, Fy, Tz) of 1 N of the thrusters at y = 0.4 and -0.4 m, and of the azimuth at x = 0.9 m."""
 # watts over N^1.5
 FORWARD = 0.997
 REVERSE = 1.449
@@ -22,8 +22,7 @@ LEAST = 39.91
 
 
 def answers(price: Array) -> tuple[Array, Array, float]:
-    """Forces (4,) [N] that are worth most at prices (4,) [W/N], their derivative (4, 4) and their
-    watts."""
+    """Forces (4,) [N] that are worth most at prices (4,) [W/N], their derivative (4, 4) and their watts."""
     size = np.array([*np.abs(price[:2]), *2 * [np.hypot(*price[2:])]]) + 1e-12
     back = np.array([*(price[:2] < 0.0), False, False])
     scale = np.where(back, REVERSE, FORWARD)

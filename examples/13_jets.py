@@ -1,6 +1,7 @@
-# %% [markdown] # What jets take, from twenty samples Jets that meet other actuators or the hull
-# weaken them. You will see what the laws alone miss, and what the fitted jets leave of it. The tank
-# here is a robot whose jets spread and weaken otherwise than usual.
+# %% [markdown]
+# # What jets take, from twenty samples
+# Jets that meet other actuators or the hull weaken them. You will see what the laws alone miss, and what the
+# fitted jets leave of it. The tank here is a robot whose jets spread and weaken otherwise than usual.
 
 # %%
 from dataclasses import replace
@@ -22,7 +23,7 @@ measured = wrench + 0.02 * wrench.std(axis=0) * rng.normal(size=wrench.shape)
 
 # %%
 fit = fit_constants(Samples(believed, command, measured))
-print(f"laws alone miss {fit.laws:.3f} of the yardstick, with jets {fit.left:.3f}")
+print(f"laws alone miss {fit.laws:.3f} of the wrench scale, with jets {fit.left:.3f}")
 print(fit.jets)
 
 # %%

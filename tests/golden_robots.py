@@ -81,7 +81,9 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
     has_no_gaps = not any(actuator.kind == "fin" for actuator in plant.actuators)
     rng = np.random.default_rng(seed)
     block = thinned(Compiled.of(load(layout)).robot.block)
-    plant.scales = head_of(block)["yard"].copy()  # both measure a miss on the same yardstick
+    plant.scales = head_of(block)[
+        "wrench_scale"
+    ].copy()  # both measure a miss on the same yardstick
     questions = [_question(plant, rng) for _ in range(N_QUESTIONS)]
     columns = plant.effectiveness.T
     lines = [

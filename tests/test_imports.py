@@ -163,13 +163,16 @@ def test_the_core_imports_no_wing_and_all_imports_go_one_way() -> None:
     for path in _sources("finlab"):
         module = _module_of(path)
         here = _room(module)
-        if here is None:  # finlab/__init__.py and __main__.py are the front door
+        if here is None:  # finlab/__init__.py and __main__.py import what the package offers
             continue
         for imported, line in _imports(path):
             there = _room(imported)
             if there is not None and not _allowed(module, here, there):
                 wrong.append(f"{path.relative_to(ROOT)}:{line} imports {imported}")
-    assert not wrong, "\n".join(wrong)
+    advice = (
+        "CORE and WINGS say what a room may import; a verb that imports a wing has a line in VERBS"
+    )
+    assert not wrong, "\n".join([*wrong, advice])
 
 
 def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:

@@ -30,7 +30,7 @@ from finlab.research.evaluation.scoring import ratio_interval, sigma_of
 from finlab.research.evaluation.splits import SPLITS, Case, make_split
 
 EXACT, TRACKED = 1e-5, 1e-3
-"""Normalized errors up to which the yardstick and a method count as delivering a target."""
+"""Normalized errors up to which the reference and a method count as delivering a target."""
 CHEAPER = 1.0 - 1e-4
 """Cost over the reference's below which a method has won."""
 KEEPS: dict[str, Name] = {
@@ -183,7 +183,7 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
+        "The reference is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
         "and tables: "
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
         f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."

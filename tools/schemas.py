@@ -4,6 +4,7 @@ them."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -25,10 +26,26 @@ def schemas() -> dict[Path, str]:
             "$schema": "https://json-schema.org/draft/2020-12/schema",
             "$id": f"{title}.schema.json",
         }
-        texts[PACKAGE / name] = (
-            json.dumps({**head, "title": title, **msgspec.json.schema(kind)}, indent=1) + "\n"
-        )
+        schema = {**head, "title": title, **unwrapped(msgspec.json.schema(kind))}
+        texts[PACKAGE / name] = json.dumps(schema, indent=1) + "\n"
     return texts
+
+
+def unwrapped(schema: Any) -> Any:
+    """Returns a schema whose descriptions, which come from docstrings, have one line for each
+    paragraph: how wide the source is does not show in them."""
+    if isinstance(schema, list):
+        return [unwrapped(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    result = {}
+    for key, value in schema.items():
+        if key == "description" and isinstance(value, str):
+            paragraphs = value.split("\n\n")
+            result[key] = "\n\n".join(" ".join(words.split()) for words in paragraphs)
+        else:
+            result[key] = unwrapped(value)
+    return result
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """One browser: state, questions, answers, and the page that is written of them, in one loop.
 
-browser   a widget changes            viser calls `Intents.do` on the event loop loop      the
-session changes         nothing else ever changes it loop      `Jobs.ask`                  what can
-be seen is asked; what was asked already costs nothing thread    `solve(question)`           pure:
-it knows no widget, no session, no loop loop      `facts_of`, `Board`         widgets are functions
-of facts; what did not change is not sent
+browser   a widget changes       viser calls `Intents.do` on the event loop
+loop      the session changes    nothing else ever changes it
+loop      `Jobs.ask`             what can be seen is asked; what was asked already costs nothing
+thread    `solve(question)`      pure: it knows no widget, no session, no loop
+loop      `facts_of`, `Board`    widgets are functions of facts; what did not change is not sent
 """
 
 import asyncio

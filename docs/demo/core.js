@@ -41,8 +41,8 @@ export function prepare(core, block, n) {
   // Of the actuators the one whose number is `lost` does not work; -1 for none. Its rows are null.
   return (wrench, kind = "closest", groups = [], lost = -1) => {
     served("policy")[0] = POLICIES.indexOf(kind);
-    served("groups")[0] = groups.length;
-    served("weight").fill(1);
+    served("group_count")[0] = groups.length;
+    served("axis_weight").fill(1);
     served("group").set(groups.flat());
     new Uint8Array(core.memory.buffer, question, fl_question.size).fill(0); // no axis free, no tick
     asked("wrench").set(wrench);
@@ -58,7 +58,7 @@ export function prepare(core, block, n) {
       return core.fl_power_of_force(robot, i, size);
     });
     if (lost >= 0) for (const each of [force, command, power]) each[lost] = null;
-    const [within] = answered("within");
-    return { force, power, command, wrench: answered("aim"), within: within === 1 };
+    const [within] = answered("is_attainable");
+    return { force, power, command, wrench: answered("wrench_served"), within: within === 1 };
   };
 }

@@ -15,7 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
@@ -169,7 +169,14 @@ class FinLaw(ActuatorLaw):
 
 
 class PlanarLaw(FinLaw):
-    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction."""
+    """A fin whose mean force lies in the plane across its shaft: a size T(A, f, phi), and the
+    direction phi + `offset`.
+
+    The response to a price is compiled from size and power in that plane, so that the lower bound
+    of the power holds for such laws alone: `force` is final, and no subclass can add a force along
+    the shaft. Where the size depends on the zero direction, `uniform` is False and `unevenness`
+    says how.
+    """
 
     def grid_numbers(self, lower: Array, upper: Array) -> Array:
         """See `FinLaw`: of the size."""
@@ -188,6 +195,7 @@ class PlanarLaw(FinLaw):
     ) -> tuple[Array, Array, Array | float]:
         """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
 
+    @final
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         xp = library_of(command)
         amplitude = command[..., 0]
@@ -208,6 +216,7 @@ class PlanarLaw(FinLaw):
         parts = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(parts, axis=-1)
 
+    @final
     def force_and_jacobian(
         self, command: Array, inflow: Array | None = None
     ) -> tuple[Array, Array]:

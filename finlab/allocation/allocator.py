@@ -75,7 +75,7 @@ class Allocator:
             method: one of `finlab.allocation.METHODS`, or a class of your own.
             checkpoint: for methods with networks: a checkpoint folder, the name of a shipped
                 checkpoint, or what `read_checkpoint` gives; by default the shipped one.
-            robust: what an expected miss of 1 % of the yardstick is worth [W], growing with its
+            robust: what an expected miss of 1 % of the wrench scale is worth [W], growing with its
                 square; from 0 to 1e9, 0 by default: how far actuators may be from their laws then
                 costs nothing.
             period_s: time between ticks [s], above 0 and up to 1000, 0.1 by default: with the rates

@@ -95,7 +95,7 @@ def interaction(
     robot = open_robot(layout)[0]
     fit = fit_constants(in_worker(read_table, robot, samples))
     print(
-        f"laws alone miss {fit.laws:.3g} of the yardstick (root mean square), with jets "
+        f"laws alone miss {fit.laws:.3g} of the wrench scale (root mean square), with jets "
         f"{fit.left:.3g}"
     )
     print(f"interaction: {plain(fit.jets)}".replace("'", ""))

@@ -43,7 +43,7 @@ def allocate(
         free: an axis that may take any wrench, such as Ty.
         method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or
         ipopt.
-        robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
+        robust: for method dual: watts that an expected error of 1 % of the wrench scale is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or
         priority.

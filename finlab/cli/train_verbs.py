@@ -126,7 +126,7 @@ def interaction(
     check_positive(steps=steps, minutes=minutes)
     error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
     print(
-        f"{output / WEIGHTS_FILE}: error {error:.3g} of the yardstick on robots held out, noise "
+        f"{output / WEIGHTS_FILE}: error {error:.3g} of the wrench scale on robots held out, noise "
         "included"
     )
 
@@ -159,7 +159,8 @@ def generate(
         commands: random commands on each of them.
         seed: of all draws.
         varied_limits: share of the layouts whose fins have limits of their own.
-        fin_model: what causes the wrenches: drag, lighthill, soft, or a table of measured forces.
+        fin_model: what causes the wrenches: a law of fins by its name in layout files, such as
+            drag, or a table of measured forces.
     """
     from finlab.errors import CommandError
     from finlab.layout import FinModelSpec

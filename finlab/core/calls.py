@@ -133,8 +133,8 @@ def _policy_record(policy: PolicyFields) -> Record:
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
     record["policy"] = POLICIES.index(policy.kind)
-    record["groups"] = len(policy.groups)
-    record["weight"] = weights / weights.max()
+    record["group_count"] = len(policy.groups)
+    record["axis_weight"] = weights / weights.max()
     for index, axes in enumerate(policy.groups):
         record["group"][:, index] = axes
     return record
@@ -156,13 +156,13 @@ class _Question:
         # Views of the fields, since every tick would pay for looking them up by name.
         self._wrench = record["wrench"]
         self._policy_pointer = record["policy"]
-        self._lam_pointer = record["price"]
+        self._lam_pointer = record["prices"]
         self._previous_pointer = record["previous"]
         self._lost_pointer = record["lost"]
         self._free_pointer = record["free"]
         self._calm = record["calm"]
         self._ticks = record["ticks"]
-        self._angles_wanted_pointer = record["toward"]
+        self._angles_wanted_pointer = record["angles_wanted"]
 
         self._policy: Record | None = None
         self._lam = np.zeros(6)
@@ -227,13 +227,13 @@ class _Answer:
         self._record = record
         self.address = record.ctypes.data
         self._force = record["force"][:, :count]
-        self._lam = record["price"]
-        self._wrench_served = record["aim"]
-        self._gap_power_bound = record["value"]
+        self._lam = record["prices"]
+        self._wrench_served = record["wrench_served"]
+        self._gap_power_bound = record["gap_power_bound"]
         self._error = record["error"]
         self._command = record["command"][:, :count]
-        self._is_attainable = record["within"]
-        self._is_truncated = record["ended"]
+        self._is_attainable = record["is_attainable"]
+        self._is_truncated = record["is_truncated"]
 
     def read(self) -> CoreAnswer:
         """Returns a copy of what the core has written."""
@@ -390,24 +390,24 @@ class Core:
             )
         return command
 
-    def dual_value(self, wrench: Array, lam_reduced: Array) -> tuple[Array, float]:
+    def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
         """Evaluates the dual function (Eq. 3) at reduced multipliers.
 
         Args:
             wrench: desired (6,) [N, N m].
-            lam_reduced: multipliers (6,) [W] in the basis of what the actuators span.
+            lambda_reduced: multipliers (6,) [W] in the basis of what the actuators span.
 
         Returns:
             The responses (n, 2) [N] (Eq. 5), and the dual value [W].
         """
         wrench = np.ascontiguousarray(wrench)
-        lam_reduced = np.ascontiguousarray(lam_reduced)
+        lambda_reduced = np.ascontiguousarray(lambda_reduced)
         force = np.empty((self._count, 2))
-        value = self._core.fl_look(
+        value = self._core.fl_dual_value(
             self._block_address,
             self._work_address,
             wrench.ctypes.data,
-            lam_reduced.ctypes.data,
+            lambda_reduced.ctypes.data,
             force.ctypes.data,
         )
         return force, value
@@ -439,11 +439,11 @@ class Core:
             )
         _raise_refusal(error)
         return Conjugates(
-            price_ahead=records["price"],
-            price_reverse=records["price_back"],
+            price_ahead=records["price_ahead"],
+            price_reverse=records["price_reverse"],
             conjugate=records["conjugate"],
-            force_min=records["low"][:1],
-            force_max=records["high"][:1],
+            force_min=records["force_min"][:1],
+            force_max=records["force_max"][:1],
         )
 
 

@@ -1,7 +1,8 @@
-/* Control allocation in C99: commands of least power for a wanted wrench. No heap, no library but math.h.
+/* Control allocation in C99: commands of least power for a desired wrench. No heap, no library but
+   math.h.
 
-   A robot is one block of constant numbers, which Python compiles; its fields are in fl_fields.h. All that changes lies in
-   a work area, `fl_work`, one for each thread. The calls:
+   A robot is one block of constant numbers, which Python compiles; its fields are in fl_fields.h.
+   All that changes lies in a work area, `fl_work`, one for each thread. The calls:
 
      static fl_work work;
      static fl_answer answer;
@@ -11,9 +12,10 @@
      if (!code) code = fl_answer_one(block, &work, &question, &answer);
      if (code) puts(fl_error_text(code));
 
-   Units are SI; wrenches (Fx, Fy, Fz, Tx, Ty, Tz) are in the body frame, x forward, y left, z up. docs/theory/method.md has
-   the mathematics: the wrench is met at multipliers lambda, to which each actuator responds with the force that is worth
-   most there (Eq. 5); Newton's method finds the lambda at which the responses add up to the wrench (Eq. 8). */
+   Units are SI; wrenches (Fx, Fy, Fz, Tx, Ty, Tz) are in the body frame, x forward, y left, z up.
+   docs/theory/method.md has the mathematics, docs/theory/glossary.md the names: the wrench is met
+   at multipliers lambda, to which each actuator responds with the force that is worth most there
+   (Eq. 5); Newton's method finds the lambda at which the responses add up to the wrench (Eq. 8). */
 #ifndef FINLAB_H
 #define FINLAB_H
 #include "fl_names.h"
@@ -36,14 +38,14 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif
 
-/* Most steps of Newton's method in one answer by the usual settings: two searches of two parts, each a dive and two for
-   each cut. Where foils drag, steps of a start take FL_SETTLE more: starts of a part, of the foils' ends, of a lattice of
-   their angles (6) and of the shares of a ray. */
+/* Most steps of Newton's method in one answer by the usual settings: two searches of two parts,
+   each a dive and two for each cut. Where foils drag, steps of a start take FL_SETTLE more: starts
+   of a part, of the foils' ends, of a lattice of their angles (6) and of the shares of a ray. */
 #define FL_SETTLE (12 * 60)
 #define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
 
-#define FL_VERSION 5   /* of all structs and functions here */
+#define FL_VERSION 6   /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -60,7 +62,7 @@ typedef const struct fl_policy *fl_policy_at;
 #undef FL_FIELD
 #undef FL_END
 
-/* Kinds of commands: fl_actuator.form. */
+/* Kinds of commands: fl_actuator.command_kind. */
 enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
 
 /* What to give for a wrench beyond reach: fl_policy.policy. */
@@ -83,8 +85,9 @@ int fl_version(void);
    @return      a sentence that says what is wrong and what to do */
 const char *fl_error_text(int code);
 
-/* @return all fields of the structs as text, a struct a line: "fl_head fl_real magic;... fl_real scale[6];...". Who reads a
-           block or an answer in another language asks the library that he has loaded. */
+/* @return all fields of the structs as text, a struct a line:
+           "fl_head fl_real magic;... fl_real wrench_scale[6];...". Who reads a block or an answer
+           in another language asks the library that he has loaded. */
 const char *fl_fields(void);
 
 /* @param which  0 fl_real, 1 fl_head, 2 fl_actuator, 3 fl_work, 4 fl_policy, 5 fl_answer, 6 FL_MOST
@@ -113,65 +116,76 @@ void fl_usual_settings(fl_settings *settings);
    @return          FL_OK, or FL_BAD_ARGUMENT where a number is below 0 */
 int fl_use_settings(fl_work *work, const fl_settings *settings);
 
-/* Finds commands for one wrench: of least power where it is within reach, by the policy where it is not.
+/* Finds commands for one wrench: of least power where it is within reach, by the policy where it is
+   not.
 
    @param block     numbers of a robot
    @param work      its prepared work area
    @param question  wrench, policy, commands before, losses, free axes
    @param answer    becomes forces, commands, multipliers and errors
-   @return          FL_OK; FL_BAD_ARGUMENT where a number of the question is not finite or out of range, such as the NaN of
-                    an estimator; FL_BAD_NUMBER where the robot cannot work with it */
-int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question, fl_answer *answer);
+   @return          FL_OK; FL_BAD_ARGUMENT where a number of the question is not finite or out of
+                    range, such as the NaN of an estimator; FL_BAD_NUMBER where the robot cannot
+                    work with it */
+int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question,
+                  fl_answer *answer);
 
-/* Finds commands for many wrenches, all else as in a question.
+/* Finds commands for many wrenches, all else as in a question. The outputs are those of fl_answer.
 
-   @param wrench   (count, 6) [N, N m]
-   @param force    (count, n, 2) [N]
-   @param price    (count, 6) multipliers of the wrenches [W/N, W/(N m)]
-   @param aim      (count, 6) wrenches that the forces give
-   @param value    (count,) power that gaps are proved to need [W]
-   @param command  (count, n, 3)
-   @param within   (count,) whether a wrench is within reach
-   @param error    (count,) distance of the commands' wrench from the aim, over the yardstick
-   @return         an error code, or -1 where a search ended at its bound of parts */
-int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *wrench, int count,
-                   fl_real *force, fl_real *price, fl_real *aim, fl_real *value, fl_real *command,
-                   unsigned char *within, fl_real *error);
+   @param wrench           (count, 6) desired [N, N m]
+   @param force            (count, n, 2) [N]
+   @param prices           (count, 6) multipliers of the wrenches [W/N, W/(N m)]
+   @param wrench_served    (count, 6) wrenches that the forces give [N, N m]
+   @param gap_power_bound  (count,) power that gaps are proved to need [W]
+   @param command          (count, n, 3)
+   @param is_attainable    (count,) whether a wrench is within reach
+   @param error            (count,) distance of the commands' wrench from the one served, on the
+                           yardstick
+   @return                 an error code, or -1 where a search ended at its bound of parts */
+int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
+                   const fl_real *wrench, int count, fl_real *force, fl_real *prices,
+                   fl_real *wrench_served, fl_real *gap_power_bound, fl_real *command,
+                   unsigned char *is_attainable, fl_real *error);
 
 /* Finds commands for forces.
 
    @param force     (count, n, 2) [N]
    @param previous  (n, 3), whose angles are kept where there is no force; 0 for none
    @param command   (count, n, 3) */
-void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count, const fl_real *previous,
-                 fl_real *command);
+void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count,
+                 const fl_real *previous, fl_real *command);
 
-/* Says what forces are worth at multipliers of the wrench, for proofs of a lower bound of the power.
+/* Says what forces are worth at multipliers of the wrench, for proofs of a lower bound of the
+   power.
 
    @param question  what may be given now
-   @param price     (count, 6) [W/N, W/(N m)]
+   @param prices    (count, 6) multipliers [W/N, W/(N m)]
    @param worth     (count, n) of fl_actuator_worth
    @return          FL_OK or FL_BAD_NUMBER */
-int fl_worth(const fl_real *block, fl_work *work, const fl_question *question, const fl_real *price, int count,
-             fl_actuator_worth *worth);
+int fl_worth(const fl_real *block, fl_work *work, const fl_question *question,
+             const fl_real *prices, int count, fl_actuator_worth *worth);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 
-   @param own     (count, n, 16): place of a polygon's corners, or 0 and radius, middle and half of a sector; then the
-                  wrench per newton along both directions
+   @param sets    (count, n, 16): offset of a polygon's corners, or 0 and radius, centre and half
+                  angle of a sector [N, rad]; then the wrench per newton along both directions
    @param from    (count, 6) where the rays begin
    @param ray     (count, 6)
    @param close   to which share a length is a bound
    @param size    (count,) lengths over those of the rays
    @param normal  (count, 6) of the supporting planes
    @param force   (count, n, 2) at the ends [N] */
-void fl_reach(const fl_real *block, fl_work *work, const fl_real *own, const fl_wide *from, const fl_wide *ray, int count,
-              fl_wide close, fl_wide *size, fl_wide *normal, fl_real *force);
+void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl_wide *from,
+              const fl_wide *ray, int count, fl_wide close, fl_wide *size, fl_wide *normal,
+              fl_real *force);
 
-/* @param inner  (6,) multipliers in reduced coordinates [W]
-   @param force  becomes the responses (n, 2) [N]
-   @return       the dual value for a wrench [W], Eq. 3 */
-fl_real fl_look(const fl_real *block, fl_work *work, const fl_real *wrench, const fl_real *inner, fl_real *force);
+/* Evaluates the dual at multipliers.
+
+   @param wrench          (6,) [N, N m]
+   @param lambda_reduced  (6,) multipliers in reduced coordinates [W]
+   @param force           becomes the responses (n, 2) [N]
+   @return                the dual value for the wrench [W], Eq. 3 */
+fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench,
+                      const fl_real *lambda_reduced, fl_real *force);
 
 #ifdef __cplusplus
 }

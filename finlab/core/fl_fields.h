@@ -1,100 +1,124 @@
-/* The fields of all structs that cross the border of the core, once. C, numpy and JavaScript are made of this list:
-   nobody else says where a field lies. Who adds, moves or resizes one raises FL_VERSION.
+/* The fields of all structs that cross the border of the core, once. C, numpy and JavaScript are
+   made of this list: nobody else says where a field lies. Who adds, moves or resizes one raises
+   FL_VERSION.
 
-   FL_FIELD(type, name, shape, unit, meaning). A place is that of a table in the block: it counts numbers from the first
-   one, and is 0 where there is no table. */
+   FL_FIELD(type, name, shape, unit, meaning). An offset is that of a table in the block: it counts
+   numbers from the first one, and is 0 where there is no table.
+
+   What is in a block is fl_real, counts and flags too, so that a block is an array of one type that
+   Python and JavaScript make and keep without packing, and that -DFL_SINGLE converts number by
+   number. */
 FL_BEGIN(fl_head)
 FL_FIELD(fl_real, magic, , "1", "FL_MAGIC")
 FL_FIELD(fl_real, version, , "1", "FL_VERSION")
 FL_FIELD(fl_real, length, , "1", "numbers in the block")
 FL_FIELD(fl_real, n, , "1", "actuators")
-FL_FIELD(fl_real, range, , "1", "r, rank of the effectiveness")
-FL_FIELD(fl_real, scale, [6], "N, N m", "wrench = scale * scaled wrench")
-FL_FIELD(fl_real, yard, [6], "N, N m", "yardstick of errors")
-FL_FIELD(fl_real, counts, [6], "1", "1 of an axis that the robot commands, else 0")
-FL_FIELD(fl_real, beside, [6], "N, N m", "wrench on top of that of the forces")
+FL_FIELD(fl_real, rank, , "1", "r, rank of the effectiveness")
+FL_FIELD(fl_real, axis_scale, [6], "N, N m", "wrench = axis_scale * scaled wrench")
+FL_FIELD(fl_real, wrench_scale, [6], "N, N m", "sigma, the yardstick of errors")
+FL_FIELD(fl_real, is_commanded, [6], "1", "1 of an axis that the robot commands, else 0")
+FL_FIELD(fl_real, wrench_offset, [6], "N, N m", "o, wrench beside that of the forces")
 FL_FIELD(fl_real, basis, [6][6], "1", "6 x r: directions of scaled wrenches that are driven")
 FL_END(fl_head)
 
 FL_BEGIN(fl_actuator)
-FL_FIELD(fl_real, rows, , "1", "1: a force along one direction; 2: in a plane, or a lift and its drag")
-FL_FIELD(fl_real, ahead, , "place", "table of force over price")
-FL_FIELD(fl_real, back, , "place", "the same in reverse")
-FL_FIELD(fl_real, share, , "1", "force over that of the tables")
-FL_FIELD(fl_real, worth, , "1", "power over that of the tables")
-FL_FIELD(fl_real, gauge, , "place", "how the force differs between directions")
-FL_FIELD(fl_real, low, , "N", "least force; of planes below 0 against their direction")
-FL_FIELD(fl_real, high, , "N", "largest force")
-FL_FIELD(fl_real, least, , "N", "the same as low, but 0 where a plane needs no reverse")
-FL_FIELD(fl_real, middle, , "rad", "of the arc of directions")
-FL_FIELD(fl_real, half, , "rad", "half of that arc; pi for all directions")
-FL_FIELD(fl_real, band, , "N", "forces smaller than this, other than 0, cannot be held")
-FL_FIELD(fl_real, speed, , "m/s", "above 0: the second row is drag, whose power is speed times drag")
-FL_FIELD(fl_real, gain, [2], "N^2/W", "force over price of each row at the largest force, by half of it")
-FL_FIELD(fl_real, most, [2], "N", "largest force of each row")
-FL_FIELD(fl_real, matrix, [2][6], "1/N", "scaled wrench in the basis per newton of each row")
-FL_FIELD(fl_real, own, [3][6], "1/N", "wrench over the yardstick per newton along each of the law's axes")
-FL_FIELD(fl_real, form, , "1", "how forces become commands: FL_THRUSTER ...")
-FL_FIELD(fl_real, lower, [3], "command", "least command; unused numbers 0")
-FL_FIELD(fl_real, upper, [3], "command", "largest command; unused numbers 0")
-FL_FIELD(fl_real, step, [3], "command", "largest changes in a tick")
-FL_FIELD(fl_real, turns, , "1", "1 where the angle of the command may turn freely")
-FL_FIELD(fl_real, law, , "place", "grid of the law")
-FL_FIELD(fl_real, beat, , "place", "a fin's beat, or a foil's curve of lift and angle")
-FL_FIELD(fl_real, sign, , "1", "of a thruster's command over its force")
-FL_FIELD(fl_real, lean, , "rad", "of a fin or foil: angle from command to force")
-FL_FIELD(fl_real, uneven, , "1", "of a fin: 1 + uneven cos(angle - uneven_at)")
-FL_FIELD(fl_real, uneven_at, , "rad", "see uneven")
-FL_FIELD(fl_real, pressure, , "N", "of a foil: force per coefficient")
-FL_FIELD(fl_real, turned, , "rad", "of a foil: angle without lift")
-FL_FIELD(fl_real, rest, , "1", "of a foil: coefficient of drag there")
-FL_FIELD(fl_real, doubt, , "W/N^2", "of a foil: what a squared force costs beside its power")
+FL_FIELD(fl_real, rows, , "1",
+         "of B: 1: a force along one direction; 2: in a plane, or a lift and its drag")
+FL_FIELD(fl_real, force_table, , "offset", "T(v), table of force over price")
+FL_FIELD(fl_real, force_table_reverse, , "offset", "the same in reverse")
+FL_FIELD(fl_real, force_scale, , "1", "k_T, force over that of the tables")
+FL_FIELD(fl_real, power_scale, , "1", "k_P, power over that of the tables")
+FL_FIELD(fl_real, gauge_table, , "offset", "radius and support function of a plane by direction")
+FL_FIELD(fl_real, force_min, , "N", "least force; of planes below 0 against their direction")
+FL_FIELD(fl_real, force_max, , "N", "largest force")
+FL_FIELD(fl_real, force_min_needed, , "N", "force_min, but 0 where no reverse is needed")
+FL_FIELD(fl_real, sector_center, , "rad", "of the arc of directions")
+FL_FIELD(fl_real, sector_half_angle, , "rad", "half of that arc; pi for all directions")
+FL_FIELD(fl_real, dead_band, , "N", "forces smaller than this, other than 0, cannot be held")
+FL_FIELD(fl_real, flow_speed, , "m/s",
+         "U; above 0: the second row is drag, whose power is U times drag")
+FL_FIELD(fl_real, secant, [2], "N^2/W",
+         "|y| / |s| of each row at the largest force, by half of it")
+FL_FIELD(fl_real, row_force_max, [2], "N", "largest force of each row")
+FL_FIELD(fl_real, effectiveness_reduced, [2][6], "1/N",
+         "columns of B: scaled wrench in the basis per newton of each row")
+FL_FIELD(fl_real, effectiveness_normalized, [3][6], "1/N",
+         "B / sigma: wrench on the yardstick per newton along each axis of the law")
+FL_FIELD(fl_real, command_kind, , "1", "how forces become commands: FL_THRUSTER ...")
+FL_FIELD(fl_real, command_min, [3], "command", "least command; unused numbers 0")
+FL_FIELD(fl_real, command_max, [3], "command", "largest command; unused numbers 0")
+FL_FIELD(fl_real, max_change, [3], "command", "largest changes in a tick")
+FL_FIELD(fl_real, is_free_angle, , "1", "1 where the angle of the command may turn freely")
+FL_FIELD(fl_real, law_grid, , "offset", "grid of the law")
+FL_FIELD(fl_real, command_table, , "offset", "a fin's beat, or a foil's curve of lift and angle")
+FL_FIELD(fl_real, command_sign, , "1", "of a thruster's command over its force")
+FL_FIELD(fl_real, lean_angle, , "rad", "of a fin or foil: angle from command to force")
+FL_FIELD(fl_real, unevenness, , "1", "of a fin: 1 + unevenness cos(angle - unevenness_angle)")
+FL_FIELD(fl_real, unevenness_angle, , "rad", "see unevenness")
+FL_FIELD(fl_real, pressure_area, , "N", "of a foil: dynamic pressure times area")
+FL_FIELD(fl_real, zero_lift_angle, , "rad", "of a foil: angle without lift")
+FL_FIELD(fl_real, zero_lift_drag, , "1", "of a foil: coefficient of drag there")
+FL_FIELD(fl_real, uncertainty_cost, , "W/N^2",
+         "of a foil: what a squared force costs beside its power")
 FL_END(fl_actuator)
 
 FL_BEGIN(fl_policy)
 FL_FIELD(int, policy, , "1", "FL_CLOSEST ...")
-FL_FIELD(int, groups, , "1", "groups of axes, for FL_PRIORITY")
-FL_FIELD(fl_real, weight, [6], "1", "of the axes, largest 1, for FL_CLOSEST")
+FL_FIELD(int, group_count, , "1", "groups of axes, for FL_PRIORITY")
+FL_FIELD(fl_real, axis_weight, [6], "1", "of the axes, largest 1, for FL_CLOSEST")
 FL_FIELD(fl_byte, group, [6][6], "1", "1 of the axes of each group, for FL_PRIORITY")
 FL_END(fl_policy)
 
 FL_BEGIN(fl_question)
-FL_FIELD(fl_real, wrench, [6], "N, N m", "target; behind it all is zeros where there is nothing to say")
+FL_FIELD(fl_real, wrench, [6], "N, N m",
+         "desired; behind it all is zeros where there is nothing to say")
 FL_FIELD(fl_policy_at, policy, , "address", "what to give beyond reach; 0: nothing else")
-FL_FIELD(fl_reals, price, , "address", "(6,) of the wrench [W/N, W/(N m)]: where to begin; 0 for none")
-FL_FIELD(fl_reals, previous, , "address", "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
+FL_FIELD(fl_reals, prices, , "address",
+         "multipliers (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
+FL_FIELD(fl_reals, previous, , "address",
+         "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
-FL_FIELD(fl_bytes, free, , "address", "(6,) which axes may take any wrench, beside those not commanded; 0 for none")
+FL_FIELD(fl_bytes, free, , "address",
+         "(6,) which axes may take any wrench, beside those not commanded; 0 for none")
 FL_FIELD(fl_real, calm, , "1", "what turning costs in a tick: 0 nothing, 2 usual, up to 10")
-FL_FIELD(int, ticks, , "1", "how many ticks after `previous` the commands are for; 0 or 1 for the next")
-FL_FIELD(fl_reals, toward, , "address", "angles (n,) [rad] that turning of pods costs from, NaN: from that of `previous`; 0 for none")
+FL_FIELD(int, ticks, , "1",
+         "how many ticks after `previous` the commands are for; 0 or 1 for the next")
+FL_FIELD(fl_reals, angles_wanted, , "address",
+         "(n,) [rad] from which turning of pods costs, NaN: that of `previous`; 0 for none")
 FL_END(fl_question)
 
 FL_BEGIN(fl_answer)
 FL_FIELD(fl_real, force, [FL_MOST][2], "N", "of each actuator's rows")
-FL_FIELD(fl_real, price, [6], "W/N, W/(N m)", "of the wrench")
-FL_FIELD(fl_real, inner, [6], "W", "the same in the basis of what the actuators span now")
-FL_FIELD(fl_real, aim, [6], "N, N m", "wrench that the forces give")
-FL_FIELD(fl_real, value, , "W", "power that gaps are proved to need")
-FL_FIELD(fl_real, error, , "1", "distance of the commands' wrench from the aim, on the yardstick, by the laws' tables")
+FL_FIELD(fl_real, prices, [6], "W/N, W/(N m)", "multipliers lambda of the wrench")
+FL_FIELD(fl_real, lambda_reduced, [6], "W",
+         "the same in reduced coordinates, of what actuators span now")
+FL_FIELD(fl_real, wrench_served, [6], "N, N m",
+         "wrench that the forces give, out of reach by the policy")
+FL_FIELD(fl_real, gap_power_bound, , "W", "power that gaps are proved to need")
+FL_FIELD(fl_real, error, , "1",
+         "distance of the commands' wrench from wrench_served, on the yardstick, by law grids")
 FL_FIELD(fl_real, command, [FL_MOST][3], "command", "of each actuator")
-FL_FIELD(int, status, , "1", "of Newton's method: FL_MET ...")
-FL_FIELD(int, within, , "1", "1 where the target is within reach")
-FL_FIELD(int, steps, , "1", "Newton's steps")
-FL_FIELD(int, ended, , "1", "1 where a search ended at its bound of steps")
-FL_FIELD(int, placed, , "1", "1 where the commands are those of a search, for foils")
+FL_FIELD(int, newton_status, , "1", "how Newton's method ended: FL_MET ...")
+FL_FIELD(int, is_attainable, , "1", "1 where the target is within reach")
+FL_FIELD(int, newton_steps, , "1", "Newton's steps")
+FL_FIELD(int, is_truncated, , "1", "1 where a search ended at its bound of steps")
+FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
 FL_END(fl_answer)
 
 FL_BEGIN(fl_actuator_worth)
-FL_FIELD(fl_real, price, , "W/N", "along the force of an actuator, ahead; 0 where it pushes in reverse")
-FL_FIELD(fl_real, price_back, , "W/N", "along the force in reverse")
+FL_FIELD(fl_real, price_ahead, , "W/N",
+         "along the force of an actuator, ahead; 0 where it pushes in reverse")
+FL_FIELD(fl_real, price_reverse, , "W/N", "along the force in reverse")
 FL_FIELD(fl_real, conjugate, , "W", "most that a force is worth, less its power")
-FL_FIELD(fl_real, low, , "N", "least force, of planes below 0 in reverse")
-FL_FIELD(fl_real, high, , "N", "largest force")
+FL_FIELD(fl_real, force_min, , "N", "least force, of planes below 0 in reverse")
+FL_FIELD(fl_real, force_max, , "N", "largest force")
 FL_END(fl_actuator_worth)
 
 FL_BEGIN(fl_settings)
-FL_FIELD(int, most_parts, , "1", "parts of sets with gaps that are looked at for one wrench: bounds its time")
-FL_FIELD(int, tick_parts, , "1", "the same in a tick where turning costs, as the next tick goes on from there")
-FL_FIELD(int, command_steps, , "1", "Levenberg-Marquardt steps that end an answer; most end after three")
+FL_FIELD(int, most_parts, , "1",
+         "parts of sets with gaps that are looked at for one wrench: bounds its time")
+FL_FIELD(int, tick_parts, , "1",
+         "the same in a tick where turning costs, as the next tick goes on from there")
+FL_FIELD(int, command_steps, , "1",
+         "Levenberg-Marquardt steps that end an answer; most end after three")
 FL_END(fl_settings)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 5
+VERSION = 6
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -19,7 +19,7 @@ SIGNATURES = {
     "fl_answer_one": "ipppp",
     "fl_answer_many": "ippppippppppp",
     "fl_commands": "vpppipp",
-    "fl_look": "rppppp",
+    "fl_dual_value": "rppppp",
     "fl_worth": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",

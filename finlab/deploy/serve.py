@@ -1,26 +1,23 @@
-"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any
-more.
+"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when targets stop.
 
 A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free`
 (names of axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at
 the next ticks, and `flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted.
 Each answer says in `status` what it is, and has the `id` of its request, a refused one's too:
 
-=========
-============================================================================================ status
-meaning =========
-============================================================================================ `ok`
-commands for the newest target `neutral`  no target for longer than the watchdog allows; the fins
-are commanded to rest `error`    the request was refused, which changes nothing, or could not be
-answered, and the line before is
-           `neutral`; `error` holds one sentence and there are no commands
-=========
-============================================================================================
+=========  ===================================================================================
+status     meaning
+=========  ===================================================================================
+`ok`       commands for the newest target
+`neutral`  no target for longer than the watchdog allows; the fins are commanded to rest
+`error`    the request was refused, which changes nothing, or could not be answered, and the
+           line before is `neutral`; `error` holds one sentence and there are no commands
+=========  ===================================================================================
 
-From one answer to the next, commands change no faster than the drives' rates allow in a tick. Only
-the newest request counts: those that waited behind it are skipped, since a robot wants the present,
-not the past; one that is older than the watchdog allows, as after a pause of the process, is
-dropped. However the service ends, a neutral command is the last that it sends.
+From one answer to the next, commands change no faster than the drives' rates allow in a tick.
+Only the newest request counts: those that waited behind it are skipped, since a robot wants the
+present, not the past; one that is older than the watchdog allows, as after a pause of the process,
+is dropped. However the service ends, a neutral command is the last that it sends.
 """
 
 import json

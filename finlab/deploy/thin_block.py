@@ -21,11 +21,11 @@ CELLS = 128
 """Cells of a table at most; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Directions of a gauge at most."""
-TABLES = ("ahead", "back", "gauge", "law", "beat")
+TABLES = ("force_table", "force_table_reverse", "gauge_table", "law_grid", "command_table")
 """Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
 fin's beat or a foil's curve."""
 FIN = 2
-"""`form` of a fin, FL_FIN."""
+"""`command_kind` of a fin, FL_FIN."""
 
 
 class Table(NamedTuple):
@@ -44,7 +44,7 @@ def tables_of(block: Array) -> list[dict[int, Table]]:
         for field in TABLES:
             place = int(actuator[field])
             if place > 0:
-                length = _length(field, block[place:], is_fin=actuator["form"] == FIN)
+                length = _length(field, block[place:], is_fin=actuator["command_kind"] == FIN)
                 by_place[place] = Table(field, block[place : place + length])
         tables.append(by_place)
     return tables
@@ -52,13 +52,13 @@ def tables_of(block: Array) -> list[dict[int, Table]]:
 
 def _length(field: str, table: Array, is_fin: bool) -> int:
     """Returns how many numbers a table has, by its first ones (see fl_work.h)."""
-    if field in ("ahead", "back"):
+    if field in ("force_table", "force_table_reverse"):
         cells = int(table[1])
         return 3 + 3 * (cells + 1)
-    if field == "gauge":
+    if field == "gauge_table":
         points = int(table[0])
         return 1 + 4 * points
-    if field == "law":
+    if field == "law_grid":
         knots = table[:3]
         columns = table[5]
         return int(7 + knots.sum() + knots.prod() * columns)
@@ -84,7 +84,7 @@ def thinned(block: Array) -> Array:
     moved_to = {0: 0}
     place_new = begin
     for place, table in tables.items():
-        thin = _thinned_table(table, actuators[actuators["law"] == place])
+        thin = _thinned_table(table, actuators[actuators["law_grid"] == place])
         thin_tables.append(thin)
         moved_to[place] = place_new
         place_new += len(thin)
@@ -94,9 +94,9 @@ def thinned(block: Array) -> Array:
     for actuator in actuators_of(block):
         for field in TABLES:
             actuator[field] = moved_to[int(actuator[field])]
-        if not actuator["turns"]:
-            actuator["lower"] = _rounded(actuator["lower"], up=True)
-            actuator["upper"] = _rounded(actuator["upper"], up=False)
+        if not actuator["is_free_angle"]:
+            actuator["command_min"] = _rounded(actuator["command_min"], up=True)
+            actuator["command_max"] = _rounded(actuator["command_max"], up=False)
     return block
 
 
@@ -110,11 +110,11 @@ def _rounded(limits: Array, up: bool) -> NDArray[np.float32]:
 
 def _thinned_table(table: Table, users: Record) -> Array:
     """Returns a table with fewer knots; `users` are the actuators (m,) whose law it is."""
-    if table.field in ("ahead", "back"):
+    if table.field in ("force_table", "force_table_reverse"):
         return _radial(table.numbers)
-    if table.field == "gauge":
+    if table.field == "gauge_table":
         return _gauge(table.numbers)
-    if table.field == "law":
+    if table.field == "law_grid":
         return _grid(table.numbers, users)
     return _curve(table.numbers)
 
@@ -170,13 +170,13 @@ def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[A
     Returns:
         Knots, values, and their period: 0 where only a part of it is left.
     """
-    angle_min = (foils["lower"][:, 0] - foils["lean"]).min()
-    angle_max = (foils["upper"][:, 0] - foils["lean"]).max()
+    angle_min = (foils["command_min"][:, 0] - foils["lean_angle"]).min()
+    angle_max = (foils["command_max"][:, 0] - foils["lean_angle"]).max()
     around = np.concatenate([knot - period, knot, knot + period])
     begin = np.searchsorted(around, angle_min) - 3
     stop = np.searchsorted(around, angle_max) + 3
     has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)
-    if not period or foils["form"][0] == FIN or not has_room:
+    if not period or foils["command_kind"][0] == FIN or not has_room:
         return knot, value, period
     rows = np.arange(begin, stop)
     return around[rows], value[rows % len(knot)], 0.0

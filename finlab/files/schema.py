@@ -286,8 +286,7 @@ def form(
     ]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
-    line = (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")
-    about: dict[str, Any] = {"__doc__": line, "stands_for": cls}
+    about: dict[str, Any] = {"__doc__": _summary(cls), "stands_for": cls}
     if tag is None and issubclass(cls, Checked) and cls.type:
         tag = ("type", cls.type)
     key, value = tag or (None, None)
@@ -300,6 +299,14 @@ def form(
         tag_field=key,
         tag=value,
     )
+
+
+def _summary(cls: type) -> str:
+    """The first paragraph of a class's docstring on one line, for the schema; without the sentence
+    that its values are checked, which is of no use to who writes a file."""
+    paragraph = (cls.__doc__ or "").split("\n\n")[0]
+    words = " ".join(paragraph.split())
+    return words.replace(" Checked on construction.", "")
 
 
 def given(part: Any) -> dict[str, Any]:

@@ -30,7 +30,7 @@ class Normalization(Struct, forbid_unknown_fields=True):
     """Of the features of fins with horizontal shafts, by name, as the paper's network takes
     them."""
     wrench: dict[str, float]
-    """Of each axis of a wrench [N, N m]: the robot's own yardstick, in which errors are
+    """Of each axis of a wrench [N, N m]: the robot's own wrench scale, in which errors are
     measured."""
 
 

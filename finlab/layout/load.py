@@ -1,10 +1,9 @@
 """Layouts read from what a user may name: a shipped layout, a layout or graph file, a bundle.
 
-Layout files are YAML for people, JSON accepted. Mounting angles in degrees, the rest SI and
-radians.
-
-There is one version, 2, which holds actuators of any type under `actuators`. What holds degrees in
-a file is kept in radians; paths become absolute; a table of thrust in a CSV file becomes rows.
+Layout files are YAML for people, JSON accepted. Mounting angles are in degrees, the rest is SI and
+radians. There is one version, 2, which holds actuators of any type under `actuators`. What holds
+degrees in a file is kept in radians; paths become absolute; a table of thrust in a CSV file becomes
+rows.
 
 Every error names the file and the key, such as `x.yaml: actuators[2].limits.amplitude_rad of fin
 'bow': minimum 0.6 is above maximum 0.05; swap them`. `layout.schema.json` beside this module is

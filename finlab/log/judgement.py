@@ -64,7 +64,7 @@ class Judgement:
     robot: Layout
     """By whose laws it was judged."""
     scale: Array
-    """The robot's yardstick (6,) [N, N m]."""
+    """The robot's wrench scale (6,) [N, N m]."""
     seconds: float
     """Time that was judged [s]."""
     asked: tuple[float, ...]
@@ -79,7 +79,7 @@ class Judgement:
     """Mean power of the outputs by the actuators' own models [W]; None where the log has no
     outputs."""
     axis: str | None
-    """Axis that lost most, as a share of the yardstick; None where none was lost."""
+    """Axis that lost most, as a share of the wrench scale; None where none was lost."""
     stopped: tuple[str, ...]
     """Actuators that were at rest all along while what they would have given was missing, and those
     that the autopilot had stopped at last, or that had ceased to turn by then."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.fin_model import FinModelSpec
+from finlab.actuators.fin.fin_model import SCALES_THRUST, FinModelSpec
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
@@ -35,7 +35,7 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
     assert np.linalg.norm(far.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.forces)
 
 
-@pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
+@pytest.mark.parametrize("kind", SCALES_THRUST)
 def test_a_torn_fin_gives_its_share_at_every_command(
     search: AnyRobot, penta: Layout, kind: str
 ) -> None:

@@ -1,6 +1,8 @@
 """`finlab layout check|show|optimize`, through `main` in this process."""
 
 import json
+import re
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -31,14 +33,56 @@ def test_check_names_file_and_key_of_each_bad_file(
     assert "'nowhere.yaml' is neither a file nor a shipped layout; shipped are A, B, C, D" in second
 
 
+def table_of_actuators(printed: str) -> dict[str, dict[str, str]]:
+    """What `finlab layout show` printed: actuator -> head of a column -> cell."""
+    lines = iter(printed.splitlines())
+    head = next(line for line in lines if line.startswith("actuator  "))
+    titles = re.split(r" {2,}", head)
+    rows = takewhile(str.strip, lines)  # up to the empty line below the table
+    cells = [dict(zip(titles, re.split(r" {2,}", row), strict=True)) for row in rows]
+    return {row["actuator"]: row for row in cells}
+
+
+@pytest.mark.parametrize(
+    ("robot", "actuator", "cells"),
+    [
+        (
+            "A",
+            "front_right",
+            {
+                "type": "fin",
+                "x [m]": "0.258",
+                "y [m]": "-0.150",
+                "z [m]": "0.000",
+                "direction": "shaft at -60.0 deg",
+            },
+        ),
+        (
+            "turtle_hybrid",
+            "front_right",
+            {"limits": "A 0.05..0.6 rad, f 0.1..2.1 Hz, any direction, drag"},
+        ),
+        (
+            "turtle_hybrid",
+            "lift_left",
+            {"direction": "axis (0, 0, 1)", "limits": "-39.91..51.44 N, power_law"},
+        ),
+    ],
+)
+def test_show_has_a_row_for_each_actuator(
+    robot: str, actuator: str, cells: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["layout", "show", robot]) == 0
+    table = table_of_actuators(capsys.readouterr().out)
+    assert tuple(table) == load_layout(shipped_layouts()[robot]).names
+    assert {title: table[actuator][title] for title in cells} == cells
+
+
 @pytest.mark.parametrize(
     ("argv", "words"),
     [
-        (["A"], ["front_right  fin    0.258  -0.150   0.000  shaft at -60.0 deg",
-                 "4 fins push in 6 of 6 independent directions."]),
+        (["A"], ["4 fins push in 6 of 6 independent directions."]),
         (["no_yaw"], ["Not commanded, free: yaw."]),
-        (["turtle_hybrid"], ["0.258  -0.150   0.000  shaft at -60.0 deg   A 0.05..0.6 rad",
-                             "axis (0, 0, 1)       -39.91..51.44 N, power_law"]),
         (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions.",
                        "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing"]),
         (["torpedo", "--flow", "1.5", *"00000"], ["push in 3 of 3 independent directions"]),
@@ -47,7 +91,7 @@ def test_check_names_file_and_key_of_each_bad_file(
                                      "Share of the largest wrench that is left without one fin"]),
     ],
 )  # fmt: skip
-def test_show_prints_actuators_and_what_they_can_do(
+def test_show_says_what_the_actuators_can_do(
     argv: list[str], words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["layout", "show", *argv]) == 0

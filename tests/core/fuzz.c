@@ -35,20 +35,20 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
     q->wrench[k] = below(4) ? (fl_real)(size * (2 * uniform() - 1)) : 0;
     if (!below(50)) q->wrench[k] = wild(q->wrench[k]);
     price[k] = (fl_real)(size * (2 * uniform() - 1));
-    policy->weight[k] = (fl_real)uniform();
+    policy->axis_weight[k] = (fl_real)uniform();
     for (int g = 0; g < 6; g++) policy->group[g][k] = (unsigned char)below(2);
   }
-  policy->policy = below(20) ? below(3) : below(100) - 50, policy->groups = below(20) ? below(7) : below(100) - 50;
-  if (!below(30)) policy->weight[below(6)] = wild(1);
+  policy->policy = below(20) ? below(3) : below(100) - 50, policy->group_count = below(20) ? below(7) : below(100) - 50;
+  if (!below(30)) policy->axis_weight[below(6)] = wild(1);
   if (!below(30)) price[below(6)] = wild(1);
   for (int k = 0; k < 3 * ROBOT_COUNT; k++) {
     const fl_actuator *a = actuators + k / 3;
-    previous[k] = a->lower[k % 3] + (a->upper[k % 3] - a->lower[k % 3]) * (fl_real)uniform();
+    previous[k] = a->command_min[k % 3] + (a->command_max[k % 3] - a->command_min[k % 3]) * (fl_real)uniform();
     if (!below(50)) previous[k] = wild(previous[k]);
   }
   for (int k = 0; k < ROBOT_COUNT + 6; k++) flags[k] = (unsigned char)!below(4);
   q->policy = below(4) ? policy : 0;
-  q->price = below(4) ? 0 : price;
+  q->prices = below(4) ? 0 : price;
   q->previous = below(2) ? previous : 0;
   q->lost = below(3) ? 0 : flags;
   q->free = below(3) ? 0 : flags + ROBOT_COUNT;
@@ -59,11 +59,11 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
 static const char *wrong_with(const fl_answer *out, const fl_actuator *actuators, int count) {
   for (int i = 0; i < count; i++)
     for (int k = 0; k < 3; k++)
-      if (!(out->command[i][k] >= actuators[i].lower[k] && out->command[i][k] <= actuators[i].upper[k])) return "command";
+      if (!(out->command[i][k] >= actuators[i].command_min[k] && out->command[i][k] <= actuators[i].command_max[k])) return "command";
   for (int k = 0; k < 6; k++)
-    if (!isfinite(out->aim[k])) return "aim";
+    if (!isfinite(out->wrench_served[k])) return "aim";
   if (!isfinite(out->error)) return "error";
-  return out->steps < 0 || out->steps > FL_BOUND ? "steps" : 0;
+  return out->newton_steps < 0 || out->newton_steps > FL_BOUND ? "steps" : 0;
 }
 
 static int fuzz(int cases, fl_real *block, fl_work *work) {
@@ -98,7 +98,7 @@ static int fuzz(int cases, fl_real *block, fl_work *work) {
       if (bad && !failed) wrong = "a wrench that is no number is answered";
       if (wrong) return printf("case %d, question %d, %d changes: %s\n", n, k, changes, wrong), 1;
       answers += !failed;
-      if (!failed && out.steps > most) most = out.steps;
+      if (!failed && out.newton_steps > most) most = out.newton_steps;
     }
     while (changes--) block[changed[changes]] = robot[changed[changes]];
   }

@@ -175,7 +175,7 @@ def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
     assert len(thinned(thin)) <= len(thin)
     double = actuators_of(robot.block)
     single = actuators_of(thin)
-    for limit in ("lower", "upper"):
+    for limit in ("command_min", "command_max"):
         np.testing.assert_allclose(single[limit], double[limit], rtol=2e-7)
 
 

@@ -43,7 +43,7 @@ def copied(folder: Path) -> Path:
     copy = folder / "finlab"
     shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__", "libfinlab.*"))
     fields = copy / "core" / "fl_fields.h"
-    before = "FL_FIELD(fl_real, own, [3][6],"
+    before = "FL_FIELD(fl_real, command_kind, ,"
     text = fields.read_text()
     assert text.count(before) == 1
     fields.write_text(

@@ -43,7 +43,7 @@ def test_every_name_of_the_package_has_a_page(site: Any) -> None:
 
     pages = reference.python_pages()
     assert {f"reference/python/finlab.{name}.md" for name in finlab._HOME} <= set(pages)
-    assert "reference/python/finlab.sim.ClosedLoop.md" in pages
+    assert "reference/python/finlab.swim.simulation.ClosedLoop.md" in pages
 
 
 def test_a_numbered_equation_has_an_anchor_and_its_number(site: Any) -> None:

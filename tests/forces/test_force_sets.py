@@ -16,7 +16,9 @@ HALVES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
 def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
     """Robots of fins with arcs of one width."""
     none = np.zeros_like(middle)
-    return ForceSets(effectiveness, radius, middle, none + half, none, block_of_planes(middle.shape[1]))
+    return ForceSets(
+        effectiveness, radius, middle, none + half, none, block_of_planes(middle.shape[1])
+    )
 
 
 def fins(half: float, rows: int = 200) -> ForceSets:

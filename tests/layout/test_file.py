@@ -9,6 +9,7 @@ import time
 import pytest
 import yaml
 
+from finlab.actuators.fin.fin_model import FIN_MODELS
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_layout, save_layout
 
@@ -102,7 +103,7 @@ BAD = [
     ("actuators[0].limits.frequency_hz[0]", -1, "must lie within"),
     ("actuators[0].limits.zero_direction_rad", [-4, 4], "one turn"),
     ("actuators[0].model", "drag", "expected keys and values, got 'drag'"),
-    ("actuators[0].model.type", "jet", "expected one of drag, lighthill, soft, table"),
+    ("actuators[0].model.type", "jet", f"expected one of {', '.join(FIN_MODELS)}"),
     ("actuators[0].model.type", ..., "required key is missing"),
     ("actuators[0].model.area", -1, "must lie within 1e-05 .. 10, got -1"),
     ("actuators[0].model.width", 1, "expected one of density, drag_coefficient"),

@@ -15,18 +15,17 @@ from finlab.actuators.law import OWN_INERTIA, Blade
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 
-SPECS = [
-    FinModelSpec("drag"),
-    FinModelSpec("lighthill"),
-    FinModelSpec("soft"),
+DRAG = make_law(FinModelSpec("drag"))
+LIGHTHILL = make_law(FinModelSpec("lighthill"))
+SOFT = make_law(FinModelSpec("soft"))
+UNEVEN = make_law(
     FinModelSpec(
         "soft", (("d", 0.1), ("e", 0.2), ("k", 2.0), ("p", 1.7), ("phi_e", 2.0), ("q", 3.0))
-    ),
-]
-DRAG, LIGHTHILL, SOFT, UNEVEN = (make_law(spec) for spec in SPECS)
-LAWS = [DRAG, LIGHTHILL, SOFT, UNEVEN]
-NAMES = ["drag", "lighthill", "soft", "uneven"]
-every_law = pytest.mark.parametrize("law", LAWS, ids=NAMES)
+    )
+)
+"""A soft fin whose thrust depends on the zero direction and is turned from it."""
+LAWS = {name: make_law(FinModelSpec(name)) for name in PLANAR_LAWS} | {"uneven": UNEVEN}
+every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 
 
 def commands(n, seed=0):

@@ -33,6 +33,7 @@ from webapp.markup.verdict import (
     verdict_sentence,
 )
 from webapp.markup.words import SPEED, authority_sentence, in_app, trim_sentence
+from webapp.panels.actuator_model import LAWS, law_words
 from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import ARROWS, LENGTH, NEWTONS, fitting
@@ -323,3 +324,13 @@ def test_a_weight_that_takes_most_of_what_fins_give_is_said() -> None:
     lift = ucat.body.mass_kg * GRAVITY - 0.7 * float(reach[2])
     layout = replace(ucat, body=replace(ucat.body, buoyancy_n=lift))
     assert "that is most" in (trim_sentence(layout, reach) or "")
+
+
+def test_a_law_that_the_app_has_no_words_for_is_known_by_its_class(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fin = load_layout(shipped_layouts()["A"]).fins[0]
+    assert law_words(fin).startswith("a stiff blade")
+    monkeypatch.delitem(LAWS, "drag")
+    assert law_words(fin).startswith("T = 2 rho Cd S rc^2 (2 pi f)^2 (1 - cos 2A) with half")
+    assert "\n" not in law_words(fin)

@@ -47,16 +47,22 @@ def public(module: Any) -> dict[str, Any]:
     }
 
 
+def packages(module: Any) -> list[Any]:
+    """A package and those inside it, each before what it holds, in the order of their names."""
+    listed = [module]
+    for _, inner in sorted(module.modules.items()):
+        if inner.is_init_module:
+            listed += packages(inner)
+    return listed
+
+
 def python_pages() -> Pages:
     """A page for each package that has public names, and one for each name."""
-    packages = [
-        package(),
-        *(each for _, each in sorted(package().modules.items()) if each.is_init_module),
-    ]
+    modules = packages(package())
     pages = {}
     index = "# Python\n\n| import from | what is there |\n|---|---|\n"
     home: dict[str, str] = {}
-    for module in packages:
+    for module in modules:
         names = public(module)
         if not names:
             continue

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
+from finlab.actuators.fin.fin_laws import PLANAR_LAWS
 from finlab.actuators.fin.fin_model import DOUBT
 from finlab.actuators.fin.table_law import TableLaw
 from finlab.actuators.thrust_model import PowerTable
@@ -31,6 +32,7 @@ LAWS = {
     "power_law": "power that grows with a power of the force",
     "foil": "lift and drag of a foil; at rest it gives nothing",
 }
+"""Model -> what it is, in words of the app; see `law_words`."""
 HEIGHT = 140
 """Height of a plot [px]."""
 SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
@@ -137,8 +139,20 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
         (last, *_) = model.rows[-1]
         said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
         return html(f"<div class='fl dim'>{said}</div>", len(model.rows), first, last, model.unit)
-    said = LAWS.get(part.model_type, f"a law of its own kind, {part.type}")
+    said = law_words(part)
     return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
+
+
+def law_words(part: Actuator) -> str:
+    """What the formula of an actuator is, without a full stop: the words of `LAWS`, else, of a fin
+    law, the summary of its class."""
+    kind = part.model_type
+    if kind in LAWS:
+        return LAWS[kind]
+    if isinstance(part, Fin) and kind in PLANAR_LAWS:
+        summary = (PLANAR_LAWS[kind].__doc__ or f"the law {kind}").split("\n\n")[0]
+        return " ".join(summary.split()).removesuffix(".")
+    return f"a law of its own kind, {part.type}"
 
 
 def _table_words(fin: Fin, doubts: bool) -> str:

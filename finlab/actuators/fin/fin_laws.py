@@ -137,7 +137,12 @@ class Soft(PlanarLaw):
         )
 
 
-PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
+PLANAR_LAWS: dict[str, type[PlanarLaw]] = {
+    # Under the names of `FIN_MODELS`, which has their parameters.
+    "drag": Drag,
+    "lighthill": Lighthill,
+    "soft": Soft,
+}
 """Fin model -> law with a formula; its parameters may be arrays, one number for each of n fins."""
 
 

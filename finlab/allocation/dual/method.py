@@ -48,7 +48,7 @@ class DualSettings(Settings):
         0.0,
         0.0,
         1e9,
-        "what an expected miss of 1 % of the yardstick is worth, growing with its square",
+        "what an expected miss of 1 % of the wrench scale is worth, growing with its square",
         "W",
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

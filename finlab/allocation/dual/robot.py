@@ -180,27 +180,29 @@ class DualRobot:
         head["magic"] = MAGIC
         head["version"] = VERSION
         head["n"] = len(self.responses)
-        head["range"] = rank
-        head["scale"] = self.axis_scale
-        head["yard"] = self._wrench_scale
-        head["counts"] = self._counts
-        head["beside"] = self._wrench_offset
+        head["rank"] = rank
+        head["axis_scale"] = self.axis_scale
+        head["wrench_scale"] = self._wrench_scale
+        head["is_commanded"] = self._counts
+        head["wrench_offset"] = self._wrench_offset
         head["basis"][:, :rank] = self.basis
 
         actuators = np.zeros(len(self.responses), struct("fl_actuator"))
-        actuators["low"] = self.ends[:, 0]
-        actuators["high"] = self.ends[:, 1]
-        actuators["speed"] = self.flow_speed
-        actuators["gain"] = self._secant
-        actuators["most"] = self.row_force_max
-        actuators["matrix"][..., :rank] = (self.effectiveness / self.axis_scale) @ self.basis
-        actuators["own"] = self._effectiveness_normalized
-        actuators["doubt"] = self._uncertainty_cost
+        actuators["force_min"] = self.ends[:, 0]
+        actuators["force_max"] = self.ends[:, 1]
+        actuators["flow_speed"] = self.flow_speed
+        actuators["secant"] = self._secant
+        actuators["row_force_max"] = self.row_force_max
+        actuators["effectiveness_reduced"][..., :rank] = (
+            self.effectiveness / self.axis_scale
+        ) @ self.basis
+        actuators["effectiveness_normalized"] = self._effectiveness_normalized
+        actuators["uncertainty_cost"] = self._uncertainty_cost
         limits = self._limits
-        actuators["lower"] = limits.lower
-        actuators["upper"] = limits.upper
-        actuators["step"] = np.minimum(limits.max_change, _INFINITE_CHANGE)
-        actuators["turns"] = np.any(limits.turns, axis=1)
+        actuators["command_min"] = limits.lower
+        actuators["command_max"] = limits.upper
+        actuators["max_change"] = np.minimum(limits.max_change, _INFINITE_CHANGE)
+        actuators["is_free_angle"] = np.any(limits.turns, axis=1)
         described = zip(actuators, self.responses, self._forms, self._offsets, strict=True)
         for actuator, response, form, offsets in described:
             _describe(actuator, response, form, offsets)
@@ -212,44 +214,44 @@ class DualRobot:
 def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffsets") -> None:
     """Writes what one actuator offers, and how its forces become commands, into its fields."""
     _, force_scale, power_scale = response.table.origin
-    actuator["share"] = force_scale
-    actuator["worth"] = power_scale
-    actuator["band"] = response.band
+    actuator["force_scale"] = force_scale
+    actuator["power_scale"] = power_scale
+    actuator["dead_band"] = response.band
     # A foil has two rows: lift, and the drag of that lift.
-    actuator["rows"] = 1.0 if actuator["speed"] == 0.0 else 2.0
-    actuator["least"] = actuator["low"]
+    actuator["rows"] = 1.0 if actuator["flow_speed"] == 0.0 else 2.0
+    actuator["force_min_needed"] = actuator["force_min"]
     if isinstance(response, Plane):
         actuator["rows"] = 2.0
-        actuator["middle"] = response.middle
-        actuator["half"] = response.half
+        actuator["sector_center"] = response.middle
+        actuator["sector_half_angle"] = response.half
         if _needs_no_reverse(response):
-            actuator["least"] = 0.0
+            actuator["force_min_needed"] = 0.0
 
-    actuator["form"] = _FORMS.index(form.kind)
+    actuator["command_kind"] = _FORMS.index(form.kind)
     for field, offset in offsets._asdict().items():
         actuator[field] = offset
-    actuator["sign"] = form.sign
-    actuator["lean"] = form.lean
-    actuator["uneven"] = form.uneven
-    actuator["uneven_at"] = form.uneven_at
-    actuator["pressure"] = form.pressure
-    actuator["turned"] = form.zero_lift_angle
-    actuator["rest"] = form.zero_lift_drag
+    actuator["command_sign"] = form.sign
+    actuator["lean_angle"] = form.lean
+    actuator["unevenness"] = form.uneven
+    actuator["unevenness_angle"] = form.uneven_at
+    actuator["pressure_area"] = form.pressure
+    actuator["zero_lift_angle"] = form.zero_lift_angle
+    actuator["zero_lift_drag"] = form.zero_lift_drag
 
 
 class TableOffsets(NamedTuple):
     """Offsets of one actuator's tables in the block, by the fields of `fl_actuator` that hold them;
     0 for none."""
 
-    ahead: int
+    force_table: int
     """Of force over price."""
-    back: int
+    force_table_reverse: int
     """Of the same in reverse."""
-    gauge: int
+    gauge_table: int
     """Of how the force differs between directions."""
-    law: int
+    law_grid: int
     """Of the grid of the law."""
-    beat: int
+    command_table: int
     """Of a fin's amplitudes and frequencies, or a foil's lifts and angles."""
 
 
@@ -286,13 +288,13 @@ class _Tables:
         law = form.law
         beat = form.beat
         return TableOffsets(
-            ahead=self.radial(response.table),
-            back=self.radial(response.reverse),
-            gauge=self.offset(
+            force_table=self.radial(response.table),
+            force_table_reverse=self.radial(response.reverse),
+            gauge_table=self.offset(
                 gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))
             ),
-            law=self.offset(law, lambda: cast(Array, law)),
-            beat=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
+            law_grid=self.offset(law, lambda: cast(Array, law)),
+            command_table=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
         )
 
     @property

@@ -1,196 +1,349 @@
-/* Answers of one actuator to a price: the force that is worth most, less its power, and its derivative.
+/* The response of one actuator to a price s of its force: y = argmax s.y - c(y), with its
+   derivative and the conjugate c*(s), Eq. 4 and 5.
 
-   A line answers T(|s|) sign(s), a plane T(v) g with v = s.g and g the direction of the force. Where it may
-   choose between two answers, the ends of a wide arc or the two ways of a pod, it gives a blend of both: what
-   the smooth larger one of their conjugates asks for. A foil gives lift and with it drag; with drag paid a
-   [W/N], lift is as dear as r = 1 - a/U times its power: it answers v as v/r. Where r < 0 drag is welcome:
-   then r is softened to s(r) > 0, and (s - r) times the chord of the power is on top of the conjugate. */
+   A line responds with T(|s|) sign(s), a plane with T(v) g where v = s.g and g is the direction of
+   the force. Where it may choose between two responses, the ends of a wide arc or the two ways of a
+   pod, it gives a blend of both: the gradient of a smooth maximum of their conjugates.
+
+   A foil gives lift and with it drag. With drag paid a [W/N], lift is as dear as r = 1 - a/U times
+   its power, so that its response to a price v is T(v/r). Where r < 0 drag is welcome: then r is
+   softened to q(r) > 0, and (q - r) times the chord of the power is on top of the conjugate.
+
+   Prices are in W/N along the actuator's own rows, forces in N. */
 #include "internal.h"
 
-#define SOFT R(0.2)
+#define SOFT R(0.2) /* r of a foil below which it is softened */
+#define BLEND_REST R(1e-12) /* least width [W] of a blend */
 
-typedef struct { real along, x, y, xx, xy, yy, other; int beyond; } fan;
+/* A direction in which a plane may push. */
+typedef struct {
+  real v;          /* price along it [W/N] */
+  real x, y;       /* g: force per newton of size; of length 1 but for a gauge */
+  real xx, xy, yy; /* how g turns with the price, dg/ds [N/W] */
+  int is_beyond;   /* whether the price lies beyond an end of the arc, which g then is */
+  real other_end;  /* angle of the other end then [rad] */
+} push_direction;
 
-static real gauge_or_one(const real *gauge, real angle) { return gauge ? fl_gauge_radius(gauge, angle) : 1; }
+static const real *gauge_of(const real *block, const fl_actuator *a) {
+  if (a->gauge_table > 0) return block + (int)a->gauge_table;
+  return 0;
+}
 
-/* The direction in which a plane answers a price, with its gauge, and how it turns. */
-static fan direction_of(const fl_set *set, const real *gauge, const real *price, real gap2) {
-  real size = SQRT(price[0] * price[0] + price[1] * price[1] + gap2), x = price[0] / size, y = price[1] / size;
-  real tangent = 1 / size;
-  fan o = {size, x, y, 0, 0, 0, 0, 0};
+/* The radius rho of a gauge at an angle [rad]; 1 without one. */
+static real radius_at(const real *gauge, real angle) {
+  if (gauge) return fl_gauge_radius(gauge, angle);
+  return 1;
+}
+
+/* An end of an arc as a direction, which no price turns. */
+static push_direction end_of_arc(const real *gauge, real angle, const real *price) {
+  const real rho = radius_at(gauge, angle);
+  push_direction end = {0, rho * COS(angle), rho * SIN(angle), 0, 0, 0, 0, 0};
+  end.v = price[0] * end.x + price[1] * end.y;
+  return end;
+}
+
+/* The direction g in which a plane responds to a price s: that of s, and of a gauge
+   g = sigma e + sigma' e_across with e = s / |s|. `floor_squared` is added to |s|^2: below its root
+   a price is rounding. */
+static push_direction direction_of(const fl_set *set, const real *gauge, const real *price,
+                                   real floor_squared) {
+  const real size = SQRT(price[0] * price[0] + price[1] * price[1] + floor_squared);
+  const real x = price[0] / size;
+  const real y = price[1] / size;
+  real turning = 1 / size; /* of g across e per price across e; sigma + sigma'' of a gauge */
+  push_direction g = {size, x, y, 0, 0, 0, 0, 0};
   if (gauge) {
-    gauge_point s = fl_gauge_support(gauge, x, y);
-    o.x = s.value * x - s.slope * y, o.y = s.value * y + s.slope * x;
-    tangent *= MAX(s.value + s.bend, 0);
-    o.along *= s.value;
+    const gauge_point sigma = fl_gauge_support(gauge, x, y);
+    g.x = sigma.value * x - sigma.slope * y;
+    g.y = sigma.value * y + sigma.slope * x;
+    turning *= fl_larger(sigma.value + sigma.bend, 0);
+    g.v *= sigma.value;
   }
-  if (set->half < PI) {
-    real c = set->cos_middle, d = set->sin_middle, ahead = o.x * c + o.y * d, aside = o.y * c - o.x * d;
-    if (FABS(aside) * set->cos_half > ahead * set->sin_half) {
-      /* The nearer end by the price itself: by the force, both are alike where the arc has no width. */
-      real nearer = price[1] * c - price[0] * d < 0 ? -1 : 1, end = set->middle + nearer * set->half;
-      real rho = gauge_or_one(gauge, end);
-      o.x = rho * COS(end), o.y = rho * SIN(end);
-      o.along = price[0] * o.x + price[1] * o.y;
-      o.beyond = 1, o.other = set->middle - nearer * set->half;
-      tangent = 0;
+  if (set->sector_half_angle < PI) {
+    const real along_middle = g.x * set->cos_center + g.y * set->sin_center;
+    const real across_middle = g.y * set->cos_center - g.x * set->sin_center;
+    if (FABS(across_middle) * set->cos_half_angle > along_middle * set->sin_half_angle) {
+      /* The nearer end by the price itself: by the force, both are alike where the arc has no
+         width. */
+      real nearer = 1;
+      if (price[1] * set->cos_center - price[0] * set->sin_center < 0) nearer = -1;
+      push_direction end =
+          end_of_arc(gauge, set->sector_center + nearer * set->sector_half_angle, price);
+      end.is_beyond = 1;
+      end.other_end = set->sector_center - nearer * set->sector_half_angle;
+      g = end;
+      turning = 0;
     }
   }
-  o.xx = tangent * (1 - x * x), o.xy = -tangent * x * y, o.yy = tangent * (1 - y * y);
+  g.xx = turning * (1 - x * x);
+  g.xy = -turning * x * y;
+  g.yy = turning * (1 - y * y);
+  return g;
+}
+
+/* Blends a response with another one: c* becomes the smooth maximum (a + b + root) / 2 of both
+   conjugates, with root = sqrt((a - b)^2 + width^2), and all else follows from its derivatives by
+   the price. `width` is in W. */
+static void blend(response *own, const response *other, real width) {
+  const real lead = own->conjugate - other->conjugate;
+  const real root = SQRT(lead * lead + width * width);
+  const real p = (1 + lead / root) / 2; /* weight of the one, q of the other */
+  const real q = 1 - p;
+  const real dp = width * width / (2 * root * root * root); /* dp / dlead [1/W] */
+  const real dx = own->force[0] - other->force[0];
+  const real dy = own->force[1] - other->force[1];
+  own->force[0] = p * own->force[0] + q * other->force[0];
+  own->force[1] = p * own->force[1] + q * other->force[1];
+  own->xx = p * own->xx + q * other->xx + dp * dx * dx;
+  own->xy = p * own->xy + q * other->xy + dp * dx * dy;
+  own->yy = p * own->yy + q * other->yy + dp * dy * dy;
+  own->conjugate += (root - lead) / 2;
+}
+
+/* Width [W] of a blend of two responses whose largest force costs so much. */
+static real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
+
+/* The response of a size T along a direction g: y = T g, dy/ds = T' g g' + T dg/ds. */
+static response along_direction(line_response T, const push_direction *g) {
+  response y;
+  y.force[0] = T.force * g->x;
+  y.force[1] = T.force * g->y;
+  y.xx = T.slope * g->x * g->x + T.force * g->xx;
+  y.xy = T.slope * g->x * g->y + T.force * g->xy;
+  y.yy = T.slope * g->y * g->y + T.force * g->yy;
+  y.conjugate = T.conjugate;
+  y.angle = 0;
+  return y;
+}
+
+/* The response of a plane that pushes ahead alone. */
+static response sector_response(const real *block, const fl_actuator *a, const fl_set *set,
+                                const real *gauge, const real *price) {
+  const push_direction g = direction_of(set, gauge, price, set->price_floor_squared);
+  response own = along_direction(fl_limited_response(block, a, set, 0, g.v), &g);
+  if (set->is_forked && g.is_beyond) {
+    const push_direction end = end_of_arc(gauge, g.other_end, price);
+    const response other = along_direction(fl_limited_response(block, a, set, 0, end.v), &end);
+    blend(&own, &other, blend_width(set->cost_at_max));
+  }
+  return own;
+}
+
+/* The response of a plane: of one that pushes either way a blend of both, the gauge ahead. */
+static response plane_response(const real *block, const fl_actuator *a, const fl_set *set,
+                               const real *price) {
+  response own = sector_response(block, a, set, gauge_of(block, a), price);
+  if (set->force_max_reverse > 0) {
+    const fl_set reversed = fl_reversed_set(set);
+    const response other = sector_response(block, a, &reversed, 0, price);
+    blend(&own, &other, blend_width(reversed.cost_at_max));
+  }
+  return own;
+}
+
+/* Power [W] of a foil without lift: its drag is there all the same. */
+static real power_at_rest(const real *block, const fl_actuator *a) {
+  const real *table = block + (int)a->force_table;
+  return a->power_scale * table[2];
+}
+
+/* r = 1 - a/U of a foil, and q(r): r above SOFT, and e^(r/SOFT - 1) SOFT below, at least CLOSE of
+   it. */
+typedef struct {
+  real r, q;
+  real slope; /* q'(r), 0 where q is held */
+  real bend;  /* q''(r) */
+} soft_ratio;
+
+static soft_ratio soft_ratio_of(real r) {
+  soft_ratio ratio;
+  const real below = fl_smaller(r / SOFT - 1, 0);
+  const real decay = EXP(below);
+  ratio.r = r;
+  ratio.q = r;
+  ratio.slope = 0;
+  ratio.bend = 0;
+  if (decay > CLOSE) ratio.slope = decay;
+  if (below < 0) {
+    ratio.q = SOFT * fl_larger(decay, CLOSE);
+    ratio.bend = ratio.slope / SOFT;
+  }
+  return ratio;
+}
+
+/* The response of a foil to the prices of its lift and its drag. With P the power beyond that at
+   rest, chord(y) its chord between the limits and y the lift,
+
+       c*(s) = q max over y of (v y - P(y)) + (q - r) chord(0) - rest,
+       v     = (s_lift + (q - r) chord') / q,
+
+   its drag is the derivative of c* by the price of drag, where dr/ds = -1/U. */
+static response foil_response(const real *block, const fl_actuator *a, const fl_set *set,
+                              const real *price) {
+  const soft_ratio ratio = soft_ratio_of(1 - price[1] / a->flow_speed);
+  const real q = ratio.q;
+  const real excess = q - ratio.r;
+  const real rest = power_at_rest(block, a);
+  const real range = fl_larger(set->force_max - set->force_min, TINY);
+  const real chord_slope = (set->cost_at_max - set->cost_at_min) / range; /* [W/N] */
+  const real v = (price[0] + excess * chord_slope) / q;
+
+  const line_response lift = fl_limited_response(block, a, set, 1, v);
+  const real power = v * lift.force - lift.conjugate - rest;
+  const real chord = set->cost_at_min - rest + chord_slope * (lift.force - set->force_min);
+  const real chord_at_zero = set->cost_at_min - rest - chord_slope * set->force_min;
+  const real dlift = lift.slope / q;
+  /* Drag per lift along the curve of responses: marginal power over speed, P' = v or that of the
+     chord. */
+  const real drag_slope = (ratio.slope * v + (1 - ratio.slope) * chord_slope) / a->flow_speed;
+
+  response y;
+  y.force[0] = lift.force;
+  y.force[1] = (ratio.slope * power + (1 - ratio.slope) * chord) / a->flow_speed;
+  y.xx = dlift;
+  y.xy = dlift * drag_slope;
+  y.yy = dlift * drag_slope * drag_slope +
+         (chord - power) * ratio.bend / (a->flow_speed * a->flow_speed);
+  y.conjugate = q * (lift.conjugate + rest) + excess * chord_at_zero - rest;
+  y.angle = 0;
+  return y;
+}
+
+/* The response of a foil near to a command, in a step d [rad] of its angle from there: with
+   y = y_0 + d y' and a cost c_0 + c' d + c'' / 2 d^2, it is d = (s.y' - c') / c'' within its
+   limits. */
+static response tangent_response(const fl_set *set, const real *price) {
+  const fl_tangent *t = set->tangent;
+  const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* [W/rad] */
+  const real d = fl_clipped(gain / t->curvature, set->force_min, set->force_max);
+  const real x = t->force_slope[0];
+  const real y = t->force_slope[1];
+  real dd = 0; /* derivative of d by the gain */
+  if (d > set->force_min && d < set->force_max) dd = 1 / t->curvature;
+  response o;
+  o.force[0] = t->force[0] + d * x;
+  o.force[1] = t->force[1] + d * y;
+  o.xx = dd * x * x;
+  o.xy = dd * x * y;
+  o.yy = dd * y * y;
+  o.conjugate = dot(price, t->force, 2) + d * (gain - d * t->curvature / 2) - t->cost;
+  o.angle = 0;
   return o;
 }
 
-/* Blends an answer with another one, in a width [W] of their conjugates. */
-static void blend(response *own, const response *other, real width) {
-  real ahead = own->conjugate - other->conjugate, root = SQRT(ahead * ahead + width * width);
-  real share = (1 + ahead / root) / 2, rest = 1 - share, turn = width * width / (2 * root * root * root);
-  real dx = own->force[0] - other->force[0], dy = own->force[1] - other->force[1];
-  own->force[0] = share * own->force[0] + rest * other->force[0];
-  own->force[1] = share * own->force[1] + rest * other->force[1];
-  own->xx = share * own->xx + rest * other->xx + turn * dx * dx;
-  own->xy = share * own->xy + rest * other->xy + turn * dx * dy;
-  own->yy = share * own->yy + rest * other->yy + turn * dy * dy;
-  own->conjugate += (root - ahead) / 2;
-}
-
-static response along_fan(line_response o, const fan *f) {
-  return (response){{o.force * f->x, o.force * f->y},
-                 o.slope * f->x * f->x + o.force * f->xx,
-                 o.slope * f->x * f->y + o.force * f->xy,
-                 o.slope * f->y * f->y + o.force * f->yy,
-                 o.conjugate, 0};
-}
-
-static response one_way(const real *block, const fl_actuator *a, const fl_set *set, const real *gauge,
-                     const real *price) {
-  fan f = direction_of(set, gauge, price, set->gap2);
-  response own = along_fan(fl_limited_response(block, a, set, 0, f.along), &f);
-  if (set->forked && f.beyond) {
-    real rho = gauge_or_one(gauge, f.other);
-    fan g = {0, rho * COS(f.other), rho * SIN(f.other), 0, 0, 0, 0, 0};
-    response other = along_fan(fl_limited_response(block, a, set, 0, price[0] * g.x + price[1] * g.y), &g);
-    blend(&own, &other, FINE * set->high_cost + R(1e-12));
-  }
-  return own;
-}
-
-static response plane(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
-  response own = one_way(block, a, set, a->gauge > 0 ? block + (int)a->gauge : 0, price);
-  if (set->reverse > 0) {
-    fl_set back = fl_reversed_set(set);
-    response other = one_way(block, a, &back, 0, price);
-    blend(&own, &other, FINE * back.high_cost + R(1e-12));
-  }
-  return own;
-}
-
-static real rest_of(const real *block, const fl_actuator *a) { return a->worth * block[(int)a->ahead + 2]; }
-
-static response foil(const real *block, const fl_actuator *a, const fl_set *set, const real *price) {
-  real ratio = 1 - price[1] / a->speed, below = MIN(ratio / SOFT - 1, 0), power = EXP(below);
-  real rate = power > CLOSE ? power : 0, soft = below < 0 ? SOFT * MAX(power, CLOSE) : ratio;
-  real rise = (set->high_cost - set->low_cost) / MAX(set->high - set->low, TINY);
-  real bend = below < 0 ? rate / SOFT : 0, rest = rest_of(block, a), own = (price[0] + (soft - ratio) * rise) / soft;
-  line_response o = fl_limited_response(block, a, set, 1, own);
-  real cost = own * o.force - o.conjugate - rest, most = set->low_cost - rest + rise * (o.force - set->low);
-  o.conjugate = soft * (o.conjugate + rest) + (soft - ratio) * (set->low_cost - rest - rise * set->low) - rest;
-  o.slope /= soft;
-  real lean = (rate * own + (1 - rate) * rise) / a->speed;
-  return (response){{o.force, (rate * cost + (1 - rate) * most) / a->speed},
-                 o.slope,
-                 o.slope * lean,
-                 o.slope * lean * lean + (most - cost) * bend / (a->speed * a->speed),
-                 o.conjugate, 0};
-}
-
-static response on_tangent(const fl_set *set, const real *price) {
-  const fl_tangent *t = set->tangent;
-  real gain = dot(price, t->slope, 2) - t->pay, step = CLIP(gain / t->bend, set->low, set->high);
-  real x = t->slope[0], y = t->slope[1], free = step > set->low && step < set->high ? 1 / t->bend : 0;
-  return (response){{t->force[0] + step * x, t->force[1] + step * y}, free * x * x, free * x * y, free * y * y,
-                 dot(price, t->force, 2) + step * (gain - step * t->bend / 2) - t->cost, 0};
-}
-
+/* The response of an actuator within a set to the price (2,) of its force [W/N]. */
 response fl_response(const real *block, int i, const fl_set *set, const real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   if (a->rows == 1) {
-    line_response o = fl_limited_response(block, a, set, 1, price[0]);
-    return (response){{o.force, 0}, o.slope, 0, 0, o.conjugate, 0};
+    const line_response line = fl_limited_response(block, a, set, 1, price[0]);
+    return (response){{line.force, 0}, line.slope, 0, 0, line.conjugate, 0};
   }
-  if (set->tangent) return on_tangent(set, price);
-  if (a->speed > 0) return foil(block, a, set, price);
-  if (set->turn > 0) return fl_response_with_turning(block, i, set, price);
-  return plane(block, a, set, price);
+  if (set->tangent) return tangent_response(set, price);
+  if (a->flow_speed > 0) return foil_response(block, a, set, price);
+  if (set->turn_cost > 0) return fl_response_with_turning(block, i, set, price);
+  return plane_response(block, a, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */
 real fl_drag_of_lift(const real *block, int i, real force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return a->speed > 0 ? (fl_power_of_force(block, i, force) - rest_of(block, a)) / a->speed : 0;
+  if (!(a->flow_speed > 0)) return 0;
+  return (fl_power_of_force(block, i, force) - power_at_rest(block, a)) / a->flow_speed;
 }
 
-static void farthest_foil(const real *block, int i, const fl_set *set, const real *price, wide *force) {
+/* Lift and drag of a foil that are worth most at a price, whatever their power. Where drag is dear
+   that is a response to the price of lift over that of drag; else one end of the lift. */
+static void farthest_foil(const real *block, int i, const fl_set *set, const real *price,
+                          wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  real cost = -price[1];
-  if (cost > 0)
-    force[0] = fl_limited_response(block, a, set, 1, price[0] * a->speed / cost).force;
-  else {
-    real low = price[0] * set->low - cost * fl_drag_of_lift(block, i, set->low);
-    force[0] = price[0] * set->high - cost * fl_drag_of_lift(block, i, set->high) > low ? set->high : set->low;
+  const real drag_cost = -price[1];
+  real lift;
+  if (drag_cost > 0) {
+    lift = fl_limited_response(block, a, set, 1, price[0] * a->flow_speed / drag_cost).force;
+  } else {
+    const real drag_low = fl_drag_of_lift(block, i, set->force_min);
+    const real drag_high = fl_drag_of_lift(block, i, set->force_max);
+    const real worth_low = price[0] * set->force_min - drag_cost * drag_low;
+    const real worth_high = price[0] * set->force_max - drag_cost * drag_high;
+    lift = set->force_min;
+    if (worth_high > worth_low) lift = set->force_max;
   }
-  force[1] = fl_drag_of_lift(block, i, (real)force[0]);
+  force[0] = lift;
+  force[1] = fl_drag_of_lift(block, i, lift);
 }
 
-/* The force that is worth most at a price, whatever its power; returns the price along it, of planes that push either
-   way along what they push ahead. */
-real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force) {
+/* The direction in which a plane's farthest force lies: of an uneven fin beyond an end of its arc
+   the farther end may be worth more. */
+static push_direction farthest_direction(const fl_set *set, const real *gauge,
+                                         const real *price) {
+  const int is_unpriced = size_of(price) * size_of(price) <= TINY;
+  if (is_unpriced) { /* any force will do, but it must be one of the set */
+    const real middle[2] = {set->cos_center, set->sin_center};
+    push_direction any = direction_of(set, gauge, middle, TINY);
+    any.v = 0;
+    return any;
+  }
+  const push_direction g = direction_of(set, gauge, price, TINY);
+  if (g.is_beyond) {
+    const push_direction end = end_of_arc(gauge, g.other_end, price);
+    if (end.v > g.v) return end;
+  }
+  return g;
+}
+
+/* The force of a set that is worth most at a price (2,), whatever its power: what of it adds to the
+   support function of Eq. 12. Returns the price along it [W/N], of planes that push either way
+   along what they push ahead. */
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price,
+                       wide *force) {
   const fl_actuator *a = ACTUATOR(block, i);
   force[1] = 0;
   if (a->rows == 1) {
-    force[0] = price[0] > 0 ? set->high : set->low;
+    force[0] = set->force_min;
+    if (price[0] > 0) force[0] = set->force_max;
     return price[0];
   }
-  if (a->speed > 0) {
+  if (a->flow_speed > 0) {
     farthest_foil(block, i, set, price, force);
     return price[0];
   }
-  const real *gauge = a->gauge > 0 ? block + (int)a->gauge : 0;
-  const real middle[2] = {set->cos_middle, set->sin_middle};
-  const int is_free = size_of(price) * size_of(price) <= TINY; /* then any force will do, but it must be one of the set */
-  fan f = direction_of(set, gauge, is_free ? middle : price, TINY);
-  if (is_free) f.along = 0;
-  if (f.beyond) { /* of an uneven fin the farther end may be worth more */
-    const real rho = gauge_or_one(gauge, f.other);
-    const real other[2] = {rho * COS(f.other), rho * SIN(f.other)};
-    const real along = dot(price, other, 2);
-    if (along > f.along) {
-      f.along = along;
-      f.x = other[0];
-      f.y = other[1];
+  const push_direction g = farthest_direction(set, gauge_of(block, a), price);
+  real size = set->force_min;
+  if (g.v > 0) size = set->force_max;
+  force[0] = g.x;
+  force[1] = g.y;
+  /* Without a gauge its length is 1 but for rounding, which would be that of the set: a step of
+     Newton's method for the inverse root takes it off. */
+  wide length_squared = 1;
+  if (!(a->gauge_table > 0)) length_squared = product(force, force, 2);
+  const wide times = size / 2 * (3 - length_squared);
+  force[0] *= times;
+  force[1] *= times;
+  if (set->force_max_reverse > 0) {
+    const fl_set reversed = fl_reversed_set(set);
+    wide other[2];
+    const real v = fl_support_of_set(block, i, &reversed, price, other);
+    if (v > 0 && reversed.force_max * v > size * g.v) {
+      force[0] = other[0];
+      force[1] = other[1];
     }
   }
-  real size = f.along > 0 ? set->high : set->low;
-  force[0] = f.x, force[1] = f.y;
-  wide length = a->gauge > 0 ? 1 : product(force, force, 2); /* 1 but for rounding, which would be that of the set */
-  wide times = size / 2 * (3 - length);
-  force[0] *= times, force[1] *= times;
-  if (set->reverse > 0) {
-    fl_set back = fl_reversed_set(set);
-    wide other[2];
-    real along = fl_support_of_set(block, i, &back, price, other);
-    if (along > 0 && back.high * along > size * f.along) force[0] = other[0], force[1] = other[1];
-  }
-  return f.along;
+  return g.v;
 }
 
-/* Whether a plane that pushes either way answers rather forward, and how far [N] its blend is from that. */
+/* Whether a plane that pushes either way responds rather ahead than in reverse, and how far its
+   blend is from that force: `off` [N]. */
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
   const fl_actuator *a = ACTUATOR(block, i);
-  fl_set back = fl_reversed_set(set);
-  response ahead = one_way(block, a, set, 0, price), other = one_way(block, a, &back, 0, price);
-  real gain = ahead.conjugate - other.conjugate, width = FINE * back.high_cost + R(1e-12);
-  real share = (1 + gain / SQRT(gain * gain + width * width)) / 2;
-  real dx = ahead.force[0] - other.force[0], dy = ahead.force[1] - other.force[1];
-  *off = MIN(share, 1 - share) * SQRT(dx * dx + dy * dy);
-  return share >= R(0.5);
+  const fl_set reversed = fl_reversed_set(set);
+  const response ahead = sector_response(block, a, set, 0, price);
+  const response reverse = sector_response(block, a, &reversed, 0, price);
+  const real lead = ahead.conjugate - reverse.conjugate;
+  const real width = blend_width(reversed.cost_at_max);
+  const real p = (1 + lead / SQRT(lead * lead + width * width)) / 2;
+  const real dx = ahead.force[0] - reverse.force[0];
+  const real dy = ahead.force[1] - reverse.force[1];
+  *off = fl_smaller(p, 1 - p) * SQRT(dx * dx + dy * dy);
+  return p >= R(0.5);
 }

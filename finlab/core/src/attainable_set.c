@@ -2,33 +2,36 @@
    go in it, Eq. 12 and 14. */
 #include "internal.h"
 
-#define NUMBERS_OF_SET 16 /* of each actuator, in `own` of fl_reach */
+#define NUMBERS_OF_SET 16 /* of each actuator, in `sets` of fl_reach */
 
 /* Takes the set of one actuator from its numbers: offset of a polygon's corners, or 0 and
-   radius, middle and half of a sector; then the wrench per newton along both directions. */
+   radius, centre and half angle of a sector; then the wrench per newton along both directions. */
 static void take_set(const real *block, fl_work *work, int i, const real *numbers) {
-  const real corners = numbers[0];
   const real *columns = numbers + 4;
-  work->set[i] = (fl_set){.high = numbers[1], .middle = numbers[2], .half = numbers[3]};
-  work->corners[i] = (int)corners;
-  fl_prepare_set(block, i, work->set + i);
-  memcpy(work->column[i], columns, sizeof work->column[i]);
+  fl_set *set = work->set + i;
+  memset(set, 0, sizeof *set);
+  set->force_max = numbers[1];
+  set->sector_center = numbers[2];
+  set->sector_half_angle = numbers[3];
+  work->polygon_offset[i] = (int)numbers[0];
+  fl_prepare_set(block, i, set);
+  memcpy(work->effectiveness_weighted[i], columns, sizeof work->effectiveness_weighted[i]);
 }
 
 /* Of `count` robots of n actuators in planes, which a block counts and no more, how far
    (count,) a ray (count, 6) from a point (count, 6) goes in what they push: a bound that is
    as `close`, the normal (count, 6) of its plane, and the forces (count, n, 2) there. Their
    sets are given (count, n, 16), see take_set. */
-void fl_reach(const real *block, fl_work *work, const real *own, const wide *from, const wide *ray,
+void fl_reach(const real *block, fl_work *work, const real *sets, const wide *from, const wide *ray,
               int count, wide close, wide *size, wide *normal, real *force) {
   const int n = COUNT(block);
   const wide farthest = 1e30;
   for (int k = 0; k < count; k++) {
-    for (int i = 0; i < n; i++) take_set(block, work, i, own + NUMBERS_OF_SET * i);
+    for (int i = 0; i < n; i++) take_set(block, work, i, sets + NUMBERS_OF_SET * i);
     size[k] = fl_farthest_along_ray(block, work, from, ray, -farthest, farthest, close,
                                     &work->mixture, normal);
     fl_mixed_forces(block, &work->mixture, (real(*)[2])force);
-    own += NUMBERS_OF_SET * n;
+    sets += NUMBERS_OF_SET * n;
     from += 6;
     ray += 6;
     normal += 6;

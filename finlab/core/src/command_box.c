@@ -6,22 +6,22 @@
 
 /* Which number of a command is an angle; -1 where none is. */
 int fl_angle_number(const fl_actuator *a) {
-  if (a->form == FL_FIN) return 2;
-  if (a->form == FL_POD) return 0;
+  if (a->command_kind == FL_FIN) return 2;
+  if (a->command_kind == FL_POD) return 0;
   return -1;
 }
 
 /* Which number of a command is a force; -1 where none is. */
 int fl_force_number(const fl_actuator *a) {
-  if (a->form == FL_THRUSTER) return 0;
-  if (a->form == FL_POD) return 1;
+  if (a->command_kind == FL_THRUSTER) return 0;
+  if (a->command_kind == FL_POD) return 1;
   return -1;
 }
 
 /* A number of a command in a box, an angle wrapped first. */
 real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
-  const real low = box->low[i][k];
-  const real high = box->high[i][k];
+  const real low = box->command_min[i][k];
+  const real high = box->command_max[i][k];
   const real middle = (low + high) / 2;
   if (k == angle) value = middle + fl_wrap_angle(value - middle);
   return fl_clipped(value, low, high);
@@ -31,13 +31,13 @@ real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
    edge but for rounding it does not. */
 int fl_is_in_dead_band(const fl_actuator *a, const real *command) {
   const int k = fl_force_number(a);
-  return k >= 0 && FABS(command[k]) < a->band * (1 - NEARLY);
+  return k >= 0 && FABS(command[k]) < a->dead_band * (1 - NEARLY);
 }
 
 /* The edge of a dead band on the side of a command. */
 static real edge_of_band(const fl_actuator *a, real command) {
-  if (command < 0) return -a->band;
-  return a->band;
+  if (command < 0) return -a->dead_band;
+  return a->dead_band;
 }
 
 /* Puts commands that gaps left a little inside their dead band at its edge: forces nearer to
@@ -47,7 +47,7 @@ void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) 
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
     if (k < 0 || !fl_is_in_dead_band(a, command[i])) continue;
-    if (size_of(force[i]) < AT_EDGE * a->band) continue;
+    if (size_of(force[i]) < AT_EDGE * a->dead_band) continue;
     command[i][k] = edge_of_band(a, command[i][k]);
   }
 }
@@ -58,10 +58,10 @@ void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_force_number(a);
-    if (k < 0 || !(FABS(command[i][k]) < a->band)) continue;
+    if (k < 0 || !(FABS(command[i][k]) < a->dead_band)) continue;
     if (!fl_is_in_dead_band(a, command[i]))
       command[i][k] = edge_of_band(a, command[i][k]);
-    else if (box->low[i][k] <= 0 && box->high[i][k] >= 0)
+    else if (box->command_min[i][k] <= 0 && box->command_max[i][k] >= 0)
       command[i][k] = 0;
   }
 }
@@ -79,12 +79,12 @@ void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
     const int angle = fl_angle_number(a);
     for (int k = 0; k < 3; k++) {
       real value = command[i][k];
-      if (!(k == angle && box->free[i])) value = fl_clip_number(box, i, k, angle, value);
+      if (!(k == angle && box->is_free_angle[i])) value = fl_clip_number(box, i, k, angle, value);
       if (k == angle) {
-        const real middle = (a->lower[k] + a->upper[k]) / 2;
+        const real middle = (a->command_min[k] + a->command_max[k]) / 2;
         value = middle + fl_wrap_angle(value - middle);
       }
-      command[i][k] = fl_clipped(value, a->lower[k], a->upper[k]);
+      command[i][k] = fl_clipped(value, a->command_min[k], a->command_max[k]);
     }
   }
 }

@@ -193,8 +193,8 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
   real along_x = COS(angle);
   real along_y = SIN(angle);
   real bend = 0; /* (d rho / d angle) / rho */
-  if (a->gauge > 0) {
-    const real *gauge = block + (int)a->gauge;
+  if (a->gauge_table > 0) {
+    const real *gauge = block + (int)a->gauge_table;
     const real rho = fl_gauge_radius(gauge, angle);
     if (has_slope) {
       const real rise =
@@ -215,16 +215,16 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
 /* Lift of a foil and its drag beyond that at rest, by its angle. */
 static void foil_force(const fl_actuator *a, const real *grid, const real *command, real *force,
                        real (*slope)[3], int has_slope) {
-  const real along[3] = {0, 0, command[0] - a->lean};
+  const real along[3] = {0, 0, command[0] - a->lean_angle};
   real by[3][3] = {{0}};
   real(*by_or_none)[3] = 0;
   if (has_slope) by_or_none = by;
   grid_at(grid, along, force, by_or_none);
   for (int k = 0; k < 2; k++) {
-    force[k] *= a->pressure;
-    slope[0][k] = a->pressure * by[2][k];
+    force[k] *= a->pressure_area;
+    slope[0][k] = a->pressure_area * by[2][k];
   }
-  force[1] -= a->pressure * a->rest;
+  force[1] -= a->pressure_area * a->zero_lift_drag;
 }
 
 /* Force of a fin whose law gives a size, by amplitude and frequency, along the third
@@ -238,12 +238,12 @@ static void fin_force(const fl_actuator *a, const real *grid, const real *comman
   grid_at(grid, command, &size, by_or_none);
   real uneven = 1;
   real d_uneven = 0; /* its derivative by the angle */
-  if (a->uneven != 0) {
-    const real angle = command[2] - a->uneven_at;
-    uneven += a->uneven * COS(angle);
-    d_uneven = -a->uneven * SIN(angle);
+  if (a->unevenness != 0) {
+    const real angle = command[2] - a->unevenness_angle;
+    uneven += a->unevenness * COS(angle);
+    d_uneven = -a->unevenness * SIN(angle);
   }
-  const real direction = command[2] + a->lean;
+  const real direction = command[2] + a->lean_angle;
   const real along_x = COS(direction);
   const real along_y = SIN(direction);
   const real d_size[3] = {by[0][0] * uneven, by[1][0] * uneven, size * d_uneven};
@@ -263,18 +263,18 @@ static void fin_force(const fl_actuator *a, const real *grid, const real *comman
 void fl_force_of_command(const real *block, int i, const real *command, real *force,
                          real (*slope)[3]) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *grid = block + (int)a->law;
+  const real *grid = block + (int)a->law_grid;
   const int has_slope = slope != 0;
   real unused[3][3];
   if (!has_slope) slope = unused;
   memset(force, 0, 3 * sizeof *force);
   memset(slope, 0, 9 * sizeof **slope);
-  if (a->form == FL_THRUSTER) {
+  if (a->command_kind == FL_THRUSTER) {
     force[0] = command[0];
     slope[0][0] = 1;
-  } else if (a->form == FL_POD) {
+  } else if (a->command_kind == FL_POD) {
     pod_force(block, a, command, force, slope, has_slope);
-  } else if (a->form == FL_FOIL) {
+  } else if (a->command_kind == FL_FOIL) {
     foil_force(a, grid, command, force, slope, has_slope);
   } else if (grid[5] == 1) {
     fin_force(a, grid, command, force, slope, has_slope);
@@ -321,19 +321,19 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
                         real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = 0;
-  if (a->gauge > 0) gauge = block + (int)a->gauge;
+  if (a->gauge_table > 0) gauge = block + (int)a->gauge_table;
   const real size = size_of(force);
   const real direction = ATAN2(force[1], force[0]);
   real angle = direction;
   real wanted = size;
   for (int k = 0; k < 2; k++) { /* what the tables leave undone is asked for on top */
-    real most = a->high;
-    real lean = a->lean;
+    real most = a->force_max;
+    real lean = a->lean_angle;
     if (gauge) {
-      most = a->high * fl_gauge_radius(gauge, angle);
+      most = a->force_max * fl_gauge_radius(gauge, angle);
       lean = fl_gauge_lean(gauge, angle);
     }
-    beat_at(block + (int)a->beat, wanted / most, command);
+    beat_at(block + (int)a->command_table, wanted / most, command);
     command[2] = angle - lean;
     for (int c = 0; c < 3; c++) command[c] = fl_clip_number(box, i, c, 2, command[c]);
     if (k == 1) break;
@@ -373,17 +373,17 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   const fl_actuator *a = ACTUATOR(block, i);
   const real direction = ATAN2(force[1], force[0]);
   real size = size_of(force);
-  if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, direction);
+  if (a->gauge_table > 0) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   real angle = angle_before;
   if (size > 0) angle = direction;
   const pod_way ahead = pod_way_of(block, i, box, angle, size, 0);
   const pod_way back = pod_way_of(block, i, box, angle, size, 1);
-  const real slack = NEARLY * a->upper[1];
+  const real slack = NEARLY * a->command_max[1];
   const int is_nearer = back.miss < ahead.miss - slack;
   const int is_as_near = back.miss <= ahead.miss + slack;
   const int is_cheaper = back.power < ahead.power * (1 - NEARLY);
   pod_way chosen = ahead;
-  if (box->low[i][1] < 0 && (is_nearer || (is_as_near && is_cheaper))) chosen = back;
+  if (box->command_min[i][1] < 0 && (is_nearer || (is_as_near && is_cheaper))) chosen = back;
   command[0] = chosen.angle;
   command[1] = chosen.force;
   command[2] = 0;
@@ -394,21 +394,21 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
 void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force,
                           const real *before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (a->form == FL_FIN) {
+  if (a->command_kind == FL_FIN) {
     fin_command(block, i, box, force, command);
     return;
   }
-  if (a->form == FL_POD) {
+  if (a->command_kind == FL_POD) {
     real angle_before = 0;
     if (before) angle_before = before[0];
     pod_command(block, i, box, force, angle_before, command);
     return;
   }
-  real wanted = a->sign * force[0];
-  if (a->form == FL_FOIL) {
-    real angle = on_curve(block + (int)a->beat, FABS(force[0]) / a->pressure);
+  real wanted = a->command_sign * force[0];
+  if (a->command_kind == FL_FOIL) {
+    real angle = on_curve(block + (int)a->command_table, FABS(force[0]) / a->pressure_area);
     if (force[0] < 0) angle = -angle;
-    wanted = angle + a->turned;
+    wanted = angle + a->zero_lift_angle;
   }
   command[0] = fl_clip_number(box, i, 0, -1, wanted);
   command[1] = 0;
@@ -421,15 +421,15 @@ void fl_command_for_force(const real *block, int i, const fl_box *box, const rea
 static void sizes_in(const real *block, int i, const fl_box *box, real *least, real *largest,
                      real *direction) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *low = box->low[i];
-  const real *high = box->high[i];
+  const real *low = box->command_min[i];
+  const real *high = box->command_max[i];
   *least = R(1e30);
   *largest = -R(1e30);
   *direction = 0;
   for (int j = 0; j < PROBES * PROBES; j++) {
     real command[3] = {0, 0, (low[2] + high[2]) / 2};
     real force[3];
-    if (a->form == FL_FOIL) {
+    if (a->command_kind == FL_FOIL) {
       command[0] = low[0] + (real)j / (PROBES * PROBES - 1) * (high[0] - low[0]);
     } else {
       command[0] = low[0] + (real)(j % PROBES) / (PROBES - 1) * (high[0] - low[0]);
@@ -437,7 +437,7 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
     }
     fl_force_of_command(block, i, command, force, 0);
     real size = force[0];
-    if (a->form != FL_FOIL) size = size_of(force + 1);
+    if (a->command_kind != FL_FOIL) size = size_of(force + 1);
     if (size > *largest) *direction = ATAN2(force[2], force[1]);
     *least = fl_smaller(*least, size);
     *largest = fl_larger(*largest, size);
@@ -448,19 +448,19 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
    reverse, and the arc of their directions [rad]. */
 force_range fl_force_range(const real *block, int i, const fl_box *box) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *low = box->low[i];
-  const real *high = box->high[i];
+  const real *low = box->command_min[i];
+  const real *high = box->command_max[i];
   force_range range = {0, 0, 0, 0};
-  if (a->form == FL_THRUSTER) {
+  if (a->command_kind == FL_THRUSTER) {
     range.low = low[0];
     range.high = high[0];
-    if (!(a->sign > 0)) {
+    if (!(a->command_sign > 0)) {
       range.low = -high[0];
       range.high = -low[0];
     }
     return range;
   }
-  if (a->form == FL_FOIL) {
+  if (a->command_kind == FL_FOIL) {
     real unused;
     sizes_in(block, i, box, &range.low, &range.high, &unused);
     return range;
@@ -471,13 +471,13 @@ force_range fl_force_range(const real *block, int i, const fl_box *box) {
   if (range.half >= PI - NOTHING) range.half = PI;
   range.low = low[1];
   range.high = high[1];
-  if (a->form == FL_POD) return range;
+  if (a->command_kind == FL_POD) return range;
   real direction;
   sizes_in(block, i, box, &range.low, &range.high, &direction);
   /* where the force points at the middle of the commands' arc */
   range.middle += fl_wrap_angle(direction - range.middle);
-  if (a->gauge > 0) {
-    const real rho = fl_gauge_radius(block + (int)a->gauge, range.middle);
+  if (a->gauge_table > 0) {
+    const real rho = fl_gauge_radius(block + (int)a->gauge_table, range.middle);
     range.low /= rho;
     range.high /= rho;
   }

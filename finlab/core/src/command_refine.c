@@ -15,21 +15,23 @@
 /* The residual (6,) of commands, on the yardstick. Returns its square. */
 static real residual_of(const real *block, const fl_work *work, const real *wrench_wanted,
                         real command[][3], real *residual) {
-  const real *scale = HEAD(block)->yard;
+  const real *scale = HEAD(block)->wrench_scale;
   const fl_span *span = &work->span;
-  for (int k = 0; k < 6; k++) residual[k] = (wrench_wanted[k] - span->beside[k]) / scale[k];
+  for (int k = 0; k < 6; k++) residual[k] = (wrench_wanted[k] - span->wrench_offset[k]) / scale[k];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    if (span->lost[i]) continue;
+    if (span->is_lost[i]) continue;
     real force[3];
     fl_force_of_command(block, i, command[i], force, 0);
     if (fl_is_in_dead_band(a, command[i])) memset(force, 0, sizeof force);
     for (int k = 0; k < 6; k++) {
-      residual[k] -= force[0] * a->own[0][k] + force[1] * a->own[1][k] + force[2] * a->own[2][k];
+      residual[k] -= force[0] * a->effectiveness_normalized[0][k] +
+                     force[1] * a->effectiveness_normalized[1][k] +
+                     force[2] * a->effectiveness_normalized[2][k];
     }
   }
   for (int k = 0; k < 6; k++) {
-    if (!span->counts[k]) residual[k] = 0;
+    if (!span->axis_counts[k]) residual[k] = 0;
   }
   return dot(residual, residual, 6);
 }
@@ -38,21 +40,22 @@ static real residual_of(const real *block, const fl_work *work, const real *wren
    limits, into the work area. */
 static void find_jacobian(const real *block, fl_work *work, const fl_box *box,
                           real command[][3]) {
-  const unsigned char *counts = work->span.counts;
+  const unsigned char *counts = work->span.axis_counts;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real force[3];
     real by[3][3]; /* of the force (second index) by each command */
     fl_force_of_command(block, i, command[i], force, by);
-    if (work->span.lost[i] || fl_is_in_dead_band(a, command[i])) memset(by, 0, sizeof by);
+    if (work->span.is_lost[i] || fl_is_in_dead_band(a, command[i])) memset(by, 0, sizeof by);
     for (int c = 0; c < 3; c++) {
-      const real width = box->high[i][c] - box->low[i][c];
-      real *row = work->slope[i][c];
+      const real width = box->command_max[i][c] - box->command_min[i][c];
+      real *row = work->jacobian[i][c];
       for (int k = 0; k < 6; k++) {
         row[k] = 0;
         if (!counts[k]) continue;
-        const real slope =
-            by[c][0] * a->own[0][k] + by[c][1] * a->own[1][k] + by[c][2] * a->own[2][k];
+        const real slope = by[c][0] * a->effectiveness_normalized[0][k] +
+                           by[c][1] * a->effectiveness_normalized[1][k] +
+                           by[c][2] * a->effectiveness_normalized[2][k];
         row[k] = width * slope;
       }
     }
@@ -62,9 +65,9 @@ static void find_jacobian(const real *block, fl_work *work, const fl_box *box,
 /* Whether a step takes number c of a command out of its limits. */
 static int leaves_box(const real *block, const fl_box *box, int i, int c, const real *command,
                       real step) {
-  if (c == fl_angle_number(ACTUATOR(block, i)) && box->free[i]) return 0;
-  if (step < 0) return command[c] <= box->low[i][c] + NOTHING;
-  if (step > 0) return command[c] >= box->high[i][c] - NOTHING;
+  if (c == fl_angle_number(ACTUATOR(block, i)) && box->is_free_angle[i]) return 0;
+  if (step < 0) return command[c] <= box->command_min[i][c] + NOTHING;
+  if (step > 0) return command[c] >= box->command_max[i][c] - NOTHING;
   return 0;
 }
 
@@ -77,7 +80,7 @@ static void damped_step(const real *block, fl_work *work, const real *residual, 
   real gram[6][6] = {{0}}; /* J J' */
   for (int i = 0; i < n; i++) {
     for (int c = 0; c < 3; c++) {
-      if (!held[i][c]) fl_add_square(gram, work->slope[i][c], 1);
+      if (!held[i][c]) fl_add_square(gram, work->jacobian[i][c], 1);
     }
   }
   const real ridge = (mu + ROUNDING * REGULAR) * fl_trace(gram) + TINY;
@@ -87,7 +90,7 @@ static void damped_step(const real *block, fl_work *work, const real *residual, 
   for (int i = 0; i < n; i++) {
     for (int c = 0; c < 3; c++) {
       step[i][c] = 0;
-      if (!held[i][c]) step[i][c] = dot(work->slope[i][c], multiplier, 6);
+      if (!held[i][c]) step[i][c] = dot(work->jacobian[i][c], multiplier, 6);
     }
   }
 }
@@ -125,7 +128,7 @@ static void take_step(const real *block, const fl_box *box, real command[][3], r
     for (int c = 0; c < 3; c++) {
       real change = 0;
       if (!leaves_box(block, box, i, c, command[i], step[i][c])) change = step[i][c];
-      const real width = box->high[i][c] - box->low[i][c];
+      const real width = box->command_max[i][c] - box->command_min[i][c];
       stepped[i][c] = fl_clip_number(box, i, c, angle, command[i][c] + change * width);
     }
   }
@@ -144,7 +147,7 @@ real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, con
     real step[FL_MOST][3];
     real stepped[FL_MOST][3];
     real residual_stepped[6];
-    work->refined++;
+    work->refine_steps++;
     if (has_moved) find_jacobian(block, work, box, command);
     step_within(block, work, box, command, residual, mu, step);
     take_step(block, box, command, step, stepped);

@@ -38,7 +38,7 @@ void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
     target[j] = 0;
-    for (int k = 0; k < 6; k++) target[j] += span->basis[k][j] * (wrench[k] / span->scale[k]);
+    for (int k = 0; k < 6; k++) target[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
   }
 }
 
@@ -48,7 +48,7 @@ void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_redu
   for (int j = 0; j < 6; j++) {
     lambda_reduced[j] = 0;
     for (int k = 0; k < 6; k++) {
-      lambda_reduced[j] += span->basis[k][j] * span->scale[k] * lambda[k];
+      lambda_reduced[j] += span->basis[k][j] * span->axis_scale[k] * lambda[k];
     }
   }
 }
@@ -59,7 +59,7 @@ int fl_is_in_range(const fl_work *work, const real *wrench, const real *target) 
   real outside_squared = 0;
   real size_squared = 0;
   for (int k = 0; k < 6; k++) {
-    const real scaled = wrench[k] / span->scale[k];
+    const real scaled = wrench[k] / span->axis_scale[k];
     const real outside = scaled - dot(span->basis[k], target, 6);
     outside_squared += outside * outside;
     size_squared += scaled * scaled;
@@ -74,38 +74,41 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
   real reduced[6] = {0};
   for (int i = 0; i < COUNT(block); i++) {
     for (int row = 0; row < (int)ACTUATOR(block, i)->rows; row++) {
-      for (int j = 0; j < span->range; j++) reduced[j] += force[i][row] * span->matrix[i][row][j];
+      for (int j = 0; j < span->rank; j++)
+        reduced[j] += force[i][row] * span->effectiveness_reduced[i][row][j];
     }
   }
-  for (int k = 0; k < 6; k++) wrench[k] = span->scale[k] * dot(span->basis[k], reduced, 6);
+  for (int k = 0; k < 6; k++) wrench[k] = span->axis_scale[k] * dot(span->basis[k], reduced, 6);
 }
 
 /* The largest cost [W] within a set: C of Eq. 13 is the sum of all. */
 static real largest_cost(const fl_set *set) {
   real reverse_cost = 0;
-  if (set->reverse > 0) reverse_cost = set->reverse_cost;
-  return fl_larger(fl_larger(set->low_cost, set->high_cost), reverse_cost);
+  if (set->force_max_reverse > 0) reverse_cost = set->cost_at_max_reverse;
+  return fl_larger(fl_larger(set->cost_at_min, set->cost_at_max), reverse_cost);
 }
 
 /* Sets what follows from all sets: the largest cost, and which kinds of sets there are. */
 void fl_prepare_sets(const real *block, fl_work *work) {
-  work->most_cost = 0;
-  work->quick = 1;
-  work->torn = 0;
-  work->drags = 0;
-  work->turns = 0;
+  work->power_cost_max = 0;
+  work->is_convex = 1;
+  work->has_forks = 0;
+  work->has_drag = 0;
+  work->has_turn_cost = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const fl_set *set = work->set + i;
-    work->most_cost += largest_cost(set);
-    if (set->turn > 0) {
-      const real farthest = fl_smaller(FABS(set->middle - set->at) + set->half, PI);
-      work->most_cost += set->turn / 2 * farthest * farthest;
-      work->turns = 1;
+    work->power_cost_max += largest_cost(set);
+    if (set->turn_cost > 0) {
+      const real farthest =
+          fl_smaller(FABS(set->sector_center - set->turn_origin) + set->sector_half_angle, PI);
+      work->power_cost_max += set->turn_cost / 2 * farthest * farthest;
+      work->has_turn_cost = 1;
     }
-    work->torn |= set->forked || set->reverse > 0;
-    work->drags |= a->speed > 0 && !work->span.lost[i];
-    if (work->torn || work->drags || work->turns || a->band > 0) work->quick = 0;
+    work->has_forks |= set->is_forked || set->force_max_reverse > 0;
+    work->has_drag |= a->flow_speed > 0 && !work->span.is_lost[i];
+    if (work->has_forks || work->has_drag || work->has_turn_cost || a->dead_band > 0)
+      work->is_convex = 0;
   }
 }
 
@@ -129,50 +132,51 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real s[2];
-    own_price(work, i, lambda, s);
+    actuator_price(work, i, lambda, s);
     const response answer = fl_response(block, i, work->set + i, s); /* y, dy/ds, c*(s): Eq. 4, 5 */
     const real *y = answer.force;
 
     state->force[i][0] = y[0];
     state->force[i][1] = y[1];
-    state->slope[i][0] = answer.xx;
-    state->slope[i][1] = answer.xy;
-    state->slope[i][2] = answer.yy;
-    state->angle[i] = answer.angle;
+    state->dy_ds[i][0] = answer.xx;
+    state->dy_ds[i][1] = answer.xy;
+    state->dy_ds[i][2] = answer.yy;
+    state->push_angle[i] = answer.angle;
     const real size_s = length(a, s);
     const real size_y = length(a, y);
-    state->slope[i][3] = 0;
-    if (!work->drags) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
-      const real price_of_gain = a->most[0] / a->gain[0];
-      state->slope[i][3] = size_y / fl_larger(size_s, price_of_gain);
+    state->secant[i] = 0;
+    if (!work->has_drag) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
+      const real price_quadratic = a->row_force_max[0] / a->secant[0];
+      state->secant[i] = size_y / fl_larger(size_s, price_quadratic);
     }
     conjugate += answer.conjugate;
-    const real(*B)[6] = work->span.matrix[i];
+    const real(*B)[6] = work->span.effectiveness_reduced[i];
     for (int j = 0; j < 6; j++) wrench[j] += y[0] * B[0][j] + y[1] * B[1][j];
   }
   for (int j = 0; j < 6; j++) {
-    state->price[j] = lambda[j];
+    state->lambda_reduced[j] = lambda[j];
     state->residual[j] = target[j] - wrench[j]; /* Eq. 6 */
   }
-  state->value = dot(lambda, target, 6) - conjugate; /* Eq. 3 */
-  state->size = SQRT(dot(state->residual, state->residual, 6));
+  state->dual_value = dot(lambda, target, 6) - conjugate; /* Eq. 3 */
+  state->residual_size = SQRT(dot(state->residual, state->residual, 6));
 }
 
 /* Has Newton's method be at multipliers. */
 void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda) {
-  work->now = work->state;
+  work->state_found = work->state;
   fl_dual_at(block, work, target, lambda, work->state);
 }
 
-/* Largest force [N] of a line at prices of this sign, and its force over price there [N^2/W]. */
-static void gain_of_line(const real *block, const fl_actuator *a, real s, real *most, real *gain) {
-  const real *table = block + (int)a->ahead;
-  if (s < 0 && a->back > 0) table = block + (int)a->back;
-  const real largest_price = table[0];
+/* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
+static void secant_of_line(const real *block, const fl_actuator *a, real s, real *most,
+                           real *secant) {
+  const real *table = block + (int)a->force_table;
+  if (s < 0 && a->force_table_reverse > 0) table = block + (int)a->force_table_reverse;
+  const real price_max = table[0];
   const int cells = (int)table[1];
-  const real largest_force = table[3 + 3 * cells];
-  *most = a->share * largest_force;
-  *gain = *most * a->share / (largest_price * a->worth);
+  const real force_max = table[3 + 3 * cells];
+  *most = a->force_scale * force_max;
+  *secant = *most * a->force_scale / (price_max * a->power_scale);
 }
 
 /* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
@@ -183,27 +187,27 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
   /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
      is only read. */
   real lambda_quadratic[6];
-  fl_solve((real(*)[6])work->factor, target, lambda_quadratic);
+  fl_solve((real(*)[6])work->hessian_factor, target, lambda_quadratic);
   real H[6][6] = {{0}};
   *mu = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     real s[2];
-    own_price(work, i, lambda_quadratic, s);
+    actuator_price(work, i, lambda_quadratic, s);
     real size_s = FABS(s[0]); /* of a foil its lift alone counts */
     if (is_plane(a)) size_s = size_of(s);
-    const real size_y = a->gain[0] * size_s;
-    real most = a->most[0];
-    real gain[2] = {a->gain[0], a->gain[1]};
-    if (a->rows == 1) gain_of_line(block, a, s[0], &most, &gain[0]);
+    const real size_y = a->secant[0] * size_s;
+    real most = a->row_force_max[0];
+    real secant[2] = {a->secant[0], a->secant[1]};
+    if (a->rows == 1) secant_of_line(block, a, s[0], &most, &secant[0]);
 
     const real share = size_y / most;
     if (share > NEAR_LIMIT) *mu = SATURATED;
     /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
     real weight = SQRT(fl_clipped(share, CLOSE, 1));
-    if (share > 1 && !work->drags) weight = 1 / share;
+    if (share > 1 && !work->has_drag) weight = 1 / share;
     for (int row = 0; row < (int)a->rows; row++) {
-      fl_add_square(H, work->span.matrix[i][row], weight * gain[row]);
+      fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
     }
   }
   const real trace = fl_trace(H);
@@ -229,19 +233,19 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
                        real *step) {
   real H[6][6] = {{0}};
   for (int i = 0; i < COUNT(block); i++) {
-    const real(*B)[6] = work->span.matrix[i];
-    const real *slope = at->slope[i];
-    const real xx = slope[0] + mu * slope[3];
-    const real xy = slope[1];
-    const real yy = slope[2] + mu * slope[3];
+    const real(*B)[6] = work->span.effectiveness_reduced[i];
+    const real *dy_ds = at->dy_ds[i];
+    const real xx = dy_ds[0] + mu * at->secant[i];
+    const real xy = dy_ds[1];
+    const real yy = dy_ds[2] + mu * at->secant[i];
     if (ACTUATOR(block, i)->rows != 1)
       add_plane(H, B[0], B[1], xx, xy, yy);
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
   real c = SATURATED;
-  if (work->drags) c = 1; /* S is left out there */
-  const real weight = c * mu * fl_larger(fl_trace(H), work->least_trace);
+  if (work->has_drag) c = 1; /* S is left out there */
+  const real weight = c * mu * fl_larger(fl_trace(H), work->trace_min);
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
@@ -254,20 +258,21 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
    what is to be cut. */
 static int jumps_between(const real *block, fl_work *work, const fl_state *one,
                          const fl_state *other, const real *step, int marked) {
-  const real full = NOTHING * work->most_cost; /* in a hole around rest multipliers go to 0 */
+  const real full = NOTHING * work->power_cost_max; /* in a hole around rest multipliers go to 0 */
   const real step_squared = dot(step, step, 6);
-  const real lambda_squared = dot(one->price, one->price, 6) + 100 * work->most_cost * full;
+  const real lambda_squared =
+      dot(one->lambda_reduced, one->lambda_reduced, 6) + 100 * work->power_cost_max * full;
   if (!(step_squared < JUMP_STEP * lambda_squared)) return 0;
   const int is_short = step_squared < SHORT_STEP * lambda_squared;
   int jumps = 0;
   for (int i = 0; i < COUNT(block); i++) {
     fl_set *set = work->set + i;
-    if (!(set->turn > 0)) continue;
+    if (!(set->turn_cost > 0)) continue;
     real s[2];
-    own_price(work, i, step, s);
+    actuator_price(work, i, step, s);
     if (!fl_has_jumped(block, i, set, one, other, s, is_short)) continue;
     jumps++;
-    if (marked) fl_mark_jump(set, one->angle[i], other->angle[i]);
+    if (marked) fl_mark_jump(set, one->push_angle[i], other->push_angle[i]);
   }
   return jumps;
 }
@@ -284,16 +289,16 @@ static step_result judged_step(const real *step, const fl_state *from, const fl_
   result.slope_begin = dot(step, from->residual, 6);
   result.slope_end = dot(step, to->residual, 6);
   result.slope_left = result.slope_end / fl_larger(result.slope_begin, TINY);
-  result.rise = to->value - from->value;
+  result.rise = to->dual_value - from->dual_value;
   return result;
 }
 
 /* A step is kept that ends uphill, or where the value rose, or is the same and the residual
    fell: with saturated actuators the residual may fall while the value does, too. */
 static int is_kept(const step_result *result, const fl_state *from, const fl_state *to) {
-  const real slack = ROUNDING * FABS(from->value);
+  const real slack = ROUNDING * FABS(from->dual_value);
   if (result->slope_left >= 0 || result->rise > 0) return 1;
-  return result->rise > -slack && to->size < FELL * from->size;
+  return result->rise > -slack && to->residual_size < FELL * from->residual_size;
 }
 
 static real mu_after_kept(real mu, const step_result *result) {
@@ -315,11 +320,11 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none;
-   work->now is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
+   work->state_found is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
-  const real beyond = work->most_cost * (1 + NOTHING) + NOTHING;
+  const real beyond = work->power_cost_max * (1 + NOTHING) + NOTHING;
   real mu = NEARLY;
   real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
   real lambda_first[6];
@@ -330,27 +335,27 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
   fl_dual_start(block, work, target, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
-  real best_value = at->value; /* when it last got better by more than rounding */
-  real best_size = at->size;
+  real best_value = at->dual_value; /* when it last got better by more than rounding */
+  real best_size = at->residual_size;
   int idle = 0;
   int jumps = 0;
-  for (int i = 0; work->turns && i < COUNT(block); i++) work->set[i].jumps = 0;
+  for (int i = 0; work->has_turn_cost && i < COUNT(block); i++) work->set[i].has_jumped = 0;
   for (int k = 0;; k++) {
-    if (at->size <= TOLERANCE) return FL_MET;
-    if (at->value > beyond) return FL_BEYOND;
-    const int has_risen = at->value > best_value + ROUNDING * FABS(best_value);
-    if (has_risen || at->size < FELL * best_size) {
-      best_value = at->value;
-      best_size = at->size;
+    if (at->residual_size <= TOLERANCE) return FL_MET;
+    if (at->dual_value > beyond) return FL_BEYOND;
+    const int has_risen = at->dual_value > best_value + ROUNDING * FABS(best_value);
+    if (has_risen || at->residual_size < FELL * best_size) {
+      best_value = at->dual_value;
+      best_size = at->residual_size;
       idle = 0;
     }
     const int has_diverged = !(mu <= 1 / ROUNDING); /* or is NaN */
     if (k >= most_steps || idle > IDLE || has_diverged) {
-      if (at->size <= ENOUGH) return FL_MET;
+      if (at->residual_size <= ENOUGH) return FL_MET;
       return FL_STUCK;
     }
     idle++;
-    work->steps++;
+    work->newton_steps++;
 
     real step[6];
     if (!newton_step(block, work, at, mu, step)) {
@@ -358,9 +363,9 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
       continue;
     }
     real lambda_next[6];
-    for (int j = 0; j < 6; j++) lambda_next[j] = at->price[j] + step[j];
+    for (int j = 0; j < 6; j++) lambda_next[j] = at->lambda_reduced[j] + step[j];
     fl_dual_at(block, work, target, lambda_next, trial);
-    if (work->turns && jumps_between(block, work, at, trial, step, 0)) {
+    if (work->has_turn_cost && jumps_between(block, work, at, trial, step, 0)) {
       jumps++;
       if (jumps >= JUMPS) {
         jumps_between(block, work, at, trial, step, 1);
@@ -371,9 +376,9 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
     if (is_kept(&result, at, trial)) {
       mu = mu_after_kept(mu, &result);
       nu = 2;
-      work->now = trial;
+      work->state_found = trial;
       trial = at;
-      at = work->now;
+      at = work->state_found;
     } else {
       mu = mu_after_refused(mu, nu, &result);
       nu *= 2;

@@ -7,30 +7,31 @@
    a few microseconds, and is kept until the next question asks for another one. */
 #include "internal.h"
 
-/* Length of a column, over that of the longest one, below which nothing is left of the columns: ten times their rounding
-   in single precision, where a lost actuator would else leave a direction that is rounding. */
+/* Length of a column, over that of the longest one, below which nothing is left of the columns: ten
+   times their rounding in single precision, where a lost actuator would else leave a direction
+   that is rounding. */
 #define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
 #define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
 /* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be
    commanded against their force. */
 static const real *law_axis(const fl_actuator *a, int row) {
-  if (is_plane(a)) return a->own[1 + row];
-  return a->own[row];
+  if (is_plane(a)) return a->effectiveness_normalized[1 + row];
+  return a->effectiveness_normalized[row];
 }
 
 /* Wrench [N, N m] per newton of a row of an actuator, 0 in axes that do not count. */
 static void column_of(const real *block, const fl_span *span, int i, int row, real *column) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *yard = HEAD(block)->yard;
+  const real *sigma = HEAD(block)->wrench_scale;
   const real *axis = law_axis(a, row);
   real sign = 1;
-  if (a->form == FL_THRUSTER) sign = a->sign;
+  if (a->command_kind == FL_THRUSTER) sign = a->command_sign;
   if ((real)row >= a->rows) sign = 0;
-  if (span->lost[i]) sign = 0;
+  if (span->is_lost[i]) sign = 0;
   for (int k = 0; k < 6; k++) {
     column[k] = 0;
-    if (span->counts[k]) column[k] = sign * yard[k] * axis[k];
+    if (span->axis_counts[k]) column[k] = sign * sigma[k] * axis[k];
   }
 }
 
@@ -43,15 +44,15 @@ static void scale_of(const real *block, fl_span *span) {
       real column[6];
       column_of(block, span, i, row, column);
       for (int k = 0; k < 6; k++) {
-        const real largest = column[k] * ACTUATOR(block, i)->most[row];
+        const real largest = column[k] * ACTUATOR(block, i)->row_force_max[row];
         size[k] += largest * largest;
       }
     }
   }
   for (int k = 0; k < 6; k++) most = fl_larger(most, size[k]);
   for (int k = 0; k < 6; k++) {
-    span->scale[k] = 1;
-    if (size[k] > DEPENDENT * most) span->scale[k] = SQRT(size[k]);
+    span->axis_scale[k] = 1;
+    if (size[k] > DEPENDENT * most) span->axis_scale[k] = SQRT(size[k]);
   }
 }
 
@@ -62,28 +63,29 @@ static void basis_of(const real *block, fl_span *span) {
   real longest = 0;
   for (int p = 0; p < 2 * n; p++) {
     column_of(block, span, p / 2, p % 2, left[p]);
-    for (int k = 0; k < 6; k++) left[p][k] *= ACTUATOR(block, p / 2)->most[p % 2] / span->scale[k];
+    for (int k = 0; k < 6; k++)
+      left[p][k] *= ACTUATOR(block, p / 2)->row_force_max[p % 2] / span->axis_scale[k];
   }
   memset(span->basis, 0, sizeof span->basis);
-  span->range = 0;
-  while (span->range < 6) {
+  span->rank = 0;
+  while (span->rank < 6) {
     int best = 0;
     for (int p = 1; p < 2 * n; p++) {
       if (dot(left[p], left[p], 6) > dot(left[best], left[best], 6)) best = p;
     }
     const real square = dot(left[best], left[best], 6);
-    if (span->range == 0) longest = square;
+    if (span->rank == 0) longest = square;
     if (!(square > DEPENDENT * longest)) return;
     real q[6];
     for (int k = 0; k < 6; k++) {
       q[k] = left[best][k] / SQRT(square);
-      span->basis[k][span->range] = q[k];
+      span->basis[k][span->rank] = q[k];
     }
     for (int p = 0; p < 2 * n; p++) {
       const real projection = dot(left[p], q, 6);
       for (int k = 0; k < 6; k++) left[p][k] -= projection * q[k];
     }
-    span->range++;
+    span->rank++;
   }
 }
 
@@ -94,8 +96,8 @@ static void matrices_of(const real *block, fl_span *span) {
       column_of(block, span, i, row, column);
       for (int j = 0; j < 6; j++) {
         real sum = 0;
-        for (int k = 0; k < 6; k++) sum += span->basis[k][j] * (column[k] / span->scale[k]);
-        span->matrix[i][row][j] = sum;
+        for (int k = 0; k < 6; k++) sum += span->basis[k][j] * (column[k] / span->axis_scale[k]);
+        span->effectiveness_reduced[i][row][j] = sum;
       }
     }
   }
@@ -104,26 +106,29 @@ static void matrices_of(const real *block, fl_span *span) {
 /* As Python has prepared it: of a robot all of whose actuators work and all of whose axes count. */
 static void take_prepared(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
-  memcpy(span->scale, h->scale, sizeof span->scale);
+  memcpy(span->axis_scale, h->axis_scale, sizeof span->axis_scale);
   memcpy(span->basis, h->basis, sizeof span->basis);
   for (int i = 0; i < COUNT(block); i++) {
-    memcpy(span->matrix[i], ACTUATOR(block, i)->matrix, sizeof span->matrix[i]);
+    memcpy(span->effectiveness_reduced[i], ACTUATOR(block, i)->effectiveness_reduced,
+           sizeof span->effectiveness_reduced[i]);
   }
-  span->range = (int)h->range;
+  span->rank = (int)h->rank;
 }
 
 /* The wrench beside the forces, less the drag at rest of foils that are lost. */
 void fl_offset_wrench(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
   for (int k = 0; k < 6; k++) {
-    real sum = h->beside[k];
+    real sum = h->wrench_offset[k];
     for (int i = 0; i < COUNT(block); i++) {
       const fl_actuator *a = ACTUATOR(block, i);
-      const int has_no_drag = span->lost[i] && a->form == FL_FOIL;
-      if (has_no_drag) sum -= a->pressure * a->rest * a->own[1][k] * h->yard[k];
+      const int has_no_drag = span->is_lost[i] && a->command_kind == FL_FOIL;
+      if (has_no_drag)
+        sum -= a->pressure_area * a->zero_lift_drag * a->effectiveness_normalized[1][k] *
+               h->wrench_scale[k];
     }
-    span->beside[k] = 0;
-    if (span->counts[k]) span->beside[k] = sum;
+    span->wrench_offset[k] = 0;
+    if (span->axis_counts[k]) span->wrench_offset[k] = sum;
   }
 }
 
@@ -131,24 +136,24 @@ void fl_offset_wrench(const real *block, fl_span *span) {
    its factor. */
 static int prepare_newton(const real *block, fl_work *work) {
   const fl_span *span = &work->span;
-  real(*H)[6] = work->factor;
-  memset(work->factor, 0, sizeof work->factor);
+  real(*H)[6] = work->hessian_factor;
+  memset(work->hessian_factor, 0, sizeof work->hessian_factor);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     for (int row = 0; row < (int)a->rows; row++) {
-      fl_add_square(H, span->matrix[i][row], a->gain[row]);
+      fl_add_square(H, span->effectiveness_reduced[i][row], a->secant[row]);
     }
   }
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) {
     for (int k = 0; k <= j; k++) {
-      work->metric[j][k] = H[j][k] * (real)span->range / fl_larger(trace, TINY);
+      work->metric[j][k] = H[j][k] * (real)span->rank / fl_larger(trace, TINY);
     }
     work->metric[j][j] += NEARLY;
   }
   for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace;
-  work->least_trace = NEARLY * trace;
-  return span->range == 0 || fl_factor(H);
+  work->trace_min = NEARLY * trace;
+  return span->rank == 0 || fl_factor(H);
 }
 
 /* Prepares the state of a robot anew; 0 where its numbers are out of range. */
@@ -164,7 +169,8 @@ int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared) {
   fl_offset_wrench(block, span);
   work->is_whole = 0;
   if (prepare_newton(block, work)) return 1;
-  memset(span->lost, 2, sizeof span->lost); /* so that no question is taken for one of this state */
+  memset(span->is_lost, 2,
+         sizeof span->is_lost); /* so that no question is taken for one of this state */
   return 0;
 }
 
@@ -177,16 +183,16 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
   int is_as_prepared = 1;
   for (int i = 0; i < COUNT(block); i++) {
     const unsigned char gone = lost && lost[i];
-    is_same &= span->lost[i] == gone;
+    is_same &= span->is_lost[i] == gone;
     is_as_prepared &= !gone;
-    span->lost[i] = gone;
+    span->is_lost[i] = gone;
   }
   for (int k = 0; k < 6; k++) {
-    const unsigned char prepared = HEAD(block)->counts[k] != 0;
+    const unsigned char prepared = HEAD(block)->is_commanded[k] != 0;
     const unsigned char counts = prepared && !(free && free[k]);
-    is_same &= span->counts[k] == counts;
+    is_same &= span->axis_counts[k] == counts;
     is_as_prepared &= counts == prepared;
-    span->counts[k] = counts;
+    span->axis_counts[k] = counts;
   }
   if (is_same) return 1;
   return fl_prepare_span(block, work, is_as_prepared);

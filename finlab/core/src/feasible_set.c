@@ -1,150 +1,187 @@
-/* What may be given now: commands within limits and rates, and the forces that these give.
+/* What may be given now: commands within limits and rates, and the sets Y of forces that these
+   give.
 
-   A tick is the same question as any other, asked of smaller sets: a command changes by its rate times the period at
-   most, which leaves a box around the command before, and what forces the box gives is the actuator's set. Limits,
-   losses and rates are all sets; nothing else of the core knows of them. */
+   A tick is the same question as any other, asked of smaller sets: a command changes by its rate
+   times the period at most, which leaves a box around the command before, and what forces the box
+   gives is the actuator's set. Limits, losses and rates are all sets; nothing else of the core
+   knows of them. */
 #include "internal.h"
 
-#define LEAST_POWER R(1e-3) /* of full power, that counts as the mean power of the commands before, for turning */
-#define ACROSS R(0.01)     /* weight of a pod's price across its force over that along it, where prices before are found */
+/* Share of full power that counts at least as the mean power P of the commands before, Eq. 16. */
+#define LEAST_POWER R(1e-3)
+/* Weight of a pod's price across its force over that along it, where multipliers are fitted. */
+#define ACROSS R(0.01)
+#define QUICK R(1e6) /* change of an angle in a tick [rad] from which turning has no rate */
 
-/* The limits of all commands of an actuator. */
+/* Makes a box of the limits of all commands of an actuator. */
 static void whole_box(const real *block, fl_box *box, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
-  memcpy(box->low[i], a->lower, sizeof a->lower);
-  memcpy(box->high[i], a->upper, sizeof a->upper);
-  box->free[i] = a->turns != 0;
+  memcpy(box->command_min[i], a->command_min, sizeof a->command_min);
+  memcpy(box->command_max[i], a->command_max, sizeof a->command_max);
+  box->is_free_angle[i] = a->is_free_angle != 0;
 }
 
-/* The commands of an actuator that may follow one before after so many ticks; an angle that turns freely is counted from
-   there. */
+/* Narrows a box to the commands (3,) of an actuator that may follow one before after so many ticks;
+   an angle that turns freely is counted from there. */
 static void box_after(const real *block, fl_box *box, int i, const real *before, real ticks) {
   const fl_actuator *a = ACTUATOR(block, i);
   for (int k = 0; k < 3; k++) {
-    const int turns = k == fl_angle_number(a) && a->turns != 0;
-    const real step = a->step[k] * ticks;
-    if (turns && !(step < PI)) continue;
-    if (turns) {
-      box->low[i][k] = before[k] - step;
-      box->high[i][k] = before[k] + step;
-      box->free[i] = 0;
+    const int is_angle = k == fl_angle_number(a);
+    const real step = a->max_change[k] * ticks;
+    if (is_angle && a->is_free_angle != 0) {
+      if (!(step < PI)) continue; /* any angle is near enough */
+      box->command_min[i][k] = before[k] - step;
+      box->command_max[i][k] = before[k] + step;
+      box->is_free_angle[i] = 0;
       continue;
     }
-    const real middle = (a->lower[k] + a->upper[k]) / 2;
+    const real middle = (a->command_min[k] + a->command_max[k]) / 2;
     real center = before[k];
-    if (k == fl_angle_number(a)) center = middle + fl_wrap_angle(center - middle); /* an arc may be told a turn off */
-    center = CLIP(center, a->lower[k], a->upper[k]);
-    box->low[i][k] = MAX(center - step, a->lower[k]);
-    box->high[i][k] = MIN(center + step, a->upper[k]);
+    /* an angle of an arc may be told a whole turn off */
+    if (is_angle) center = middle + fl_wrap_angle(center - middle);
+    center = fl_clipped(center, a->command_min[k], a->command_max[k]);
+    box->command_min[i][k] = fl_larger(center - step, a->command_min[k]);
+    box->command_max[i][k] = fl_smaller(center + step, a->command_max[k]);
   }
 }
 
-/* Power [W] of an actuator at a command, and the price [W/N] of its force ahead at which it gives that. */
+/* Power [W] of an actuator at a command (3,), and the price [W/N] of its force ahead at which it
+   gives that, below 0 in reverse. */
 static real power_at(const real *block, int i, const real *command, real *price) {
   const fl_actuator *a = ACTUATOR(block, i);
   real force[3];
   fl_force_of_command(block, i, command, force, 0);
-  real size = a->sign * force[0];
+  real size = a->command_sign * force[0];
   if (is_plane(a)) size = size_of(force + 1);
-  if (a->form == FL_POD && command[1] < 0) size = -size;
-  if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(force[2], force[1]));
-  const real power = fl_power_and_price(block, i, CLIP(size, a->low, a->high), price);
+  if (a->command_kind == FL_POD && command[1] < 0) size = -size;
+  if (a->gauge_table > 0) {
+    const real direction = ATAN2(force[2], force[1]);
+    size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
+  }
+  const real within = fl_clipped(size, a->force_min, a->force_max);
+  const real power = fl_power_and_price(block, i, within, price);
   if (size < 0) *price = -*price;
   return power;
 }
 
-/* Mean power [W] of the actuators at the commands before, and a little of full power, as there is none at rest; and the
-   price of each (n,) there [W/N]. */
-static real mean_power(const real *block, const fl_work *work, const real *previous, real *price) {
+/* Mean power P [W] of the actuators at the commands before (n, 3), or a little of full power, as
+   there is none at rest; and the price (n,) of each there [W/N], 0 where it is not known. */
+static real mean_power(const real *block, const fl_work *work, const real *previous,
+                       real *price) {
   real power = 0;
   real full = 0;
   int count = 0;
   for (int i = 0; i < COUNT(block); i++) {
     price[i] = 0;
-    if (work->span.lost[i]) continue;
+    if (work->span.is_lost[i]) continue;
     count++;
-    full += work->full_power[i];
-    if (fl_is_known_command(previous + 3 * i)) power += power_at(block, i, previous + 3 * i, price + i);
+    full += work->power_max[i];
+    const real *before = previous + 3 * i;
+    if (fl_is_known_command(before)) power += power_at(block, i, before, price + i);
   }
-  return MAX(power, LEAST_POWER * full) / (real)MAX(count, 1);
+  if (count == 0) count = 1;
+  return fl_larger(power, LEAST_POWER * full) / (real)count;
 }
 
-/* Adds to a least-squares system that a newton along a direction (6,) in the basis has a price. */
-static void add_price(real h[6][6], real *right, const real *direction, real weight, real price) {
-  fl_add_square(h, direction, weight);
+/* Adds to the normal equations H lambda = right that a newton along a direction b (6,) in the basis
+   has a price [W/N], b' lambda = price, with a weight. */
+static void add_price(real H[6][6], real *right, const real *direction, real weight, real price) {
+  fl_add_square(H, direction, weight);
   for (int j = 0; j < 6; j++) right[j] += weight * price * direction[j];
 }
 
-/* Prices of the wrench in the basis at which the actuators gave what they did before: along its force each had its own
-   price (n,), and across it a pod that stood still had none. Newton's method begins there in a tick. A tick is a small
-   step, and its narrow arcs make prices that a whole robot would have for the wrench a poor guess. */
-static void begin_as_before(const real *block, fl_work *work, const real *previous, const real *price) {
-  real h[6][6] = {{0}};
+/* Sets the multipliers in the basis [W] at which the actuators gave what they did before, by least
+   squares: along its force each had its own price (n,), and across it a pod that stood still had
+   none. Newton's method begins there in a tick. A tick is a small step, and its narrow arcs make
+   multipliers that a whole robot would have for the wrench a poor guess. */
+static void begin_as_before(const real *block, fl_work *work, const real *previous,
+                            const real *price) {
+  const fl_span *span = &work->span;
+  real H[6][6] = {{0}};
   real right[6] = {0};
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const fl_span *span = &work->span;
-    const real(*matrix)[6] = span->matrix[i];
+    const real(*B)[6] = span->effectiveness_reduced[i];
     const real *before = previous + 3 * i;
-    if (work->span.lost[i] || !fl_is_known_command(before) || fl_force_number(a) < 0) continue;
-    const real angle = a->form == FL_POD ? before[0] : 0; /* a thruster has no second row */
-    const real c = COS(angle);
-    const real s = SIN(angle);
+    if (span->is_lost[i] || !fl_is_known_command(before) || fl_force_number(a) < 0) continue;
+    real alpha = 0; /* a thruster has no second row */
+    if (a->command_kind == FL_POD) alpha = before[0];
+    const real c = COS(alpha);
+    const real s = SIN(alpha);
     real ahead[6];
     real across[6];
     for (int j = 0; j < 6; j++) {
-      ahead[j] = c * matrix[0][j] + s * matrix[1][j];
-      across[j] = c * matrix[1][j] - s * matrix[0][j];
+      ahead[j] = c * B[0][j] + s * B[1][j];
+      across[j] = c * B[1][j] - s * B[0][j];
     }
-    add_price(h, right, ahead, a->gain[0], price[i]);
-    add_price(h, right, across, ACROSS * a->gain[0], 0);
+    add_price(H, right, ahead, a->secant[0], price[i]);
+    add_price(H, right, across, ACROSS * a->secant[0], 0);
   }
-  const real trace = fl_trace(h);
-  for (int j = 0; j < 6; j++) h[j][j] += NOTHING * trace + TINY;
-  const int is_at_rest = !(dot(right, right, 6) > 0); /* prices of 0 tell Newton's method nothing */
-  if (is_at_rest || !fl_factor(h)) return;
-  fl_solve(h, right, work->begin);
-  work->begins = 1;
+  const int is_at_rest = !(dot(right, right, 6) > 0);
+  if (is_at_rest) return; /* multipliers of 0 tell Newton's method nothing */
+  const real trace = fl_trace(H);
+  for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace + TINY;
+  if (!fl_factor(H)) return;
+  fl_solve(H, right, work->lambda_begin);
+  work->has_lambda_begin = 1;
 }
 
 /* Whether rates leave a number of a command all of its range. */
-static int is_free(const real *block, const fl_box *box, int i, int k) {
+static int has_full_range(const real *block, const fl_box *box, int i, int k) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return box->low[i][k] <= a->lower[k] && box->high[i][k] >= a->upper[k];
+  return box->command_min[i][k] <= a->command_min[k] && box->command_max[i][k] >= a->command_max[k];
 }
 
-/* The set of an actuator in a tick, and what turning from an angle costs there. */
+/* The forces that an actuator's box gives, within its limits. Where rates leave it all of its
+   sizes, or all of its commands, they are the robot's own, which the box gives but for rounding. */
+static force_range range_of_tick(const real *block, const fl_work *work, int i, int is_costly) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const fl_box *box = &work->box;
+  const int all_sizes = has_full_range(block, box, i, 0) && has_full_range(block, box, i, 1);
+  const int all_angles = has_full_range(block, box, i, 2);
+  if (all_sizes && all_angles && !is_costly) {
+    const force_range whole = {a->force_min_needed, a->force_max, a->sector_center,
+                               a->sector_half_angle};
+    return whole;
+  }
+  force_range range = fl_force_range(block, i, box);
+  if (a->command_kind == FL_FIN && all_sizes) {
+    range.low = a->force_min;
+    range.high = a->force_max;
+  }
+  return range;
+}
+
+/* Makes the set of an actuator in a tick, where turning from an angle [rad] costs
+   kappa / 2 [W/rad^2] of the squared turn, Eq. 16. */
 static void tick_set(const real *block, fl_work *work, int i, real angle, real kappa) {
   const fl_actuator *a = ACTUATOR(block, i);
   fl_set *set = work->set + i;
-  const int all_sizes = is_free(block, &work->box, i, 0) && is_free(block, &work->box, i, 1);
-  const int all_angles = is_free(block, &work->box, i, 2);
-  force_range own = fl_force_range(block, i, &work->box);
-  if (a->form == FL_FIN && all_sizes) {
-    own.low = a->low;
-    own.high = a->high;
-  }
-  if (all_sizes && all_angles && !(kappa > 0)) own = (force_range){a->least, a->high, a->middle, a->half};
-  const real low = CLIP(own.low, a->low, a->high);
-  const real high = CLIP(own.high, a->low, a->high);
-  fl_limit_set(block, i, set, low, high, own.middle, own.half);
-  if (!(kappa > 0)) return;
-  const real at = angle + (set->flipped ? PI : 0);
-  set->turn = kappa;
-  set->steepest = work->steepest[i];
-  set->at = set->middle + fl_wrap_angle(at - set->middle);
+  const int is_costly = kappa > 0;
+  const force_range range = range_of_tick(block, work, i, is_costly);
+  const real low = fl_clipped(range.low, a->force_min, a->force_max);
+  const real high = fl_clipped(range.high, a->force_min, a->force_max);
+  fl_limit_set(block, i, set, low, high, range.middle, range.half);
+  if (!is_costly) return;
+  real at = angle;
+  if (set->is_flipped) at += PI;
+  set->turn_cost = kappa;
+  set->slope_max = work->slope_max[i];
+  set->turn_origin = set->sector_center + fl_wrap_angle(at - set->sector_center);
 }
 
-/* The set of an actuator outside of ticks. */
+/* Makes the set of an actuator outside of ticks. */
 static void whole_set(const real *block, fl_work *work, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (work->span.lost[i])
+  if (work->span.is_lost[i]) {
     fl_empty_set(block, i, work->set + i);
-  else
-    fl_limit_set(block, i, work->set + i, a->least, a->high, a->middle, a->half);
+  } else {
+    fl_limit_set(block, i, work->set + i, a->force_min_needed, a->force_max, a->sector_center,
+                 a->sector_half_angle);
+  }
 }
 
-/* Limits of commands and sets of forces outside of ticks. */
+/* Sets limits of commands and sets of forces outside of ticks. */
 void fl_limits_without_tick(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     whole_box(block, &work->box, i);
@@ -154,66 +191,76 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
   fl_prepare_sets(block, work);
 }
 
-/* The same of a tick after the previous commands (n, 3) of a question, of which rows may be NaN. Turning of a pod costs
-   kappa = calm P / step, with P the mean power of the commands before and `step` the largest turn until the commands
-   asked for: of one tick, or of several. It costs from the angle before, or from one that is wanted. Fins turn
-   through a right angle in a few ticks, and one that points away gives little: with such a cost it would stay for ever, and
-   leave its work to others at a fifth more power. */
+/* kappa of an actuator [W/rad^2], Eq. 16: calm P / step, with `power` the mean power P of the
+   commands before and `step` the largest turn until the commands asked for: of one tick, or of
+   several. Of pods alone: fins turn through a right angle in a few ticks, and one that points away
+   gives little. With such a cost it would stay for ever, and leave its work to others at a fifth
+   more power. */
+static real turning_cost_of(const fl_actuator *a, real calm, real power, real ticks) {
+  const int has_rate = a->max_change[0] > 0 && a->max_change[0] < QUICK;
+  if (a->command_kind != FL_POD || !has_rate) return 0;
+  return calm * power / (a->max_change[0] * ticks);
+}
+
+/* The same in a tick after the previous commands (n, 3) of a question, of which rows may be NaN.
+   Turning costs from the angle before, or from one that is wanted. */
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
   real power = 0;
-  real ticks = 1;
   real price[FL_MOST];
-  if (q->ticks > 1) ticks = (real)q->ticks;
   if (q->calm > 0) power = mean_power(block, work, q->previous, price);
+  real ticks = 1;
+  if (q->ticks > 1) ticks = (real)q->ticks;
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
     const real *before = q->previous + 3 * i;
-    real kappa = 0;
-    real angle = before[0];
     whole_box(block, &work->box, i);
-    if (work->span.lost[i] || !fl_is_known_command(before)) {
+    if (work->span.is_lost[i] || !fl_is_known_command(before)) {
       whole_set(block, work, i);
       continue;
     }
-    const int is_costly = a->form == FL_POD && a->step[0] > 0 && a->step[0] < R(1e6);
-    if (is_costly) kappa = q->calm * power / (a->step[0] * ticks);
-    if (q->toward && q->toward[i] == q->toward[i]) angle = q->toward[i];
+    real angle = before[0];
+    const int is_wanted =
+        q->angles_wanted && q->angles_wanted[i] == q->angles_wanted[i]; /* not NaN */
+    if (is_wanted) angle = q->angles_wanted[i];
     box_after(block, &work->box, i, before, ticks);
+    const real kappa = turning_cost_of(ACTUATOR(block, i), q->calm, power, ticks);
     tick_set(block, work, i, angle, kappa);
   }
   work->is_whole = 0;
   fl_prepare_sets(block, work);
-  if (work->turns) begin_as_before(block, work, q->previous, price);
+  if (work->has_turn_cost) begin_as_before(block, work, q->previous, price);
 }
 
-/* Prepares the work area for what a question says that holds now; 0 where its numbers are out of range. */
+/* Prepares the work area for what a question says that holds now; 0 where its numbers are out of
+   range. */
 int fl_prepare_question(const real *block, fl_work *work, const fl_question *q) {
   if (!fl_span_of_question(block, work, q->lost, q->free)) return 0;
-  work->begins = 0;
-  if (q->previous)
+  work->has_lambda_begin = 0;
+  if (q->previous) {
     fl_limits_of_tick(block, work, q);
-  else if (!work->is_whole)
+  } else if (!work->is_whole) {
     fl_limits_without_tick(block, work);
+  }
   return 1;
 }
 
-/* Prepares a work area for the whole robot; an error code. */
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
   work->ray = 0;
-  work->refined = 0;
+  work->refine_steps = 0;
+  work->has_lambda_begin = 0;
   fl_usual_settings(&work->settings);
-  work->begins = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    work->steepest[i] = 0;
-    if (a->form == FL_POD) work->steepest[i] = fl_largest_slope(block, i);
-    work->full_power[i] = MAX(fl_power_of_force(block, i, a->high), fl_power_of_force(block, i, a->low));
+    work->slope_max[i] = 0;
+    if (a->command_kind == FL_POD) work->slope_max[i] = fl_largest_slope(block, i);
+    const real power_high = fl_power_of_force(block, i, a->force_max);
+    const real power_low = fl_power_of_force(block, i, a->force_min);
+    work->power_max[i] = fl_larger(power_high, power_low);
   }
-  for (int k = 0; k < 6; k++) work->span.counts[k] = HEAD(block)->counts[k] != 0;
+  for (int k = 0; k < 6; k++) work->span.axis_counts[k] = HEAD(block)->is_commanded[k] != 0;
   if (!fl_prepare_span(block, work, 1)) return FL_BAD_NUMBER;
   fl_limits_without_tick(block, work);
-  return 0;
+  return FL_OK;
 }
 
 void fl_usual_settings(fl_settings *settings) {
@@ -223,7 +270,9 @@ void fl_usual_settings(fl_settings *settings) {
 }
 
 int fl_use_settings(fl_work *work, const fl_settings *settings) {
-  if (settings->most_parts < 0 || settings->tick_parts < 0 || settings->command_steps < 0) return FL_BAD_ARGUMENT;
+  if (settings->most_parts < 0) return FL_BAD_ARGUMENT;
+  if (settings->tick_parts < 0) return FL_BAD_ARGUMENT;
+  if (settings->command_steps < 0) return FL_BAD_ARGUMENT;
   work->settings = *settings;
   return FL_OK;
 }

@@ -3,7 +3,8 @@
 
 #define FL_ASSERT(name, condition) typedef char fl_assert_##name[(condition) ? 1 : -1]
 
-/* A struct has the size of its fields: no padding, so each lies where those before it end, and a block is read in place. */
+/* A struct has the size of its fields: no padding, so each lies where those before it end, and a
+   block is read in place. */
 #define FL_BEGIN(type) enum { type##_bytes = 0
 #define FL_FIELD(type, name, shape, unit, meaning) + (int)sizeof(type shape)
 #define FL_END(type) };

@@ -8,12 +8,11 @@
    Steps lead to what is near. With few actuators what foils give is a curved sheet, which
    turns back where they stall: a wrench on it is met at few commands, far from each other,
    and from elsewhere steps end at a least miss. Where the starts that the dual has come to
-   no cost that it proves, others are taken from a lattice over the angles of all foils, each
-   kept within the branches of the lifts on which it lies. */
+   no cost that it proves, others are taken from a lattice over the angles of all foils
+   (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
 #include "internal.h"
 
-/* of its range that a foil turns in a step: in all thrice, if need be */
-#define TRUST (R(3.0) / ROUNDS)
+#define FOLLOWED (ROUNDS / 2)     /* points of a lattice made cheaper; FL_STARTS counts them */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
@@ -22,87 +21,9 @@
 /* share of a ray that stalled foils may add to what tables give */
 #define STALLED_MORE R(0.1)
 
-/* Whether an actuator is a foil in a flow, whose drag counts. */
-static int is_foil(const fl_actuator *a) { return a->speed > 0; }
-
-/* A foil at an angle: force, cost and their slopes; all of the tangent but its curvature. */
-static void foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real command[3] = {angle, 0, 0};
-  real force[3];
-  real by[3][3];
-  fl_force_of_command(block, i, command, force, by);
-  const real lift = force[0];
-  const real d_lift = by[0][0];
-  const real drag = force[1] + a->pressure * a->rest;
-  const real d_drag = by[0][1];
-  memcpy(tangent->force, force, sizeof tangent->force);
-  memcpy(tangent->slope, by[0], sizeof tangent->slope);
-  tangent->cost = a->speed * drag + a->doubt * (lift * lift + drag * drag);
-  tangent->pay = a->speed * d_drag + 2 * a->doubt * (lift * d_lift + drag * d_drag);
-}
-
-/* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less
-   the worth of its force at prices s of lift and drag. */
-static void draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
-                         fl_tangent *tangent, fl_set *set) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real low = box->low[i][0];
-  const real high = box->high[i][0];
-  const real most_turn = TRUST * (high - low);
-  const real apart = CLOSE * (high - low) + TINY;
-  fl_tangent other;
-  foil_at(block, i, angle + apart, &other);
-  foil_at(block, i, angle, tangent);
-  /* Change of the slope of cost - s.force over `apart`. */
-  const real change = other.pay - tangent->pay - dot(s, other.slope, 2) + dot(s, tangent->slope, 2);
-  tangent->bend = fl_larger(FABS(change) / apart, CLOSE * a->speed * a->pressure + TINY);
-  const real most_cost =
-      tangent->cost + FABS(tangent->pay) * most_turn + tangent->bend * most_turn * most_turn;
-  set->low = fl_larger(low - angle, -most_turn);
-  set->high = fl_smaller(high - angle, most_turn);
-  set->tangent = tangent;
-  set->low_cost = most_cost;
-  set->high_cost = most_cost;
-}
-
-/* Forces along the rows of commands, and their cost [W]. */
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
-                          real force[][2]) {
-  real cost = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    force[i][0] = 0;
-    force[i][1] = 0;
-    if (work->span.lost[i]) continue;
-    real along[3];
-    fl_force_of_command(block, i, command[i], along, 0);
-    real size;
-    if (is_plane(a)) {
-      force[i][0] = along[1];
-      force[i][1] = along[2];
-      size = size_of(force[i]);
-    } else {
-      force[i][0] = a->sign * along[0];
-      size = force[i][0];
-    }
-    if (a->gauge > 0) size /= fl_gauge_radius(block + (int)a->gauge, ATAN2(along[2], along[1]));
-    if (is_foil(a)) {
-      fl_tangent tangent;
-      foil_at(block, i, command[i][0], &tangent);
-      force[i][1] = tangent.force[1];
-      cost += tangent.cost;
-      continue;
-    }
-    if (a->form == FL_POD && command[i][1] < 0) size = -size;
-    cost += fl_power_of_force(block, i, size);
-  }
-  return cost;
-}
-
 static int has_gap(const fl_actuator *a, const fl_set *set) {
-  if (is_plane(a)) return set->forked || set->reverse > 0;
-  return a->band > 0;
+  if (is_plane(a)) return set->is_forked || set->force_max_reverse > 0;
+  return a->dead_band > 0;
 }
 
 /* Narrows sets and limits of other actuators to the side of a gap on which their forces are. */
@@ -114,15 +35,15 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
     if (has_gap(a, set)) {
       fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
     }
-    if (a->form != FL_THRUSTER || !(a->band > 0)) continue;
-    real low = set->low;
-    real high = set->high;
-    if (!(a->sign > 0)) {
-      low = -set->high;
-      high = -set->low;
+    if (a->command_kind != FL_THRUSTER || !(a->dead_band > 0)) continue;
+    real low = set->force_min;
+    real high = set->force_max;
+    if (!(a->command_sign > 0)) {
+      low = -set->force_max;
+      high = -set->force_min;
     }
-    box->low[i][0] = fl_larger(box->low[i][0], low);
-    box->high[i][0] = fl_smaller(box->high[i][0], high);
+    box->command_min[i][0] = fl_larger(box->command_min[i][0], low);
+    box->command_max[i][0] = fl_smaller(box->command_max[i][0], high);
     command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
   }
 }
@@ -131,11 +52,11 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
 static void take_step(const real *block, const fl_work *work, const fl_box *box, real force[][2],
                       real share, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.lost[i]) continue;
-    const real *answer = work->now->force[i];
+    if (work->span.is_lost[i]) continue;
+    const real *answer = work->state_found->force[i];
     const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
-    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
-      const real *slope = work->tangent[i].slope;
+    if (fl_is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
+      const real *slope = work->tangent[i].force_slope;
       const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
       command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
       continue;
@@ -151,36 +72,36 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
 static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   int free = 0;
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.lost[i]) continue;
-    for (int c = 0; c < 3; c++) free += box->high[i][c] > box->low[i][c];
+    if (work->span.is_lost[i]) continue;
+    for (int c = 0; c < 3; c++) free += box->command_max[i][c] > box->command_min[i][c];
   }
-  return free < work->span.range;
+  return free < work->span.rank;
 }
 
-/* Steps towards work->aim, of which so many in a row have to halve the error: most starts
+/* Steps towards work->wrench_target, of which so many in a row have to halve the error: most starts
    end soon. */
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
   real error = NONE;
   for (int k = 0; k < 2 * ROUNDS; k += steps) {
     const real before = error;
-    error = fl_refine_commands(block, work, box, work->aim, command, steps);
+    error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
     if (error <= EXACT || error > before / 2) return;
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->aim, to an
-   error on the yardstick and to rounding. Where that is what tables leave, steps on their
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target,
+   to an error on the yardstick and to rounding. Where that is what tables leave, steps on their
    error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
   real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->aim[k]) / HEAD(block)->yard[k];
+  for (int k = 0; k < 6; k++) size += FABS(work->wrench_target[k]) / HEAD(block)->wrench_scale[k];
   if (most_error > EXACT) {
     approach(block, work, box, command, ROUNDS / 2);
     steps = 0;
   }
-  const real error = fl_refine_commands(block, work, box, work->aim, command, steps);
+  const real error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
   return error <= most_error + ROUNDING * size;
 }
 
@@ -195,15 +116,15 @@ static real error_allowed(const real *block, const fl_work *work, const fl_box *
 static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
+    if (!fl_is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     real s[2];
-    own_price(work, i, lambda, s);
-    draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
+    actuator_price(work, i, lambda, s);
+    fl_draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
   }
 }
 
-/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential
-   quadratic programming that keep giving work->aim; `lambda` becomes that of the last step.
+/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
+   programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
    Their cost. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
                     real most_error, real cost, real *lambda, real command[][3],
@@ -214,7 +135,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     if (has_moved) draw_tangents(block, work, box, lambda, command);
     fl_prepare_sets(block, work);
     if (has_moved && fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK) == FL_MET) {
-      memcpy(lambda, work->now->price, sizeof work->now->price);
+      memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
     }
     real stepped[FL_MOST][3];
     real force_stepped[FL_MOST][2];
@@ -237,7 +158,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
   return cost;
 }
 
-/* Makes commands give work->aim, in the basis `target`, to an error on the yardstick, and
+/* Makes commands give work->wrench_target, in the basis `target`, to an error on the yardstick, and
    then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
    their cost [W]; NONE where they do not come to give it. */
 static real settle(const real *block, fl_work *work, const real *target, real most_error,
@@ -266,33 +187,27 @@ static void improve_from(const real *block, fl_work *work, const real *target, c
   const real cost = settle(block, work, target, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
-  memcpy(work->placed, command, sizeof work->placed);
-  memcpy(work->best, force, sizeof force);
-  memcpy(work->near, lambda_near, sizeof lambda_near);
+  memcpy(work->best_command, command, sizeof work->best_command);
+  memcpy(work->best_force, force, sizeof force);
+  memcpy(work->best_lambda, lambda_near, sizeof lambda_near);
 }
 
 /* The same of the forces and multipliers that Newton's method came to. */
 void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best_cost) {
   real command[FL_MOST][3];
-  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, command);
-  improve_from(block, work, target, work->now->price, command, best_cost);
-}
-
-/* The last lift coefficient of a foil's table and its angle [rad]: beyond, it stalls and
-   drags more. */
-static const real *end_of(const real *block, const fl_actuator *a) {
-  const real *curve = block + (int)a->beat;
-  return curve + 2 * (int)curve[0] - 1;
+  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                         command);
+  improve_from(block, work, target, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
 static int may_stall(const real *block, const fl_work *work, int i, int end, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  *command = work->box.low[i][0];
-  if (end) *command = work->box.high[i][0];
-  if (!is_foil(a) || work->span.lost[i]) return 0;
-  const real stall_angle = end_of(block, a)[1];
-  return FABS(*command - a->turned) > stall_angle;
+  *command = work->box.command_min[i][0];
+  if (end) *command = work->box.command_max[i][0];
+  if (!fl_is_foil(a) || work->span.is_lost[i]) return 0;
+  const real stall_angle = fl_lift_end(block, a)[1];
+  return FABS(*command - a->zero_lift_angle) > stall_angle;
 }
 
 /* How much more than its conjugate in the dual a foil is worth, at the multipliers so far,
@@ -301,15 +216,15 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
 static real worth_of_stall(const real *block, const fl_work *work, int i, int end, real limit) {
   const fl_actuator *a = ACTUATOR(block, i);
   real s[2];
-  own_price(work, i, work->now->price, s);
+  actuator_price(work, i, work->state_found->lambda_reduced, s);
   const response known = fl_response(block, i, work->set + i, s);
-  real stall_angle = end_of(block, a)[1];
+  real stall_angle = fl_lift_end(block, a)[1];
   if (!end) stall_angle = -stall_angle;
-  const real begin = a->turned + stall_angle;
+  const real begin = a->zero_lift_angle + stall_angle;
   real more = 0;
   for (int k = 1; k <= ROUNDS; k++) {
     fl_tangent tangent;
-    foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
+    fl_foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
     const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
     more = fl_larger(more, conjugate - known.conjugate);
   }
@@ -320,266 +235,36 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
    stall, which its sets leave out: no commands give the target for less. `most_cost` is what
    none cost more than. */
 static real proved_value(const real *block, const fl_work *work, real *most_cost) {
-  real value = work->now->value;
-  *most_cost = work->most_cost * (1 + CLOSE) + NOTHING;
+  real value = work->state_found->dual_value;
+  *most_cost = work->power_cost_max * (1 + CLOSE) + NOTHING;
   for (int i = 0; i < COUNT(block); i++) {
     for (int end = 0; end < 2; end++) {
       real limit;
       if (!may_stall(block, work, i, end, &limit)) continue;
       value -= worth_of_stall(block, work, i, end, limit);
       fl_tangent stalled;
-      foil_at(block, i, limit, &stalled);
+      fl_foil_at(block, i, limit, &stalled);
       *most_cost += stalled.cost;
     }
   }
   return value;
 }
 
-/* A lattice over the angles of foils. Each has some on every branch of its lift within the
-   limits: stalled one way, lift one way, lift the other way, stalled the other way. */
-/* branches of a foil; foils on the lattice, others begin at rest */
-enum { BRANCHES = 4, LAID = 6 };
-#define LATTICE (1 << 2 * LAID)  /* points at most: one on each branch of so many foils */
-#define EACH_MOST (ROUNDS / 2)   /* angles on a branch */
-#define NODES (4 * ROUNDS)       /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
-#define SPREAD (5 * ROUNDS)      /* points at which steps on the commands begin */
-#define FOLLOWED (ROUNDS / 2)    /* how many of these are made cheaper; FL_STARTS counts them */
-
-typedef struct {
-  int foils;                                        /* how many there are */
-  int foil[LAID];                                   /* which actuators these are */
-  int branches[LAID];                               /* of each foil */
-  int first[LAID];                                  /* its first node */
-  int each;                                         /* nodes on a branch */
-  real edge[LAID][BRANCHES + 1];                    /* ends of the branches [rad] */
-  real angle[NODES], cost[NODES], wrench[NODES][6]; /* of each node; the wrench in the basis */
-  /* other actuators: force by a wrench in the basis */
-  real row[FL_MOST][2][6];
-} lattice;
-
-typedef struct {
-  unsigned char node[LAID]; /* of each foil */
-  real cost;                /* [W], with the price of a miss */
-} lattice_point;
-
-/* Ends of the branches of a foil's lift within its limits; how many branches there are. */
-static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real low = work->box.low[i][0];
-  const real high = work->box.high[i][0];
-  const real stall_angle = end_of(block, a)[1];
-  const real turn[BRANCHES - 1] = {a->turned - stall_angle, a->turned, a->turned + stall_angle};
-  int branches = 0;
-  edge[0] = low;
-  for (int k = 0; k < BRANCHES - 1; k++) {
-    if (!(turn[k] > low && turn[k] < high)) continue;
-    branches++;
-    edge[branches] = turn[k];
-  }
-  branches++;
-  edge[branches] = high;
-  return branches;
-}
-
-/* How many nodes each branch has: as many as the lattice has room for. */
-static int nodes_of_branch(const lattice *grid) {
-  int choices = 1;
-  int branches = 0;
-  for (int f = 0; f < grid->foils; f++) {
-    choices *= grid->branches[f];
-    branches += grid->branches[f];
-  }
-  for (int each = EACH_MOST; each > 1; each--) {
-    int points = choices;
-    for (int f = 0; f < grid->foils; f++) points *= each;
-    if (points <= LATTICE && branches * each <= NODES) return each;
-  }
-  return 1;
-}
-
-/* Foils, their branches, and how many nodes each branch has. */
-static void find_branches(const real *block, const fl_work *work, lattice *grid) {
-  grid->foils = 0;
-  for (int i = 0; i < COUNT(block) && grid->foils < LAID; i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.lost[i]) continue;
-    const int f = grid->foils;
-    grid->branches[f] = edges_of(block, work, i, grid->edge[f]);
-    grid->foil[f] = i;
-    grid->foils++;
-  }
-  grid->each = nodes_of_branch(grid);
-}
-
-/* The nodes of all foils: angles in the middle of equal parts of each branch. */
-static void lay_nodes(const real *block, const fl_work *work, lattice *grid) {
-  int node = 0;
-  for (int f = 0; f < grid->foils; f++) {
-    const real(*B)[6] = work->span.matrix[grid->foil[f]];
-    grid->first[f] = node;
-    for (int k = 0; k < grid->branches[f] * grid->each; k++) {
-      const real *edge = grid->edge[f] + k / grid->each;
-      const real share = ((real)(k % grid->each) + R(0.5)) / (real)grid->each;
-      grid->angle[node] = edge[0] + share * (edge[1] - edge[0]);
-      fl_tangent tangent;
-      foil_at(block, grid->foil[f], grid->angle[node], &tangent);
-      const real *y = tangent.force;
-      grid->cost[node] = tangent.cost;
-      for (int j = 0; j < 6; j++) grid->wrench[node][j] = y[0] * B[0][j] + y[1] * B[1][j];
-      node++;
-    }
-  }
-}
-
-/* The other actuators by H^-1 of H = sum B g B', with their gains g: y = g B' H^-1 r are the
-   forces for a wrench r that are cheapest where power is quadratic and nothing has limits. */
-static void lay_rows(const real *block, const fl_work *work, lattice *grid) {
-  real H[6][6] = {{0}};
-  memset(grid->row, 0, sizeof grid->row);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) fl_add_square(H, work->span.matrix[i][q], a->gain[q]);
-  }
-  const real ridge = fl_larger(NOTHING, ROUNDING) * fl_trace(H) + TINY;
-  for (int j = 0; j < 6; j++) H[j][j] += ridge;
-  if (!fl_factor(H)) return;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) {
-      fl_solve(H, work->span.matrix[i][q], grid->row[i][q]);
-      for (int j = 0; j < 6; j++) grid->row[i][q][j] *= a->gain[q];
-    }
-  }
-}
-
-/* Holds a force within the limits of a set but for its direction; its size. */
-static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
-  if (!is_plane(a)) {
-    force[0] = fl_clipped(force[0], set->low, set->high);
-    return FABS(force[0]);
-  }
-  const real wanted = size_of(force);
-  const real size = fl_smaller(wanted, fl_larger(set->high, set->reverse));
-  for (int q = 0; q < 2; q++) force[q] *= size / fl_larger(wanted, TINY);
-  return size;
-}
-
-/* Forces of the other actuators at a point for a target, held within their limits, and what
-   all cost there: watts as force^1.5, and ROUNDS times those of all actuators for a miss of
-   one scaled wrench. */
-static real cost_at_point(const real *block, const fl_work *work, const lattice *grid,
-                          const real *target, const unsigned char *node, real force[][2]) {
-  real cost = 0;
-  real left[6]; /* of the target, by the other actuators */
-  memcpy(left, target, sizeof left);
-  for (int f = 0; f < grid->foils; f++) {
-    cost += grid->cost[node[f]];
-    for (int j = 0; j < 6; j++) left[j] -= grid->wrench[node[f]][j];
-  }
-  real residual[6];
-  memcpy(residual, left, sizeof residual);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const fl_set *set = work->set + i;
-    real *y = force[i];
-    y[0] = 0;
-    y[1] = 0;
-    if (is_foil(a)) continue;
-    for (int q = 0; q < (int)a->rows; q++) y[q] = dot(grid->row[i][q], left, 6);
-    const real size = held_force(a, set, y);
-    const real share = size / a->most[0];
-    cost += fl_larger(set->high_cost, set->low_cost) * share * SQRT(share);
-    for (int q = 0; q < (int)a->rows; q++) {
-      for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.matrix[i][q][j];
-    }
-  }
-  return cost + ROUNDS * work->most_cost * SQRT(dot(residual, residual, 6));
-}
-
-/* Puts a point among the `count` cheapest ones (SPREAD,), which are in order; how many there
-   are then. */
-static int put_in_order(lattice_point *points, int count, const lattice_point *added) {
-  int index = count;
-  if (count == SPREAD) {
-    index = SPREAD - 1;
-    if (!(added->cost < points[index].cost)) return count;
-  }
-  while (index > 0 && added->cost < points[index - 1].cost) {
-    points[index] = points[index - 1];
-    index--;
-  }
-  points[index] = *added;
-  if (count == SPREAD) return count;
-  return count + 1;
-}
-
-/* The cheapest point of the lattice on one choice of branches, numbered in mixed radix. */
-static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
-                                        const lattice *grid, const real *target, int choice,
-                                        int points) {
-  lattice_point best = {{0}, NONE};
-  lattice_point tried = {{0}, 0};
-  for (int k = 0; k < points; k++) {
-    int branch_digits = choice;
-    int node_digits = k;
-    for (int f = 0; f < grid->foils; f++) {
-      const int branch = branch_digits % grid->branches[f];
-      const int node = node_digits % grid->each;
-      tried.node[f] = (unsigned char)(grid->first[f] + branch * grid->each + node);
-      branch_digits /= grid->branches[f];
-      node_digits /= grid->each;
-    }
-    real unused[FL_MOST][2];
-    tried.cost = cost_at_point(block, work, grid, target, tried.node, unused);
-    if (k == 0 || tried.cost < best.cost) best = tried;
-  }
-  return best;
-}
-
-/* The cheapest point of each choice of branches, and of these the cheapest ones (SPREAD,);
-   how many there are. */
-static int cheapest_points(const real *block, const fl_work *work, const lattice *grid,
-                           const real *target, lattice_point *points) {
-  int choices = 1;
-  int points_of_choice = 1;
-  for (int f = 0; f < grid->foils; f++) {
-    choices *= grid->branches[f];
-    points_of_choice *= grid->each;
-  }
-  int count = 0;
-  for (int choice = 0; choice < choices; choice++) {
-    const lattice_point best =
-        cheapest_of_choice(block, work, grid, target, choice, points_of_choice);
-    count = put_in_order(points, count, &best);
-  }
-  return count;
-}
-
-/* Commands at a point, after steps towards work->aim: first some that leave the foils on
+/* Commands at a point, after steps towards work->wrench_target: first some that leave the foils on
    their branches. */
-static void begin_at(const real *block, fl_work *work, const lattice *grid, const real *target,
-                     const lattice_point *begin, real command[][3]) {
-  real force[FL_MOST][2];
-  fl_box box = work->box;
-  cost_at_point(block, work, grid, target, begin->node, force);
-  fl_commands_for_forces(block, &work->box, force, work->previous, command);
-  for (int f = 0; f < grid->foils; f++) {
-    const int node = begin->node[f];
-    const int branch = (node - grid->first[f]) / grid->each;
-    const int i = grid->foil[f];
-    command[i][0] = grid->angle[node];
-    box.low[i][0] = grid->edge[f][branch];
-    box.high[i][0] = grid->edge[f][branch + 1];
-  }
-  approach(block, work, &box, command, ROUNDS / 2);
+static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice,
+                     const real *target, const fl_lattice_point *point, real command[][3]) {
+  fl_box branches = work->box;
+  fl_commands_of_point(block, work, lattice, target, point, &branches, command);
+  approach(block, work, &branches, command, ROUNDS / 2);
   approach(block, work, &work->box, command, ROUNDS / 2);
 }
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
    are the same; 0 for none. */
-static const lattice_point *next_point(const lattice_point *points, int count, real last_cost) {
-  const lattice_point *next = 0;
+static const fl_lattice_point *next_point(const fl_lattice_point *points, int count,
+                                          real last_cost) {
+  const fl_lattice_point *next = 0;
   for (int k = 0; k < count; k++) {
     const int is_new = points[k].cost > last_cost * (1 + NEARLY);
     if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
@@ -593,16 +278,14 @@ static const lattice_point *next_point(const lattice_point *points, int count, r
 static void improve_from_lattice(const real *block, fl_work *work, const real *target,
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
-  lattice grid;
-  lattice_point points[SPREAD];
+  fl_lattice lattice;
+  fl_lattice_point points[FL_SPREAD];
   real command[FL_MOST][3];
-  find_branches(block, work, &grid);
-  lay_nodes(block, work, &grid);
-  lay_rows(block, work, &grid);
-  const int count = cheapest_points(block, work, &grid, target, points);
+  fl_lay_lattice(block, work, &lattice);
+  const int count = fl_cheapest_points(block, work, &lattice, target, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &grid, target, points + k, command);
+    begin_at(block, work, &lattice, target, points + k, command);
     points[k].cost = NONE;
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
@@ -610,10 +293,10 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
   }
   real last_cost = 0;
   for (int tried = 0; tried < FOLLOWED && *best_cost > enough; tried++) {
-    const lattice_point *next = next_point(points, count, last_cost);
+    const fl_lattice_point *next = next_point(points, count, last_cost);
     if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
     last_cost = next->cost;
-    begin_at(block, work, &grid, target, next, command);
+    begin_at(block, work, &lattice, target, next, command);
     improve_from(block, work, target, lambda, command, best_cost);
   }
 }
@@ -627,7 +310,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
       if (*best_cost < NONE)
-        memcpy(command, work->placed, sizeof command);
+        memcpy(command, work->best_command, sizeof command);
       else
         memcpy(command, start, sizeof command);
       command[i][0] = angle;
@@ -645,8 +328,9 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   const real enough = proved * (1 + CLOSE);
   real start[FL_MOST][3];
   real lambda[6];
-  memcpy(lambda, work->now->price, sizeof lambda);
-  fl_commands_for_forces(block, &work->box, work->now->force, work->previous, start);
+  memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
+  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                         start);
   fl_improve_commands(block, work, target, best_cost);
   if (*best_cost <= enough) return;
   improve_from_stalls(block, work, target, lambda, start, best_cost);
@@ -663,19 +347,20 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
 /* Commands for forces that the dual is sure of: no foil drags more than its lift does, and
    none is in doubt. */
 int fl_are_forces_sure(const real *block, fl_work *work) {
-  fl_state *state = work->now;
+  fl_state *state = work->state_found;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    if (a->doubt > 0) return 0;
-    if (!is_foil(a)) continue;
-    const real largest_lift = a->pressure * (1 - NOTHING) * end_of(block, a)[0];
+    if (a->uncertainty_cost > 0) return 0;
+    if (!fl_is_foil(a)) continue;
+    const real largest_lift = a->pressure_area * (1 - NOTHING) * fl_lift_end(block, a)[0];
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
-  if (fl_worst_gap(block, work, state->force, state->price) >= 0) return 0;
-  memcpy(work->best, state->force, sizeof work->best);
-  fl_commands_for_forces(block, &work->box, work->best, work->previous, work->placed);
+  if (fl_worst_gap(block, work, state->force, state->lambda_reduced) >= 0) return 0;
+  memcpy(work->best_force, state->force, sizeof work->best_force);
+  fl_commands_for_forces(block, &work->box, work->best_force, work->command_previous,
+                         work->best_command);
   const real most_error = error_allowed(block, work, &work->box);
-  return come_to_give(block, work, &work->box, work->placed, ROUNDS, most_error);
+  return come_to_give(block, work, &work->box, work->best_command, ROUNDS, most_error);
 }
 
 /* Whether some foil may stall within its limits: it then gives more than its table. */
@@ -697,7 +382,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   real below_most = NEARLY;
   real start[FL_MOST][3];
   if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
-  fl_commands_for_forces(block, &work->box, out->force, work->previous, start);
+  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < 2 * ROUNDS; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
     const int has_found = found > 0;
@@ -706,8 +391,8 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     real wrench_served[6]; /* by forces */
     real target[6];
     for (int j = 0; j < 6; j++) {
-      work->aim[j] = ray_share * (wrench[j] + work->span.beside[j]);
-      wrench_served[j] = work->aim[j] - work->span.beside[j];
+      work->wrench_target[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
+      wrench_served[j] = work->wrench_target[j] - work->span.wrench_offset[j];
     }
     fl_reduce_wrench(work, wrench_served, target);
     real command[FL_MOST][3];
@@ -720,7 +405,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, out->command, sizeof command);
       else
         memcpy(command, start, sizeof command);
-      memcpy(lambda, out->inner, sizeof lambda);
+      memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
       is_met = settle(block, work, target, EXACT, lambda, command, force) < NONE;
     }
@@ -730,9 +415,9 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
       continue;
     }
     found = ray_share;
-    out->placed = 1;
+    out->has_foil_commands = 1;
     memcpy(out->command, command, sizeof command);
-    memcpy(out->inner, lambda, sizeof lambda);
-    memcpy(out->aim, wrench_served, sizeof wrench_served);
+    memcpy(out->lambda_reduced, lambda, sizeof lambda);
+    memcpy(out->wrench_served, wrench_served, sizeof wrench_served);
   }
 }

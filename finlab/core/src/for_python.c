@@ -23,14 +23,12 @@ const char *fl_fields(void) {
 #undef FL_FIELD
 #undef FL_END
 
-/* Answers to wrenches (count, 6), all else as of a question: forces (count, n, 2), prices
-   and aims (count, 6), values, commands (count, n, 3), within reach, errors; -1 where a
-   search ended at its bound of steps. */
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
-                   const real *wrench, int count, real *force, real *price, real *aim, real *value,
-                   real *command, unsigned char *within, real *error) {
+                   const real *wrench, int count, real *force, real *prices, real *wrench_served,
+                   real *gap_power_bound, real *command, unsigned char *is_attainable,
+                   real *error) {
   const size_t n = (size_t)COUNT(block);
-  int ended = 0;
+  int is_truncated = 0;
   fl_question q = *question;
   fl_answer out;
   for (int k = 0; k < count; k++) {
@@ -38,32 +36,31 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
     memcpy(force, out.force, 2 * n * sizeof *force);
-    memcpy(price, out.price, sizeof out.price);
-    memcpy(aim, out.aim, sizeof out.aim);
+    memcpy(prices, out.prices, sizeof out.prices);
+    memcpy(wrench_served, out.wrench_served, sizeof out.wrench_served);
     memcpy(command, out.command, 3 * n * sizeof *command);
     wrench += 6;
     force += 2 * n;
-    price += 6;
-    aim += 6;
+    prices += 6;
+    wrench_served += 6;
     command += 3 * n;
-    value[k] = out.value;
-    within[k] = (unsigned char)out.within;
+    gap_power_bound[k] = out.gap_power_bound;
+    is_attainable[k] = (unsigned char)out.is_attainable;
     error[k] = out.error;
-    ended |= out.ended;
+    is_truncated |= out.is_truncated;
   }
-  if (ended) return -1;
+  if (is_truncated) return -1;
   return FL_OK;
 }
 
-/* The dual at multipliers in reduced coordinates (6,) [W]: responses (n, 2), and the dual
-   value for a wrench. */
-real fl_look(const real *block, fl_work *work, const real *wrench, const real *inner, real *force) {
+real fl_dual_value(const real *block, fl_work *work, const real *wrench,
+                   const real *lambda_reduced, real *force) {
   fl_state *state = work->state;
   real target[6];
   fl_reduce_wrench(work, wrench, target);
-  fl_dual_at(block, work, target, inner, state);
+  fl_dual_at(block, work, target, lambda_reduced, state);
   memcpy(force, state->force, (size_t)COUNT(block) * sizeof state->force[0]);
-  return state->value;
+  return state->dual_value;
 }
 
 /* What one actuator's force is worth at its prices s, of all that it may give now. */
@@ -71,35 +68,35 @@ static fl_actuator_worth worth_at(const real *block, int i, const fl_set *set, c
   wide unused[2];
   const real along_force = fl_support_of_set(block, i, set, s, unused);
   fl_actuator_worth worth = {0};
-  if (set->flipped) {
-    worth.price_back = along_force;
-    worth.low = -set->high;
-    worth.high = -set->low;
+  if (set->is_flipped) {
+    worth.price_reverse = along_force;
+    worth.force_min = -set->force_max;
+    worth.force_max = -set->force_min;
   } else {
-    worth.price = along_force;
-    worth.low = set->low;
-    worth.high = set->high;
+    worth.price_ahead = along_force;
+    worth.force_min = set->force_min;
+    worth.force_max = set->force_max;
   }
-  if (set->reverse > 0) {
+  if (set->force_max_reverse > 0) {
     const fl_set back = fl_reversed_set(set);
-    worth.price_back = fl_support_of_set(block, i, &back, s, unused);
-    worth.low = -set->reverse;
+    worth.price_reverse = fl_support_of_set(block, i, &back, s, unused);
+    worth.force_min = -set->force_max_reverse;
   }
   worth.conjugate = fl_response(block, i, set, s).conjugate;
   return worth;
 }
 
-int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *price,
+int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *prices,
              int count, fl_actuator_worth *worth) {
-  fl_question calm = *question;
-  calm.calm = 0; /* turning is no power */
-  if (!fl_prepare_question(block, work, &calm)) return FL_BAD_NUMBER;
+  fl_question q = *question;
+  q.calm = 0; /* turning is no power */
+  if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
   for (int k = 0; k < count; k++) {
     real lambda[6];
-    fl_reduce_lambda(work, price + 6 * k, lambda);
+    fl_reduce_lambda(work, prices + 6 * k, lambda);
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
-      own_price(work, i, lambda, s);
+      actuator_price(work, i, lambda, s);
       *worth = worth_at(block, i, work->set + i, s);
       worth++;
     }
@@ -107,8 +104,6 @@ int fl_worth(const real *block, fl_work *work, const fl_question *question, cons
   return FL_OK;
 }
 
-/* Commands (count, n, 3) for forces (count, n, 2); angles without a force keep those of
-   previous ones (n, 3). */
 void fl_commands(const real *block, fl_work *work, const real *force, int count,
                  const real *previous, real *command) {
   const int n = COUNT(block);

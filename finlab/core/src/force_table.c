@@ -102,10 +102,11 @@ real fl_marginal_cost(const real *table, real size, real *price) {
   const real *knot = knots(table) + 3 * cell;
   const real begin = fourth_power((real)cell / (real)cells);
   const real width = fourth_power((real)(cell + 1) / (real)cells) - begin;
-  const real scale = table[0] * width;
+  const real price_max = table[0];
+  const real scale = price_max * width;
   const cubic force = cubic_between(knot[0], knot[3], knot[1] * scale, knot[4] * scale);
   const real t = solve_cubic(&force, knot[3] - knot[0], size, cell == 0);
-  const real paid = table[0] * begin + scale * t;
+  const real paid = price_max * begin + scale * t;
   if (price) *price = paid;
   const real integral = knot[0] + t * (force.m0 / 2 + t * (force.b / 3 + t * force.c / 4));
   const real conjugate = knot[2] + scale * t * integral;

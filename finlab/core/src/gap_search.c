@@ -8,33 +8,34 @@
 
 /* Whether the smoothed response of an arc has a force that is smaller than any in it. */
 static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
-  const int is_narrow = is_plane(ACTUATOR(block, i)) && set->turn == 0 && set->half <= NARROW;
-  return is_narrow && size_of(force) < HOLLOW_FORCE * set->low;
+  const int is_narrow =
+      is_plane(ACTUATOR(block, i)) && set->turn_cost == 0 && set->sector_half_angle <= NARROW;
+  return is_narrow && size_of(force) < HOLLOW_FORCE * set->force_min;
 }
 
 static int any_hollow(const real *block, const fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (is_hollow(block, i, work->set + i, work->now->force[i])) return 1;
+    if (is_hollow(block, i, work->set + i, work->state_found->force[i])) return 1;
   }
   return 0;
 }
 
 /* Remembers an answer without a gap, where it is the cheapest so far. */
 static void keep_answer(const real *block, fl_work *work, const real *target, real *best_cost) {
-  if (work->drags) {
+  if (work->has_drag) {
     fl_improve_commands(block, work, target, best_cost);
     return;
   }
-  if (!(work->now->value < *best_cost)) return;
-  *best_cost = work->now->value;
-  memcpy(work->best, work->now->force, sizeof work->best);
+  if (!(work->state_found->dual_value < *best_cost)) return;
+  *best_cost = work->state_found->dual_value;
+  memcpy(work->best_force, work->state_found->force, sizeof work->best_force);
 }
 
 /* Remembers an answer without a gap; whether one with a gap (of actuator `gap`, or -1) could
    still be cheaper. */
 static int is_open(const real *block, fl_work *work, const real *target, int status, int gap,
                    real *best_cost) {
-  const real dual_value = work->now->value;
+  const real dual_value = work->state_found->dual_value;
   if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
     keep_answer(block, work, target, best_cost);
     return 0;
@@ -46,8 +47,8 @@ static int is_open(const real *block, fl_work *work, const real *target, int sta
 /* Whether a force is so small that its actuator is frozen at its least one, where it is in a
    gap. */
 static int is_restless(const real *block, int i, const fl_set *set, const real *force) {
-  const int turns_free = is_plane(ACTUATOR(block, i)) && set->turn == 0;
-  return turns_free && size_of(force) < SHORTER * set->low;
+  const int turns_free = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0;
+  return turns_free && size_of(force) < SHORTER * set->force_min;
 }
 
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces
@@ -55,15 +56,16 @@ static int is_restless(const real *block, int i, const fl_set *set, const real *
 static void dive(const real *block, fl_work *work, const real *target, int status,
                  real *best_cost) {
   for (int round = 0; round < ROUNDS; round++) {
-    fl_state *state = work->now;
+    fl_state *state = work->state_found;
     const real largest = fl_largest_force(block, state->force);
-    const int gap = fl_worst_gap(block, work, state->force, state->price);
+    const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
     if (!is_open(block, work, target, status, gap, best_cost)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
       const real *force = state->force[i];
       const int hollow = is_hollow(block, i, set, force);
-      const int is_cut = hollow || fl_gap_of(block, work, i, force, largest, state->price) > 0;
+      const int is_cut =
+          hollow || fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0;
       if (!is_cut) continue;
       if (hollow || is_restless(block, i, set, force))
         fl_fix_at_least_force(block, i, set, force);
@@ -72,32 +74,32 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
     }
     fl_prepare_sets(block, work);
     real lambda[6];
-    memcpy(lambda, state->price, sizeof lambda);
+    memcpy(lambda, state->lambda_reduced, sizeof lambda);
     status = fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK);
   }
 }
 
 /* Solves both sides of a cut from the multipliers so far and stays at the cheaper one. */
 static int cheaper_side(const real *block, fl_work *work, const real *target, fl_node *node) {
-  const int nearer = fl_nearer_side(block, node->cut, &node->before, node->force);
+  const int nearer = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
   const int side[2] = {nearer, -nearer};
   real lambda_begin[6];
   real lambda[2][6];
   real cost[2];
   int status[2];
-  memcpy(lambda_begin, work->now->price, sizeof lambda_begin);
+  memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   for (int k = 0; k < 2; k++) {
     fl_take_side(block, work, node, side[k]);
     status[k] = fl_dual_newton(block, work, target, lambda_begin, STEPS_AT_KINK);
-    cost[k] = work->now->value;
+    cost[k] = work->state_found->dual_value;
     if (status[k] == FL_BEYOND) cost[k] = NONE;
-    memcpy(lambda[k], work->now->price, sizeof lambda[k]);
+    memcpy(lambda[k], work->state_found->lambda_reduced, sizeof lambda[k]);
   }
   const int cheaper = cost[1] < cost[0];
   const int other = !cheaper;
-  node->first = side[cheaper];
+  node->first_side = side[cheaper];
   node->score[0] = cost[other];
-  memcpy(node->price, lambda[other], sizeof node->price);
+  memcpy(node->lambda_reduced, lambda[other], sizeof node->lambda_reduced);
   if (cheaper == 1) return status[1];
   fl_take_side(block, work, node, side[0]);
   return fl_dual_newton(block, work, target, lambda[0], STEPS_AT_KINK);
@@ -106,7 +108,8 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
 /* How many parts a search may look at. */
 static int most_parts_of(const fl_work *work) {
   const fl_settings *settings = &work->settings;
-  if (work->turns && settings->tick_parts < settings->most_parts) return settings->tick_parts;
+  if (work->has_turn_cost && settings->tick_parts < settings->most_parts)
+    return settings->tick_parts;
   return settings->most_parts;
 }
 
@@ -142,20 +145,20 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
   real lambda_begin[6];
   int depth = 0;
   int parts = 0;
-  memcpy(work->kept, work->set, sizeof work->kept);
-  memcpy(lambda_begin, work->now->price, sizeof lambda_begin);
-  if (work->drags) {
+  memcpy(work->set_before, work->set, sizeof work->set_before);
+  memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
+  if (work->has_drag) {
     fl_improve_from_starts(block, work, target, &best_cost);
     fl_dual_start(block, work, target, lambda_begin);
   }
   dive(block, work, target, status, &best_cost);
-  fl_restore_sets(block, work, work->kept);
+  fl_restore_sets(block, work, work->set_before);
   fl_dual_start(block, work, target, lambda_begin);
   status = status_begin;
   for (;;) {
-    fl_state *state = work->now;
-    const real dual_value = state->value;
-    const int gap = fl_worst_gap(block, work, state->force, state->price);
+    fl_state *state = work->state_found;
+    const real dual_value = state->dual_value;
+    const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
     int open = is_open(block, work, target, status, gap, &best_cost);
     if (open && gap < 0) { /* hollow: at their least forces */
       dive_and_return(block, work, target, status, &best_cost);
@@ -163,7 +166,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
       status = FL_BEYOND;
       open = 0;
     }
-    const int can_cut = open && ACTUATOR(block, gap)->speed == 0;
+    const int can_cut = open && ACTUATOR(block, gap)->flow_speed == 0;
     fl_node *node = 0;
     if (can_cut && parts < most_parts) {
       node = fl_cut_set(block, work, &depth, gap, state->force[gap]);
@@ -173,33 +176,35 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
       parts += 2;
       continue;
     }
-    work->ended |= can_cut;
+    work->is_truncated |= can_cut;
     if (status != FL_BEYOND) least_bound = fl_smaller(least_bound, dual_value);
     node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
     if (!node) break;
-    fl_take_side(block, work, node, -node->first);
-    status = fl_dual_newton(block, work, target, node->price, STEPS_AT_KINK);
+    fl_take_side(block, work, node, -node->first_side);
+    status = fl_dual_newton(block, work, target, node->lambda_reduced, STEPS_AT_KINK);
   }
-  fl_restore_sets(block, work, work->kept);
+  fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;
   return best_cost < NONE;
 }
 
-/* Commands that give work->aim, from what Newton's method came to; 0 where none are found. */
+/* Commands that give work->wrench_target, from what Newton's method came to; 0 where none are
+   found. */
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
                         fl_answer *out) {
-  const real dual_value = work->now->value;
-  memcpy(out->inner, work->now->price, sizeof out->inner);
+  const real dual_value = work->state_found->dual_value;
+  memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   const int is_sure = status == FL_MET && fl_are_forces_sure(block, work);
   if (!is_sure) {
     real bound;
     if (!fl_search_gaps(block, work, target, status, &bound)) return 0;
     if (status != FL_MET) { /* multipliers at the commands may prove more */
-      fl_dual_start(block, work, target, work->near);
-      if (work->state->value > dual_value) memcpy(out->inner, work->near, sizeof out->inner);
+      fl_dual_start(block, work, target, work->best_lambda);
+      if (work->state->dual_value > dual_value)
+        memcpy(out->lambda_reduced, work->best_lambda, sizeof out->lambda_reduced);
     }
   }
-  memcpy(out->command, work->placed, (size_t)COUNT(block) * sizeof out->command[0]);
-  out->placed = 1;
+  memcpy(out->command, work->best_command, (size_t)COUNT(block) * sizeof out->command[0]);
+  out->has_foil_commands = 1;
   return 1;
 }

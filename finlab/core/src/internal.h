@@ -42,6 +42,7 @@ typedef fl_wide wide;
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
+#define LARGEST_NUMBER R(1e30) /* of a block or an answer */
 #define NOTHING R(1e-9)
 #define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
 #define NEARLY R(1e-6)
@@ -50,9 +51,6 @@ typedef fl_wide wide;
 #define ROUNDS 12
 #define TICK_PARTS 60 /* the usual fl_settings.tick_parts */
 #define LAST_STEPS 36 /* the usual fl_settings.command_steps */
-#define MIN(a, b) ((a) < (b) ? (a) : (b))
-#define MAX(a, b) ((a) > (b) ? (a) : (b))
-#define CLIP(x, low, high) MIN(MAX(x, low), high)
 
 #define HEAD(block) ((const fl_head *)(block))
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
@@ -83,17 +81,18 @@ static inline real size_of(const real *force) {
 }
 
 /* Whether an actuator pushes in a plane. */
-static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->speed == 0; }
+static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->flow_speed == 0; }
 /* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
-static inline void own_price(const fl_work *work, int i, const real *lambda, real *s) {
-  s[0] = dot(work->span.matrix[i][0], lambda, 6);
-  s[1] = dot(work->span.matrix[i][1], lambda, 6);
+static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
+  s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
+  s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
 }
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
 int fl_factor(real A[6][6]);
 void fl_solve(real factor[6][6], const real *right, real *x);
+int fl_are_within(const real *values, int count, real most);
 
 /* force_table.c: tables of force over price, gauges of directions */
 typedef struct { real force, slope, conjugate; } line_response;
@@ -207,9 +206,47 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
                         fl_answer *out);
 
-/* foil_drag.c: commands of robots whose foils drag */
+/* foil_tangent.c: a foil near to a command */
+/* Whether an actuator is a foil in a flow, whose drag counts. */
+static inline int fl_is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
+const real *fl_lift_end(const real *block, const fl_actuator *a);
+void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
+void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
+                     fl_tangent *tangent, fl_set *set);
 real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
                           real force[][2]);
+
+/* foil_lattice.c: where searches for commands of foils may begin */
+enum {
+  FL_BRANCHES = 4,        /* of a foil's lift */
+  FL_LAID = 6,            /* foils on the lattice; others begin at rest */
+  FL_NODES = 4 * ROUNDS,  /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
+  FL_SPREAD = 5 * ROUNDS /* points at which steps on the commands begin */
+};
+typedef struct {
+  int foils;                              /* how many there are */
+  int foil[FL_LAID];                      /* which actuators these are */
+  int branches[FL_LAID];                  /* of each foil */
+  int first[FL_LAID];                     /* its first node */
+  int each;                               /* nodes on a branch */
+  real edge[FL_LAID][FL_BRANCHES + 1];    /* ends of the branches [rad] */
+  real angle[FL_NODES];                   /* of each node [rad] */
+  real cost[FL_NODES];                    /* of each node [W] */
+  real wrench[FL_NODES][6];               /* of each node, in the basis */
+  real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
+} fl_lattice;
+typedef struct {
+  unsigned char node[FL_LAID]; /* of each foil */
+  real cost;                   /* [W], with the price of a miss */
+} fl_lattice_point;
+void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
+int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
+                       const real *target, fl_lattice_point *points);
+void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
+                          const real *target, const fl_lattice_point *point, fl_box *box,
+                          real command[][3]);
+
+/* foil_drag.c: commands of robots whose foils drag */
 void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
 int fl_are_forces_sure(const real *block, fl_work *work);
@@ -252,7 +289,7 @@ typedef struct {
   fl_effect effect;
   const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
   const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
-  real counts[6];     /* 1 of axes that count, else 0 */
+  real axis_counts[6]; /* 1 of axes that count, else 0 */
 } fl_whole;
 int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns,
               real *forces, fl_answer *out, real *end);

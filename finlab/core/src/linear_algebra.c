@@ -44,3 +44,11 @@ void fl_solve(real factor[6][6], const real *right, real *x) {
     for (int k = 5; k > i; k--) x[i] -= factor[k][i] * x[k];
   }
 }
+
+/* Whether all values are finite and their sizes no larger than so much. */
+int fl_are_within(const real *values, int count, real most) {
+  for (int k = 0; k < count; k++) {
+    if (!(FABS(values[k]) <= most)) return 0; /* NaN, too */
+  }
+  return 1;
+}

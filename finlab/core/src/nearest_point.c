@@ -27,17 +27,17 @@ wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced
   const fl_span *span = &work->span;
   wide sum = 0;
   for (int j = 0; j < 6; j++) sum += (wide)span->basis[axis][j] * (wide)reduced[j];
-  return sum * (wide)span->scale[axis] / (wide)HEAD(block)->yard[axis];
+  return sum * (wide)span->axis_scale[axis] / (wide)HEAD(block)->wrench_scale[axis];
 }
 
 /* Sets the wrench on the yardstick, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
   for (int i = 0; i < COUNT(block); i++) {
-    work->corners[i] = 0;
+    work->polygon_offset[i] = 0;
     for (int q = 0; q < 2; q++) {
-      const real *row = work->span.matrix[i][q];
+      const real *row = work->span.effectiveness_reduced[i][q];
       for (int k = 0; k < 6; k++) {
-        work->column[i][q][k] = weight[k] * fl_out_of_range(block, work, row, k);
+        work->effectiveness_weighted[i][q][k] = weight[k] * fl_out_of_range(block, work, row, k);
       }
     }
   }
@@ -59,10 +59,10 @@ static void farthest_corner(const real *polygon, const real *s, wide *force) {
 
 /* The point (6,), in weighted axes, that forces give. */
 void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point) {
-  memset(point, 0, sizeof work->column[0][0]);
+  memset(point, 0, sizeof work->effectiveness_weighted[0][0]);
   for (int i = 0; i < COUNT(block); i++) {
     for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
-      add(point, force[i][q], work->column[i][q]);
+      add(point, force[i][q], work->effectiveness_weighted[i][q]);
     }
   }
 }
@@ -74,17 +74,17 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   const int last = m->count;
   wide(*force)[2] = m->force[last];
   for (int i = 0; i < COUNT(block); i++) {
-    const wide(*column)[6] = work->column[i];
+    const wide(*column)[6] = work->effectiveness_weighted[i];
     const real s[2] = {(real)product(column[0], normal, 6), (real)product(column[1], normal, 6)};
-    if (work->corners[i] > 0)
-      farthest_corner(block + work->corners[i], s, force[i]);
+    if (work->polygon_offset[i] > 0)
+      farthest_corner(block + work->polygon_offset[i], s, force[i]);
     else
       fl_support_of_set(block, i, work->set + i, s, force[i]);
   }
   fl_point_of_forces(block, work, force, m->point[last]);
-  m->along[last] = 0;
+  m->ray_share[last] = 0;
   if (work->ray && product(work->ray, normal, 6) < 0) {
-    m->along[last] = 1;
+    m->ray_share[last] = 1;
     add(m->point[last], -1, work->ray);
   }
 }
@@ -92,18 +92,18 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
 /* Takes point k out of a mixture. */
 static void drop(fl_mixture *m, int k) {
   m->count--;
-  if (m->done > k) m->done = k;
+  if (m->basis_count > k) m->basis_count = k;
   const size_t behind = (size_t)(m->count - k);
   memmove(m->force + k, m->force + k + 1, behind * sizeof m->force[0]);
   memmove(m->point + k, m->point + k + 1, behind * sizeof m->point[0]);
-  memmove(m->share + k, m->share + k + 1, behind * sizeof m->share[0]);
-  memmove(m->along + k, m->along + k + 1, behind * sizeof m->along[0]);
+  memmove(m->weight + k, m->weight + k + 1, behind * sizeof m->weight[0]);
+  memmove(m->ray_share + k, m->ray_share + k + 1, behind * sizeof m->ray_share[0]);
 }
 
 static int least_share(const fl_mixture *m) {
   int least = 0;
   for (int k = 1; k < m->count; k++) {
-    if (m->share[k] < m->share[least]) least = k;
+    if (m->weight[k] < m->weight[least]) least = k;
   }
   return least;
 }
@@ -138,10 +138,10 @@ static void extend_basis(fl_mixture *m, int j) {
 /* Shares, which add up to 1, of the points that come nearest to a target, within their
    affine hull; a point that depends on those before it gets 0. */
 static void affine_shares(fl_mixture *m, const wide *target, wide *share) {
-  int begin = m->done;
+  int begin = m->basis_count;
   if (begin < 1) begin = 1;
   for (int j = begin; j < m->count; j++) extend_basis(m, j);
-  m->done = m->count;
+  m->basis_count = m->count;
 
   wide right[FL_POINTS];
   wide left[6];
@@ -167,7 +167,7 @@ static wide step_to_edge(const fl_mixture *m, const wide *wanted, int *is_inside
   for (int k = 0; k < m->count; k++) {
     if (!(wanted[k] <= BARELY)) continue;
     *is_inside = 0;
-    const wide to_edge = m->share[k] / larger_wide(m->share[k] - wanted[k], 1e-300);
+    const wide to_edge = m->weight[k] / larger_wide(m->weight[k] - wanted[k], 1e-300);
     if (!(step < to_edge)) step = to_edge;
   }
   return step;
@@ -182,22 +182,22 @@ static void mix(fl_mixture *m, const wide *target) {
     affine_shares(m, target, wanted);
     const wide step = step_to_edge(m, wanted, &is_inside);
     if (is_inside) {
-      memcpy(m->share, wanted, sizeof wanted);
+      memcpy(m->weight, wanted, sizeof wanted);
       return;
     }
-    for (int k = 0; k < m->count; k++) m->share[k] += step * (wanted[k] - m->share[k]);
-    m->share[least_share(m)] = 0;
+    for (int k = 0; k < m->count; k++) m->weight[k] += step * (wanted[k] - m->weight[k]);
+    m->weight[least_share(m)] = 0;
     for (int k = m->count - 1; k >= 0; k--) {
-      if (m->share[k] <= BARELY) drop(m, k);
+      if (m->weight[k] <= BARELY) drop(m, k);
     }
   }
-  m->share[0] = 1;
+  m->weight[0] = 1;
 }
 
 /* Sets the miss of a mixture: the way from its point to a target. Its length. */
 static wide find_miss(fl_mixture *m, const wide *target) {
   memcpy(m->miss, target, sizeof m->miss);
-  for (int p = 0; p < m->count; p++) add(m->miss, -m->share[p], m->point[p]);
+  for (int p = 0; p < m->count; p++) add(m->miss, -m->weight[p], m->point[p]);
   return length_of(m->miss);
 }
 
@@ -221,8 +221,8 @@ wide fl_nearest_point(const real *block, const fl_work *work, const wide *target
   if (m->count == 0) {
     append_farthest(block, work, target, m);
     m->count = 1;
-    m->done = 0;
-    m->share[0] = 1;
+    m->basis_count = 0;
+    m->weight[0] = 1;
   }
   for (int k = 1;; k++) {
     const wide miss = find_miss(m, target);
@@ -234,7 +234,7 @@ wide fl_nearest_point(const real *block, const fl_work *work, const wide *target
     const int has_stalled = miss >= last_miss * (1 - BARELY);
     if (is_proved || has_stalled || k == MOST_POINTS) return miss;
     last_miss = miss;
-    m->share[m->count] = 0;
+    m->weight[m->count] = 0;
     m->count++;
     mix(m, target);
   }
@@ -251,8 +251,8 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
   wide last_size = 1e300;
   memcpy(m->miss, ray, sizeof m->miss);
   m->count = 0;
-  m->done = 0;
-  m->share[0] = 1;
+  m->basis_count = 0;
+  m->weight[0] = 1;
   append_farthest(block, work, ray, m);
   for (int k = 0; k < MOST_SHARES; k++) {
     const wide *normal = m->miss;
@@ -284,7 +284,7 @@ void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     for (int q = 0; q < 2; q++) {
       wide sum = 0;
-      for (int p = 0; p < m->count; p++) sum += m->share[p] * m->force[p][i][q];
+      for (int p = 0; p < m->count; p++) sum += m->weight[p] * m->force[p][i][q];
       force[i][q] = (real)sum;
     }
   }

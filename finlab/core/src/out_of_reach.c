@@ -11,7 +11,7 @@
 #define ROUGHLY (NEARLY / 10)
 #define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
-/* Scaled wrench by which an answer at the rim may be off: what it gives is then its aim. */
+/* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
 #define NONE R(1e30)    /* power that no answer reaches */
 
@@ -29,7 +29,7 @@ static int are_same(const void *one, const void *other, size_t size) {
 static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
 
 static wide on_yardstick(const real *block, const real *wrench, int k) {
-  return (wide)wrench[k] / (wide)HEAD(block)->yard[k];
+  return (wide)wrench[k] / (wide)HEAD(block)->wrench_scale[k];
 }
 
 static void serve_closest(const real *block, fl_work *work, const real *wrench,
@@ -37,12 +37,12 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
   wide weight[6];
   wide target[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = fl_larger(policy->weight[k], CLOSE);
+    weight[k] = fl_larger(policy->axis_weight[k], CLOSE);
     target[k] = weight[k] * on_yardstick(block, wrench, k);
   }
   fl_weigh_axes(block, work, weight);
   work->mixture.count = 0;
-  const wide miss = fl_nearest_point(block, work, target, work->close, 0, &work->mixture);
+  const wide miss = fl_nearest_point(block, work, target, work->distance_enough, 0, &work->mixture);
   score[0] = rounded((real)miss);
 }
 
@@ -50,7 +50,7 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
 static void ray_of(const real *block, const fl_work *work, const real *wrench, wide *ray) {
   real along[6];
   real target[6];
-  for (int k = 0; k < 6; k++) along[k] = wrench[k] + work->span.beside[k];
+  for (int k = 0; k < 6; k++) along[k] = wrench[k] + work->span.wrench_offset[k];
   fl_reduce_wrench(work, along, target);
   const int is_in_range = fl_is_in_range(work, along, target);
   for (int k = 0; k < 6; k++) {
@@ -66,11 +66,11 @@ static wide nearest_to_ray(const real *block, fl_work *work, const wide *from, c
   fl_mixture *m = &work->mixture;
   m->count = 0;
   work->ray = ray;
-  const wide miss = fl_nearest_point(block, work, from, work->close, 0, m);
+  const wide miss = fl_nearest_point(block, work, from, work->distance_enough, 0, m);
   work->ray = 0;
   score[0] = rounded((real)miss);
   wide ray_share = 0;
-  for (int p = 0; p < m->count; p++) ray_share += m->share[p] * m->along[p];
+  for (int p = 0; p < m->count; p++) ray_share += m->weight[p] * m->ray_share[p];
   return ray_share;
 }
 
@@ -82,10 +82,11 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   wide from[6];
   wide ray[6];
   wide plane[6];
-  for (int k = 0; k < 6; k++) from[k] = -on_yardstick(block, work->span.beside, k);
+  for (int k = 0; k < 6; k++) from[k] = -on_yardstick(block, work->span.wrench_offset, k);
   ray_of(block, work, wrench, ray);
   fl_weigh_axes(block, work, weight);
-  wide ray_share = fl_farthest_along_ray(block, work, from, ray, 0, 1, work->close, m, plane);
+  wide ray_share =
+      fl_farthest_along_ray(block, work, from, ray, 0, 1, work->distance_enough, m, plane);
   /* What misses along the ray is a smaller share; what is across it counts more. */
   const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
   add(m->miss, -less, ray);
@@ -98,7 +99,7 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
 
 /* Points of a mixture anew, in the axes that hold now. */
 static void remake_points(const real *block, const fl_work *work, fl_mixture *m) {
-  m->done = 0;
+  m->basis_count = 0;
   for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
 }
 
@@ -122,7 +123,7 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
     }
     fl_weigh_axes(block, work, weight);
     remake_points(block, work, m);
-    fl_nearest_point(block, work, target, work->close, 0, m);
+    fl_nearest_point(block, work, target, work->distance_enough, 0, m);
     for (int k = 0; k < 6; k++) {
       if (group[k]) missing[k] = m->miss[k] / weight[k];
     }
@@ -137,7 +138,7 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
   wide wanted[6]; /* on the yardstick; of held axes what they have got */
   for (int k = 0; k < 6; k++) wanted[k] = on_yardstick(block, wrench, k);
   work->mixture.count = 0;
-  for (int g = 0; g < policy->groups; g++) {
+  for (int g = 0; g < policy->group_count; g++) {
     const unsigned char *group = policy->group[g];
     wide missing[6] = {0};
     const wide missed = serve_group(block, work, wanted, held, group, g == 0, missing);
@@ -174,14 +175,14 @@ static int is_better(const real *a, const real *b) {
 static void middle_of_sets(const real *block, const fl_work *work, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_set *set = work->set + i;
-    real size = (set->low + set->high) / 2;
+    real size = (set->force_min + set->force_max) / 2;
     force[i][0] = size;
     force[i][1] = fl_drag_of_lift(block, i, size);
     if (!is_plane(ACTUATOR(block, i))) continue;
-    const int is_around_rest = !(set->half < PI) || set->reverse > 0;
+    const int is_around_rest = !(set->sector_half_angle < PI) || set->force_max_reverse > 0;
     if (is_around_rest) size = 0;
-    force[i][0] = size * set->cos_middle;
-    force[i][1] = size * set->sin_middle;
+    force[i][0] = size * set->cos_center;
+    force[i][1] = size * set->sin_center;
   }
 }
 
@@ -189,7 +190,7 @@ static void middle_of_sets(const real *block, const fl_work *work, real force[][
 static real scaled_distance(const fl_work *work, const real *from, const real *to) {
   real squared = 0;
   for (int k = 0; k < 6; k++) {
-    const real change = (to[k] - from[k]) / work->span.scale[k];
+    const real change = (to[k] - from[k]) / work->span.axis_scale[k];
     squared += change * change;
   }
   return SQRT(squared);
@@ -198,12 +199,12 @@ static real scaled_distance(const fl_work *work, const real *from, const real *t
 /* Takes what Newton's method came to, for a wrench, into an answer. */
 static void take_answer(const real *block, const fl_work *work, const real *wrench,
                         fl_answer *out) {
-  const fl_state *state = work->now;
-  memcpy(out->inner, state->price, sizeof out->inner);
+  const fl_state *state = work->state_found;
+  memcpy(out->lambda_reduced, state->lambda_reduced, sizeof out->lambda_reduced);
   memcpy(out->force, state->force, (size_t)COUNT(block) * sizeof out->force[0]);
-  memcpy(out->aim, wrench, sizeof out->aim);
-  if (TOLERANCE < AT_RIM && state->size > TOLERANCE) {
-    fl_wrench_of_forces(block, work, out->force, out->aim);
+  memcpy(out->wrench_served, wrench, sizeof out->wrench_served);
+  if (TOLERANCE < AT_RIM && state->residual_size > TOLERANCE) {
+    fl_wrench_of_forces(block, work, out->force, out->wrench_served);
   }
 }
 
@@ -216,7 +217,7 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
   real given[6];
   fl_wrench_of_forces(block, work, force, given);
   memcpy(out->force, force, (size_t)COUNT(block) * sizeof out->force[0]);
-  memcpy(out->aim, given, sizeof given);
+  memcpy(out->wrench_served, given, sizeof given);
   const real distance_inside = scaled_distance(work, given, inside);
   real most_power = NONE;
   int first = WANTED;
@@ -231,12 +232,12 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
     }
     fl_reduce_wrench(work, wrench, target);
     fl_dual_newton(block, work, target, 0, STEPS_AT_KINK);
-    const real dual_value = work->now->value;
-    const int has_met = !(work->now->size > fl_larger(AT_RIM, ENOUGH));
+    const real dual_value = work->state_found->dual_value;
+    const int has_met = !(work->state_found->residual_size > fl_larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
     take_answer(block, work, wrench, out);
     most_power = (1 - FINE) * dual_value;
-    const int is_steep = !(dot(out->inner, target, 6) <= FINE / NEARLY * dual_value);
+    const int is_steep = !(dot(out->lambda_reduced, target, 6) <= FINE / NEARLY * dual_value);
     if (trial != GIVEN || !is_steep) return;
   }
 }
@@ -245,10 +246,10 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
 static void better_side(const real *block, fl_work *work, const real *wrench,
                         const fl_policy *policy, fl_node *node, real force[][2], real *score) {
   real force_other[FL_MOST][2];
-  node->first = fl_nearer_side(block, node->cut, &node->before, node->force);
-  fl_take_side(block, work, node, -node->first);
+  node->first_side = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
+  fl_take_side(block, work, node, -node->first_side);
   serve(block, work, wrench, policy, force_other, node->score);
-  fl_take_side(block, work, node, node->first);
+  fl_take_side(block, work, node, node->first_side);
   serve(block, work, wrench, policy, force, score);
   if (!is_better(node->score, score)) return;
   for (int k = 0; k < FL_SCORES; k++) {
@@ -257,8 +258,8 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
     node->score[k] = kept;
   }
   memcpy(force, force_other, (size_t)COUNT(block) * sizeof *force_other);
-  node->first = -node->first;
-  fl_take_side(block, work, node, node->first);
+  node->first_side = -node->first_side;
+  fl_take_side(block, work, node, node->first_side);
 }
 
 /* How many parts a policy may look at. */
@@ -282,18 +283,18 @@ static fl_node *last_better_cut(const real *block, fl_work *work, int *depth, co
 static void best_part(const real *block, fl_work *work, const real *wrench,
                       const fl_policy *policy, real force[][2], real *ray_share,
                       real *most_ray_share) {
-  const size_t size_of_sets = (size_t)COUNT(block) * sizeof *work->kept;
+  const size_t size_of_sets = (size_t)COUNT(block) * sizeof *work->set_before;
   const int most_parts = most_parts_of(block, work);
   real score[FL_SCORES];
   real best[FL_SCORES] = {0};
   real force_part[FL_MOST][2];
   int depth = 0;
   int has_found = 0; /* a part whose best answer lies in no gap */
-  memcpy(work->kept, work->set, sizeof work->kept);
-  work->close = CLOSE_BY;
+  memcpy(work->set_before, work->set, sizeof work->set_before);
+  work->distance_enough = CLOSE_BY;
   serve(block, work, wrench, policy, force_part, score);
   *most_ray_share = 1 - score[1];
-  work->close = ROUGHLY;
+  work->distance_enough = ROUGHLY;
   for (int parts = 0;; parts += 2) {
     const int gap = fl_worst_gap(block, work, force_part, 0);
     if (gap < 0 || !has_found) { /* of parts with a gap the last one, until there is one without */
@@ -312,12 +313,12 @@ static void best_part(const real *block, fl_work *work, const real *wrench,
     }
     node = last_better_cut(block, work, &depth, best);
     if (!node || parts >= most_parts) break;
-    fl_take_side(block, work, node, -node->first);
+    fl_take_side(block, work, node, -node->first_side);
     serve(block, work, wrench, policy, force_part, score);
   }
   fl_restore_sets(block, work, work->best_set);
-  work->close = CLOSE_BY;
-  if (!are_same(work->best_set, work->kept, size_of_sets)) {
+  work->distance_enough = CLOSE_BY;
+  if (!are_same(work->best_set, work->set_before, size_of_sets)) {
     serve(block, work, wrench, policy, force, best);
   }
   *ray_share = 1 - best[1];
@@ -327,7 +328,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench,
    axes that have it but for what tables are off. */
 static void wrench_wanted_of(const real *block, const fl_work *work, const real *wrench,
                              real force[][2], real *wanted) {
-  const real *scale = HEAD(block)->yard;
+  const real *scale = HEAD(block)->wrench_scale;
   fl_wrench_of_forces(block, work, force, wanted);
   for (int k = 0; k < 6; k++) {
     if (FABS(wanted[k] - wrench[k]) <= FINE * scale[k]) wanted[k] = wrench[k];
@@ -339,19 +340,20 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
                              fl_answer *out) {
   if (status == FL_BEYOND) return;
   const size_t size = (size_t)COUNT(block) * sizeof out->force[0];
-  fl_state *state = work->now;
+  fl_state *state = work->state_found;
   /* those of all sets prove more than those of a part */
-  memcpy(out->inner, state->price, sizeof out->inner);
-  const int gap = fl_worst_gap(block, work, state->force, state->price);
+  memcpy(out->lambda_reduced, state->lambda_reduced, sizeof out->lambda_reduced);
+  const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
   if (gap < 0) {
     if (status == FL_MET) memcpy(out->force, state->force, size);
     return;
   }
   real bound;
   if (!fl_search_gaps(block, work, target, status, &bound)) return;
-  memcpy(out->force, work->best, size);
-  out->value = 0;
-  if (!work->turns) out->value = bound * (1 - FINE); /* with turning it is more than power */
+  memcpy(out->force, work->best_force, size);
+  out->gap_power_bound = 0;
+  if (!work->has_turn_cost)
+    out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
 }
 
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench,
@@ -370,17 +372,19 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench,
   real wanted[6];
   wrench_wanted_of(block, work, wrench, force, wanted);
   cheapest_forces(block, work, force, inside, wanted, out);
-  fl_restore_sets(block, work, work->kept);
+  fl_restore_sets(block, work, work->set_before);
   if (!fl_may_have_gaps(block, work, out->force)) return;
 
   real target[6];
-  fl_reduce_wrench(work, out->aim, target); /* another part of the sets may give it for less */
+  fl_reduce_wrench(work, out->wrench_served,
+                   target); /* another part of the sets may give it for less */
   const int status = fl_dual_newton(block, work, target, 0, MOST_STEPS);
-  if (!work->drags) {
+  if (!work->has_drag) {
     cheapen_by_parts(block, work, target, status, out);
     return;
   }
-  for (int k = 0; k < 6; k++) work->aim[k] = out->aim[k] + work->span.beside[k];
+  for (int k = 0; k < 6; k++)
+    work->wrench_target[k] = out->wrench_served[k] + work->span.wrench_offset[k];
   const int is_met = fl_answer_with_drag(block, work, target, status, out);
   if (!keeps_direction) return;
   const real found = (real)is_met * ray_share;

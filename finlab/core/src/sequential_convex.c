@@ -18,11 +18,11 @@ static void forces_of_commands(const fl_whole *w, const real *block, const fl_sp
     const fl_actuator *a = ACTUATOR(block, i);
     memset(force[i], 0, sizeof force[i]);
     memset(body[i], 0, sizeof body[i]);
-    if (span->lost[i]) continue;
+    if (span->is_lost[i]) continue;
     if (!fl_is_in_dead_band(a, command[i])) fl_force_of_command(block, i, command[i], force[i], 0);
     for (int c = 0; c < 3; c++) {
       real along = force[i][c];
-      if (a->form == FL_FOIL && c == 1) along += a->pressure * a->rest;
+      if (a->command_kind == FL_FOIL && c == 1) along += a->pressure_area * a->zero_lift_drag;
       const real *axis = w->frames + 9 * i + 3 * c;
       for (int b = 0; b < 3; b++) body[i][b] += along * axis[b];
     }
@@ -45,8 +45,8 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
   forces_of_commands(w, block, span, command, force, body);
   w->effect(w->known, *body, 1, w->inflow, *unused, offset, **slope);
   for (int k = 0; k < 6; k++) {
-    head->beside[k] = HEAD(w->plain)->beside[k] + w->counts[k] * offset[k];
-    residual[k] = (wrench[k] - head->beside[k]) / head->yard[k];
+    head->wrench_offset[k] = HEAD(w->plain)->wrench_offset[k] + w->axis_counts[k] * offset[k];
+    residual[k] = (wrench[k] - head->wrench_offset[k]) / head->wrench_scale[k];
   }
   for (int i = 0; i < n; i++) {
     const fl_actuator *plain = ACTUATOR(w->plain, i);
@@ -56,16 +56,17 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
       for (int k = 0; k < 6; k++) {
         const real along =
             axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] + axis[2] * slope[i][2][k];
-        const real more = w->counts[k] * along;
-        linear->own[c][k] = plain->own[c][k] + more / head->yard[k];
-        head->beside[k] -= force[i][c] * more;
-        residual[k] -= force[i][c] * plain->own[c][k];
+        const real more = w->axis_counts[k] * along;
+        linear->effectiveness_normalized[c][k] =
+            plain->effectiveness_normalized[c][k] + more / head->wrench_scale[k];
+        head->wrench_offset[k] -= force[i][c] * more;
+        residual[k] -= force[i][c] * plain->effectiveness_normalized[c][k];
       }
     }
   }
   fl_offset_wrench(block, &work->span);
   for (int k = 0; k < 6; k++) {
-    if (!span->counts[k]) residual[k] = 0;
+    if (!span->axis_counts[k]) residual[k] = 0;
   }
   return SQRT(dot(residual, residual, 6));
 }
@@ -75,13 +76,13 @@ static void command_fins_by_force(const fl_whole *w, real *block) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *plain = ACTUATOR(w->plain, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
-    if (plain->form != FL_FIN) continue;
-    const real low[3] = {plain->middle - plain->half, plain->low};
-    const real high[3] = {plain->middle + plain->half, plain->high};
-    a->form = FL_POD;
-    a->turns = plain->half >= PI;
-    memcpy(a->lower, low, sizeof low);
-    memcpy(a->upper, high, sizeof high);
+    if (plain->command_kind != FL_FIN) continue;
+    const real low[3] = {plain->sector_center - plain->sector_half_angle, plain->force_min};
+    const real high[3] = {plain->sector_center + plain->sector_half_angle, plain->force_max};
+    a->command_kind = FL_POD;
+    a->is_free_angle = plain->sector_half_angle >= PI;
+    memcpy(a->command_min, low, sizeof low);
+    memcpy(a->command_max, high, sizeof high);
   }
 }
 
@@ -90,11 +91,11 @@ static void command_fins_by_law(const fl_whole *w, real *block) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *plain = ACTUATOR(w->plain, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
-    if (plain->form != FL_FIN) continue;
-    a->form = FL_FIN;
-    a->turns = plain->turns;
-    memcpy(a->lower, plain->lower, sizeof a->lower);
-    memcpy(a->upper, plain->upper, sizeof a->upper);
+    if (plain->command_kind != FL_FIN) continue;
+    a->command_kind = FL_FIN;
+    a->is_free_angle = plain->is_free_angle;
+    memcpy(a->command_min, plain->command_min, sizeof a->command_min);
+    memcpy(a->command_max, plain->command_max, sizeof a->command_max);
   }
 }
 
@@ -112,7 +113,7 @@ static real step_to_wrench(const fl_whole *w, real *block, fl_work *work, const 
     real residual_stepped[6];
     memcpy(stepped, command, size);
     for (int c = 0; c < 6; c++) {
-      nearer[c] = wrench[c] - (1 - share) * residual[c] * HEAD(block)->yard[c];
+      nearer[c] = wrench[c] - (1 - share) * residual[c] * HEAD(block)->wrench_scale[c];
     }
     fl_refine_commands(block, work, box, nearer, stepped, 1);
     const real error_stepped = linearize_at(w, block, work, wrench, stepped, residual_stepped);
@@ -157,7 +158,7 @@ static int answer_linear(real *block, fl_work *work, const fl_question *q, int i
    that makes an exact penalty. */
 static real penalty_at(const real *block, const real *lambda) {
   real scaled[6];
-  for (int k = 0; k < 6; k++) scaled[k] = lambda[k] * HEAD(block)->yard[k];
+  for (int k = 0; k < 6; k++) scaled[k] = lambda[k] * HEAD(block)->wrench_scale[k];
   return 2 * SQRT(dot(scaled, scaled, 6));
 }
 
@@ -197,7 +198,7 @@ int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *
   real lambda[6];
   real penalty = end[1];
   real steps = 0;
-  work->refined = 0;
+  work->refine_steps = 0;
   if (previous)
     command_fins_by_law(w, block);
   else
@@ -211,11 +212,11 @@ int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *
   real power = fl_power_of_commands(block, work, command, force);
 
   for (int turn = 0; turn < turns; turn++) {
-    if (turn > 0 && !(steps + (real)work->refined < most_steps)) break;
+    if (turn > 0 && !(steps + (real)work->refine_steps < most_steps)) break;
     const int code = answer_linear(block, work, &q, turn == 0, &answer);
     if (code) return code;
-    steps += (real)answer.steps;
-    penalty = fl_larger(penalty, penalty_at(block, answer.price));
+    steps += (real)answer.newton_steps;
+    penalty = fl_larger(penalty, penalty_at(block, answer.prices));
     const real merit = power + penalty * error;
     if (turn == 0) *out = answer;
     box_now(block, work, &q, &box);
@@ -242,15 +243,15 @@ int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *
       error = error_stepped;
       *out = answer;
       memcpy(force, force_stepped, size_of_forces);
-      memcpy(lambda, out->price, sizeof lambda);
-      q.price = lambda;
+      memcpy(lambda, out->prices, sizeof lambda);
+      q.prices = lambda;
     }
     if (!is_better || merit - power - penalty * error <= CLOSE / 2 * merit) break;
   }
   end[0] = power;
   end[1] = penalty;
   end[2] = error;
-  end[3] = steps + (real)work->refined;
+  end[3] = steps + (real)work->refine_steps;
   if (turns == 0) return 0;
   command_fins_by_law(w, block);
   box_now(block, work, &q, &box);

@@ -13,23 +13,23 @@
 
 /* Angle of a force from the middle of its arc. */
 static real angle_from_middle(const fl_set *set, const real *force) {
-  return fl_wrap_angle(ATAN2(force[1], force[0]) - set->middle);
+  return fl_wrap_angle(ATAN2(force[1], force[0]) - set->sector_center);
 }
 
 /* Whether a force of a size and at an angle from a direction is one of the sector that a
    plane gives around it. */
 static int is_in_sector(const fl_set *set, real angle, real size, real largest, real rounding) {
-  return FABS(fl_wrap_angle(angle)) - set->half <= CLOSE && size <= largest + rounding;
+  return FABS(fl_wrap_angle(angle)) - set->sector_half_angle <= CLOSE && size <= largest + rounding;
 }
 
 /* How far a plane's force is from all that it can give forward and in reverse. */
 static real gap_between_ways(const fl_actuator *a, const fl_set *set, const real *force,
                              real size) {
   const real angle = angle_from_middle(set, force);
-  const real rounding = NEARLY * a->most[0];
+  const real rounding = NEARLY * a->row_force_max[0];
   if (size <= rounding) return 0;
-  if (is_in_sector(set, angle, size, set->high, rounding)) return 0;
-  if (is_in_sector(set, angle + PI, size, set->reverse, rounding)) return 0;
+  if (is_in_sector(set, angle, size, set->force_max, rounding)) return 0;
+  if (is_in_sector(set, angle + PI, size, set->force_max_reverse, rounding)) return 0;
   return PI;
 }
 
@@ -37,23 +37,24 @@ static real gap_between_ways(const fl_actuator *a, const fl_set *set, const real
    it; 0 where it is not. */
 static real gap_in_band(const fl_actuator *a, const fl_set *set, const real *force) {
   const real size = size_of(force);
-  if (!(a->band > 0)) return 0;
-  if (size >= a->band * (1 - NOTHING) || size <= NOTHING * a->most[0]) return 0;
-  const int pushes = set->high > 0 || set->reverse > 0;
-  if (set->low >= a->band || !pushes) return 0;
-  return 1 - size / a->band;
+  if (!(a->dead_band > 0)) return 0;
+  if (size >= a->dead_band * (1 - NOTHING) || size <= NOTHING * a->row_force_max[0]) return 0;
+  const int pushes = set->force_max > 0 || set->force_max_reverse > 0;
+  if (set->force_min >= a->dead_band || !pushes) return 0;
+  return 1 - size / a->dead_band;
 }
 
 /* The same of a line, 1 or 0; of a foil how far its drag is above that of its lift. */
 static real gap_of_line(const real *block, const fl_actuator *a, int i, const fl_set *set,
                         const real *force) {
-  if (a->speed > 0) {
-    const real above = (force[1] - fl_drag_of_lift(block, i, force[0])) / a->most[1];
+  if (a->flow_speed > 0) {
+    const real above = (force[1] - fl_drag_of_lift(block, i, force[0])) / a->row_force_max[1];
     if (above > HOLLOW) return above;
     return 0;
   }
   const real size = FABS(force[0]);
-  return size < a->band * (1 - NOTHING) && size > NOTHING * a->most[0] && set->low < set->high;
+  return size < a->dead_band * (1 - NOTHING) && size > NOTHING * a->row_force_max[0] &&
+         set->force_min < set->force_max;
 }
 
 /* How far a force is in a gap of its set; 0 where it is not. One that comes from multipliers
@@ -62,29 +63,30 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
                const real *lambda) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_set *set = work->set + i;
-  if (set->turn > 0 && lambda) {
-    if (set->jumps) return PI;
+  if (set->turn_cost > 0 && lambda) {
+    if (set->has_jumped) return PI;
     return gap_in_band(a, set, force);
   }
   if (!is_plane(a)) return gap_of_line(block, a, i, set, force);
 
   const real size = size_of(force);
   real amount = gap_in_band(a, set, force);
-  if (set->reverse > 0 && !lambda) return fl_larger(gap_between_ways(a, set, force, size), amount);
-  const int is_hollow = set->low > HOLLOW * largest;
-  if (!lambda && set->half > FLAT && is_hollow && size < set->low * (1 - NEARLY))
-    amount += 1 - size / set->low;
-  if (set->half > NARROW) {
-    const real beyond_end = FABS(angle_from_middle(set, force)) - set->half;
-    if (beyond_end > CLOSE && size > NEARLY * a->most[0]) amount += beyond_end;
-    if (is_hollow && size < SHORTER * set->low) amount += 1 - size / set->low;
+  if (set->force_max_reverse > 0 && !lambda)
+    return fl_larger(gap_between_ways(a, set, force, size), amount);
+  const int is_hollow = set->force_min > HOLLOW * largest;
+  if (!lambda && set->sector_half_angle > FLAT && is_hollow && size < set->force_min * (1 - NEARLY))
+    amount += 1 - size / set->force_min;
+  if (set->sector_half_angle > NARROW) {
+    const real beyond_end = FABS(angle_from_middle(set, force)) - set->sector_half_angle;
+    if (beyond_end > CLOSE && size > NEARLY * a->row_force_max[0]) amount += beyond_end;
+    if (is_hollow && size < SHORTER * set->force_min) amount += 1 - size / set->force_min;
   }
-  if (set->reverse > 0) {
+  if (set->force_max_reverse > 0) {
     real s[2];
     real between;
-    own_price(work, i, lambda, s);
+    actuator_price(work, i, lambda, s);
     const int is_ahead = fl_undecided(block, i, set, s, &between);
-    if (between > CLOSE * a->most[0]) return PI;
+    if (between > CLOSE * a->row_force_max[0]) return PI;
     if (!is_ahead) return 0;
   }
   return amount;
@@ -116,9 +118,9 @@ int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const 
 }
 
 int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]) {
-  if (!work->quick) return 1;
+  if (!work->is_convex) return 1;
   for (int i = 0; i < COUNT(block); i++) {
-    const int is_short = size_of(force[i]) < SHORTER * work->set[i].low;
+    const int is_short = size_of(force[i]) < SHORTER * work->set[i].force_min;
     if (is_plane(ACTUATOR(block, i)) && is_short) return 1;
   }
   return 0;
@@ -132,24 +134,24 @@ static int sign_of(int is_positive) {
 /* The side (-1, 1) of a gap on which a force is rather. */
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (a->speed > 0) return sign_of(!(force[0] < (set->low + set->high) / 2));
-  if (!is_plane(a)) return sign_of(FABS(force[0]) > a->band / 2);
-  if (gap_in_band(a, set, force) > 0) return sign_of(size_of(force) > a->band / 2);
-  if (set->half >= PI && set->reverse == 0 && !set->jumps) return 1;
+  if (a->flow_speed > 0) return sign_of(!(force[0] < (set->force_min + set->force_max) / 2));
+  if (!is_plane(a)) return sign_of(FABS(force[0]) > a->dead_band / 2);
+  if (gap_in_band(a, set, force) > 0) return sign_of(size_of(force) > a->dead_band / 2);
+  if (set->sector_half_angle >= PI && set->force_max_reverse == 0 && !set->has_jumped) return 1;
   const real angle = angle_from_middle(set, force);
-  if (set->reverse > 0) return sign_of(!(COS(angle) < 0));
-  if (set->jumps) return sign_of(!(ATAN2(force[1], force[0]) < set->cut));
+  if (set->force_max_reverse > 0) return sign_of(!(COS(angle) < 0));
+  if (set->has_jumped) return sign_of(!(ATAN2(force[1], force[0]) < set->jump_angle));
   return sign_of(!(angle < 0));
 }
 
 /* Turns a set round: what it pushed in reverse is what it pushes now. */
 static void turn_round(fl_set *set) {
-  set->high = set->reverse;
-  set->high_cost = set->reverse_cost;
-  set->reverse = 0;
-  set->middle += PI;
-  set->at += PI;
-  set->flipped = 1;
+  set->force_max = set->force_max_reverse;
+  set->cost_at_max = set->cost_at_max_reverse;
+  set->force_max_reverse = 0;
+  set->sector_center += PI;
+  set->turn_origin += PI;
+  set->is_flipped = 1;
 }
 
 /* Keeps of a plane with a dead band what is beyond the band on the side of a force (1), or
@@ -157,21 +159,21 @@ static void turn_round(fl_set *set) {
 static void narrow_by_band(const real *block, int i, fl_set *set, const real *force, int side) {
   const fl_actuator *a = ACTUATOR(block, i);
   const int points_back = COS(angle_from_middle(set, force)) < 0;
-  const int is_back = set->reverse > 0 && (set->high == 0 || points_back);
+  const int is_back = set->force_max_reverse > 0 && (set->force_max == 0 || points_back);
   if (side > 0) {
     if (is_back) turn_round(set);
-    set->reverse = 0;
-    set->low = a->band;
-    real edge = a->band;
-    if (set->flipped) edge = -edge;
-    set->low_cost = fl_power_of_force(block, i, edge);
+    set->force_max_reverse = 0;
+    set->force_min = a->dead_band;
+    real edge = a->dead_band;
+    if (set->is_flipped) edge = -edge;
+    set->cost_at_min = fl_power_of_force(block, i, edge);
     return;
   }
   if (is_back)
-    set->reverse = 0;
+    set->force_max_reverse = 0;
   else {
-    set->high = 0;
-    set->high_cost = set->low_cost;
+    set->force_max = 0;
+    set->cost_at_max = set->cost_at_min;
   }
 }
 
@@ -180,45 +182,46 @@ static void narrow_by_band(const real *block, int i, fl_set *set, const real *fo
    its two answers, and where a force lies on the chord of the least ones at its angle, as
    the best one is mostly there. */
 static void narrow_by_angle(fl_set *set, const real *force, int side) {
-  real low = set->middle - set->half;
-  real high = set->middle + set->half;
-  if (set->turn > 0 && set->half >= PI) {
-    low = set->at - PI;
-    high = set->at + PI;
+  real low = set->sector_center - set->sector_half_angle;
+  real high = set->sector_center + set->sector_half_angle;
+  if (set->turn_cost > 0 && set->sector_half_angle >= PI) {
+    low = set->turn_origin - PI;
+    high = set->turn_origin + PI;
   }
-  if (set->jumps) {
+  if (set->has_jumped) {
     if (side < 0)
-      high = set->cut;
+      high = set->jump_angle;
     else
-      low = set->cut;
-    set->middle = (low + high) / 2;
-    set->half = (high - low) / 2;
+      low = set->jump_angle;
+    set->sector_center = (low + high) / 2;
+    set->sector_half_angle = (high - low) / 2;
     return;
   }
   const real angle = ATAN2(force[1], force[0]);
-  const real cut = fl_wrap_angle(angle - set->middle);
-  const int is_on_chord =
-      set->low > 0 && set->half < PI / 2 && FABS(cut) < ON_CHORD * set->half;
+  const real cut = fl_wrap_angle(angle - set->sector_center);
+  const int is_on_chord = set->force_min > 0 && set->sector_half_angle < PI / 2 &&
+                          FABS(cut) < ON_CHORD * set->sector_half_angle;
   if (is_on_chord) {
-    real from = -set->half;
-    real to = set->half;
+    real from = -set->sector_half_angle;
+    real to = set->sector_half_angle;
     if (side < 0)
       to = cut;
     else
       from = cut;
-    set->middle = fl_wrap_angle(set->middle + (from + to) / 2);
-    set->half = (to - from) / 2;
-    set->at = set->middle + fl_wrap_angle(set->at - set->middle);
+    set->sector_center = fl_wrap_angle(set->sector_center + (from + to) / 2);
+    set->sector_half_angle = (to - from) / 2;
+    set->turn_origin = set->sector_center + fl_wrap_angle(set->turn_origin - set->sector_center);
     return;
   }
-  if (set->half >= PI) {
+  if (set->sector_half_angle >= PI) {
     real turned = PI;
     if (side > 0) turned = 0;
-    set->middle = fl_wrap_angle(angle + turned);
+    set->sector_center = fl_wrap_angle(angle + turned);
   } else
-    set->middle = fl_wrap_angle(set->middle + (real)side * set->half / 2);
-  set->half /= 2;
-  set->at = set->middle + fl_wrap_angle(set->at - set->middle);
+    set->sector_center =
+        fl_wrap_angle(set->sector_center + (real)side * set->sector_half_angle / 2);
+  set->sector_half_angle /= 2;
+  set->turn_origin = set->sector_center + fl_wrap_angle(set->turn_origin - set->sector_center);
 }
 
 /* Keeps of a line what is beyond its dead band on the side of a force (1), or all else (-1);
@@ -227,20 +230,20 @@ static void narrow_line(const real *block, int i, fl_set *set, const real *force
   const fl_actuator *a = ACTUATOR(block, i);
   real edge = 0;
   int is_above = (side > 0) == (force[0] > 0);
-  if (a->speed > 0) {
+  if (a->flow_speed > 0) {
     edge = force[0];
     is_above = side > 0;
   } else if (side > 0) {
-    edge = a->band;
+    edge = a->dead_band;
     if (!(force[0] > 0)) edge = -edge;
   }
   const real cost = fl_power_of_force(block, i, edge);
   if (is_above) {
-    set->low = edge;
-    set->low_cost = cost;
+    set->force_min = edge;
+    set->cost_at_min = cost;
   } else {
-    set->high = edge;
-    set->high_cost = cost;
+    set->force_max = edge;
+    set->cost_at_max = cost;
   }
 }
 
@@ -252,12 +255,12 @@ void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int
     narrow_line(block, i, set, force, side);
   else if (gap_in_band(a, set, force) > 0)
     narrow_by_band(block, i, set, force, side);
-  else if (set->reverse > 0) {
+  else if (set->force_max_reverse > 0) {
     if (side < 0) turn_round(set);
-    set->reverse = 0;
+    set->force_max_reverse = 0;
   } else
     narrow_by_angle(set, force, side);
-  set->jumps = 0;
+  set->has_jumped = 0;
   fl_prepare_set(block, i, set);
 }
 
@@ -266,17 +269,17 @@ fl_node *fl_cut_set(const real *block, fl_work *work, int *depth, int cut, const
   if (*depth >= FL_DEPTH_OF(COUNT(block))) return 0;
   fl_node *node = work->node + *depth;
   ++*depth;
-  node->before = work->set[cut];
-  node->cut = cut;
-  node->both = 0;
+  node->set_before = work->set[cut];
+  node->actuator = cut;
+  node->has_both_sides = 0;
   node->force[0] = force[0];
   node->force[1] = force[1];
   return node;
 }
 
 void fl_take_side(const real *block, fl_work *work, const fl_node *node, int side) {
-  work->set[node->cut] = node->before;
-  fl_narrow_set(block, node->cut, work->set + node->cut, node->force, side);
+  work->set[node->actuator] = node->set_before;
+  fl_narrow_set(block, node->actuator, work->set + node->actuator, node->force, side);
   fl_prepare_sets(block, work);
 }
 
@@ -284,9 +287,9 @@ void fl_take_side(const real *block, fl_work *work, const fl_node *node, int sid
 fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth) {
   for (; *depth > 0; --*depth) {
     fl_node *node = work->node + *depth - 1;
-    work->set[node->cut] = node->before;
-    if (!node->both) {
-      node->both = 1;
+    work->set[node->actuator] = node->set_before;
+    if (!node->has_both_sides) {
+      node->has_both_sides = 1;
       return node;
     }
   }
@@ -296,8 +299,9 @@ fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth) {
 
 /* Freezes a plane at its least force, in the direction of a force or next to it in its arc. */
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force) {
-  const real angle = fl_clipped(angle_from_middle(set, force), -set->half, set->half);
-  const real direction = set->middle + angle;
-  const real least[2] = {set->low * COS(direction), set->low * SIN(direction)};
+  const real angle =
+      fl_clipped(angle_from_middle(set, force), -set->sector_half_angle, set->sector_half_angle);
+  const real direction = set->sector_center + angle;
+  const real least[2] = {set->force_min * COS(direction), set->force_min * SIN(direction)};
   fl_fix_force(block, i, set, least);
 }

@@ -54,7 +54,7 @@ static const fl_actuator *actuators_of(const fl_real *block) {
 static inline double distance(const fl_real *block, const fl_real *a, const fl_real *b) {
   double squared = 0;
   for (int k = 0; k < 6; k++) {
-    const double apart = ((double)a[k] - (double)b[k]) / (double)head_of(block)->yard[k];
+    const double apart = ((double)a[k] - (double)b[k]) / (double)head_of(block)->wrench_scale[k];
     squared += apart * apart;
   }
   return sqrt(squared);

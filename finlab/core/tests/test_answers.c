@@ -20,8 +20,8 @@ static int wrench_of(const golden_robot *robot, const fl_answer *answer, fl_real
     const fl_real *command = answer->command[i];
     fl_real force[2] = {command[0], 0};
     int directions = 1;
-    if (actuators[i].form == FL_FIN) return 0;
-    if (actuators[i].form == FL_POD) {
+    if (actuators[i].command_kind == FL_FIN) return 0;
+    if (actuators[i].command_kind == FL_POD) {
       force[0] = command[1] * (fl_real)cos((double)command[0]);
       force[1] = command[1] * (fl_real)sin((double)command[0]);
       directions = 2;
@@ -40,7 +40,7 @@ static void test_within_reach(const golden_robot *robot, int k) {
   fl_answer answer;
   memcpy(question.wrench, golden->within, sizeof question.wrench);
   CHECK(fl_answer_one(robot->block, &work, &question, &answer) == FL_OK, robot->name, k);
-  CHECK(answer.within, robot->name, k);
+  CHECK(answer.is_attainable, robot->name, k);
   CHECK((double)answer.error <= met, robot->name, k);
 
   fl_real wrench[6];
@@ -50,8 +50,8 @@ static void test_within_reach(const golden_robot *robot, int k) {
   /* The dual value proves a bound of the power, and the parts of sets with gaps a higher one. */
   fl_real force[FL_MOST][2];
   const double dual_value =
-      (double)fl_look(robot->block, &work, golden->within, answer.inner, *force);
-  const double bound = fmax(dual_value, (double)answer.value);
+      (double)fl_dual_value(robot->block, &work, golden->within, answer.lambda_reduced, *force);
+  const double bound = fmax(dual_value, (double)answer.gap_power_bound);
   double slack = optimal_with_gaps * golden->power;
   if (robot->has_no_gaps) slack = optimal * golden->power;
   CHECK(fabs(bound - golden->power) <= slack, robot->name, k);
@@ -63,7 +63,7 @@ static void ask_beyond(const golden_robot *robot, int k, int kind, fl_answer *an
   memcpy(question.wrench, robot->questions[k].beyond, sizeof question.wrench);
   question.policy = &policy;
   CHECK(fl_answer_one(robot->block, &work, &question, answer) == FL_OK, robot->name, k);
-  CHECK(!answer->within, robot->name, k);
+  CHECK(!answer->is_attainable, robot->name, k);
   CHECK((double)answer->error <= 10 * met, robot->name, k);
 }
 
@@ -75,20 +75,20 @@ static void test_direction(const golden_robot *robot, int k) {
   double squared = 0;
   fl_real on_ray[6];
   for (int c = 0; c < 6; c++) {
-    along += (double)answer.aim[c] * (double)golden->beyond[c];
+    along += (double)answer.wrench_served[c] * (double)golden->beyond[c];
     squared += (double)golden->beyond[c] * (double)golden->beyond[c];
   }
   const double share = along / squared;
   for (int c = 0; c < 6; c++) on_ray[c] = (fl_real)share * golden->beyond[c];
   CHECK(fabs(share - golden->ray_share) <= optimal * golden->ray_share, robot->name, k);
-  CHECK(distance(robot->block, on_ray, answer.aim) <= 10 * met, robot->name, k);
+  CHECK(distance(robot->block, on_ray, answer.wrench_served) <= 10 * met, robot->name, k);
 }
 
 static void test_closest(const golden_robot *robot, int k) {
   const golden_question *golden = &robot->questions[k];
   fl_answer answer;
   ask_beyond(robot, k, FL_CLOSEST, &answer);
-  const double miss = distance(robot->block, answer.aim, golden->beyond);
+  const double miss = distance(robot->block, answer.wrench_served, golden->beyond);
   CHECK(fabs(miss - golden->miss) <= optimal * golden->miss + by_polygons, robot->name, k);
 }
 
@@ -96,7 +96,7 @@ static void test_closest(const golden_robot *robot, int k) {
 static double miss_in(const fl_real *block, const fl_real *a, const fl_real *b, int first) {
   double squared = 0;
   for (int k = first; k < first + 3; k++) {
-    const double apart = ((double)a[k] - (double)b[k]) / (double)head_of(block)->yard[k];
+    const double apart = ((double)a[k] - (double)b[k]) / (double)head_of(block)->wrench_scale[k];
     squared += apart * apart;
   }
   return sqrt(squared);
@@ -114,10 +114,10 @@ static void test_groups(const golden_robot *robot, int k) {
   memcpy(question.wrench, beyond, sizeof question.wrench);
   question.policy = &policy;
   CHECK(fl_answer_one(robot->block, &work, &question, &forces_first) == FL_OK, robot->name, k);
-  const double first = miss_in(robot->block, forces_first.aim, beyond, 0);
-  const double first_closest = miss_in(robot->block, closest.aim, beyond, 0);
-  const double second = miss_in(robot->block, forces_first.aim, beyond, 3);
-  const double second_closest = miss_in(robot->block, closest.aim, beyond, 3);
+  const double first = miss_in(robot->block, forces_first.wrench_served, beyond, 0);
+  const double first_closest = miss_in(robot->block, closest.wrench_served, beyond, 0);
+  const double second = miss_in(robot->block, forces_first.wrench_served, beyond, 3);
+  const double second_closest = miss_in(robot->block, closest.wrench_served, beyond, 3);
   CHECK(first <= first_closest + by_polygons, robot->name, k);
   CHECK(second >= second_closest - by_polygons, robot->name, k);
 }
@@ -127,7 +127,7 @@ static void test_priority(const golden_robot *robot, int k) {
   const golden_question *golden = &robot->questions[k];
   fl_answer answer;
   ask_beyond(robot, k, FL_PRIORITY, &answer);
-  const double miss = distance(robot->block, answer.aim, golden->beyond);
+  const double miss = distance(robot->block, answer.wrench_served, golden->beyond);
   CHECK(fabs(miss - golden->miss) <= optimal * golden->miss + by_polygons, robot->name, k);
 }
 

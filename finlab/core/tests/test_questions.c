@@ -36,7 +36,7 @@ static void test_damaged_blocks_are_refused(const golden_robot *robot) {
   head->version += 1;
   CHECK(fl_check(block, robot->length) == FL_BAD_VERSION, robot->name, 0);
   head->version -= 1;
-  head->yard[3] = (fl_real)NAN;
+  head->wrench_scale[3] = (fl_real)NAN;
   CHECK(fl_check(block, robot->length) == FL_BAD_NUMBER, robot->name, 0);
 }
 
@@ -57,15 +57,15 @@ static void test_numbers_that_are_none_are_refused(const golden_robot *robot) {
   question.policy = &unknown;
   CHECK(ask(robot, &question) == FL_BAD_ARGUMENT, robot->name, 0);
   question = question_of(robot, 0); /* and the work area is as good as before */
-  CHECK(ask(robot, &question) == FL_OK && answer.within, robot->name, 0);
+  CHECK(ask(robot, &question) == FL_OK && answer.is_attainable, robot->name, 0);
 }
 
 static void check_limits(const golden_robot *robot, int k) {
   const fl_actuator *a = actuators_of(robot->block);
   for (int i = 0; i < (int)head_of(robot->block)->n; i++) {
     for (int c = 0; c < 3; c++) {
-      CHECK(answer.command[i][c] >= a[i].lower[c], robot->name, k);
-      CHECK(answer.command[i][c] <= a[i].upper[c], robot->name, k);
+      CHECK(answer.command[i][c] >= a[i].command_min[c], robot->name, k);
+      CHECK(answer.command[i][c] <= a[i].command_max[c], robot->name, k);
     }
   }
 }
@@ -76,9 +76,9 @@ static void check_rates(const golden_robot *robot, fl_real previous[][3], int k)
   for (int i = 0; i < (int)head_of(robot->block)->n; i++) {
     for (int c = 0; c < 3; c++) {
       double change = (double)answer.command[i][c] - (double)previous[i][c];
-      const int is_free_angle = a[i].form == FL_POD && c == 0 && a[i].turns != 0;
+      const int is_free_angle = a[i].command_kind == FL_POD && c == 0 && a[i].is_free_angle != 0;
       if (is_free_angle) change = remainder(change, 2 * acos(-1.0));
-      CHECK(fabs(change) <= (double)a[i].step[c] * (1 + 1e-5) + 1e-6, robot->name, k);
+      CHECK(fabs(change) <= (double)a[i].max_change[c] * (1 + 1e-5) + 1e-6, robot->name, k);
     }
   }
 }
@@ -129,10 +129,10 @@ static void test_free_axes_cost_no_more(const golden_robot *robot) {
     fl_real force[FL_MOST][2];
     fl_question question = question_of(robot, k);
     question.free = free;
-    CHECK(ask(robot, &question) == FL_OK && answer.within, robot->name, k);
+    CHECK(ask(robot, &question) == FL_OK && answer.is_attainable, robot->name, k);
     CHECK((double)answer.error <= met, robot->name, k);
     const double bound =
-        (double)fl_look(robot->block, &work, question.wrench, answer.inner, *force);
+        (double)fl_dual_value(robot->block, &work, question.wrench, answer.lambda_reduced, *force);
     CHECK(bound <= robot->questions[k].power * (1 + optimal), robot->name, k);
   }
 }

@@ -27,7 +27,7 @@ static double apart(const fl_real *a, const fl_real *b, const unsigned char *axe
   double sum = 0;
   for (int k = 0; k < 6; k++) {
     if (!axes[k]) continue;
-    double way = ((double)a[k] - (double)b[k]) / (double)((const fl_head *)robot)->yard[k];
+    double way = ((double)a[k] - (double)b[k]) / (double)((const fl_head *)robot)->wrench_scale[k];
     sum += way * way;
   }
   return sqrt(sum);
@@ -36,7 +36,7 @@ static double apart(const fl_real *a, const fl_real *b, const unsigned char *axe
 static int outside(void) {
   for (int i = 0; i < ROBOT_COUNT; i++)
     for (int k = 0; k < 3; k++)
-      if (!(out.command[i][k] >= ROBOT_ACTUATOR(i)->lower[k] && out.command[i][k] <= ROBOT_ACTUATOR(i)->upper[k])) return 1;
+      if (!(out.command[i][k] >= ROBOT_ACTUATOR(i)->command_min[k] && out.command[i][k] <= ROBOT_ACTUATOR(i)->command_max[k])) return 1;
   return 0;
 }
 
@@ -44,10 +44,10 @@ static int outside(void) {
 static int is_other(const sample *s) {
   for (int i = 0; i < ROBOT_COUNT; i++) {
     const fl_actuator *a = ROBOT_ACTUATOR(i);
-    if (size_of(out.force[i]) <= a->most[0] / 100) continue;
+    if (size_of(out.force[i]) <= a->row_force_max[0] / 100) continue;
     for (int k = 0; k < 3; k++) {
-      fl_real way = out.command[i][k] - s->command[i][k], width = a->upper[k] - a->lower[k];
-      if (a->turns != 0 && width > 6) way = fl_wrap_angle(way);
+      fl_real way = out.command[i][k] - s->command[i][k], width = a->command_max[k] - a->command_min[k];
+      if (a->is_free_angle != 0 && width > 6) way = fl_wrap_angle(way);
       if (FABS(way) > width / 20) return 1;
     }
   }
@@ -58,10 +58,10 @@ static int is_other(const sample *s) {
    of `direction` where foils drag, whose share is the last one that a search meets. */
 static double farther(const sample *s) {
   double most = 0;
-  if (s->policy == FL_DIRECTION) return apart(out.aim, s->aim, all) / (work.drags ? 10 : 1);
-  if (s->policy == FL_CLOSEST) return apart(out.aim, s->wrench, all) - apart(s->aim, s->wrench, all);
+  if (s->policy == FL_DIRECTION) return apart(out.wrench_served, s->aim, all) / (work.has_drag ? 10 : 1);
+  if (s->policy == FL_CLOSEST) return apart(out.wrench_served, s->wrench, all) - apart(s->aim, s->wrench, all);
   for (int g = 0; g < GROUPS; g++)
-    most = fmax(most, apart(out.aim, s->wrench, group[g]) - apart(s->aim, s->wrench, group[g]));
+    most = fmax(most, apart(out.wrench_served, s->wrench, group[g]) - apart(s->aim, s->wrench, group[g]));
   return most;
 }
 
@@ -74,7 +74,7 @@ static int differs(const sample *s) {
   memcpy(policy.group, group, sizeof group);
   memcpy(question.wrench, s->wrench, sizeof question.wrench);
   if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
-  if (out.steps > most_steps) most_steps = out.steps;
+  if (out.newton_steps > most_steps) most_steps = out.newton_steps;
   static const fl_real rest[6];
   double size = fmax(1, apart(s->wrench, rest, all)), most = s->previous ? 1e-3 + 1.02 * (double)s->error : 0;
   fl_real command[ROBOT_COUNT][3]; /* the library's, by the laws of this block */

@@ -18,23 +18,23 @@ public:
     return true;
   }
 
-  void Run() override { // setpoints are shares of the yardstick; PX4's y and z point right and down
+  void Run() override { // setpoints are shares of the wrench scale; PX4's y and z point right and down
     vehicle_thrust_setpoint_s thrust{};
     vehicle_torque_setpoint_s torque{};
     if (!_thrust.copy(&thrust) || !_torque.copy(&torque)) return;
-    const fl_real *yard = reinterpret_cast<const fl_head *>(robot)->yard;
+    const fl_real *scale = reinterpret_cast<const fl_head *>(robot)->wrench_scale;
     fl_question question{};
     question.policy = &_policy;
     for (int k = 0; k < 3; k++) {
       const float sign = k ? -1.f : 1.f;
-      question.wrench[k] = sign * thrust.xyz[k] * yard[k];
-      question.wrench[3 + k] = sign * torque.xyz[k] * yard[3 + k];
+      question.wrench[k] = sign * thrust.xyz[k] * scale[k];
+      question.wrench[3 + k] = sign * torque.xyz[k] * scale[3 + k];
     }
     if (fl_answer_one(robot, &_work, &question, &_answer)) return; // a setpoint is not finite
     actuator_motors_s motors{};
     motors.timestamp = motors.timestamp_sample = thrust.timestamp;
     for (int i = 0; i < actuator_motors_s::NUM_CONTROLS; i++)
-      motors.control[i] = i < ROBOT_COUNT ? float(_answer.command[i][0] / ROBOT_ACTUATOR(i)->upper[0]) : NAN;
+      motors.control[i] = i < ROBOT_COUNT ? float(_answer.command[i][0] / ROBOT_ACTUATOR(i)->command_max[0]) : NAN;
     _motors.publish(motors);
   }
 

@@ -255,10 +255,9 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Error: what the plant's wrench misses of the target, on the robot's yardstick. Targets "
-        "are wrenches "
-        "of random commands by the plant. The oracle goes on from the network's answer by the "
-        "plant itself."
+        "Error: what the plant's wrench misses of the target, over the robot's wrench scale. "
+        "Targets are wrenches of random commands by the plant. The oracle "
+        "goes on from the network's answer by the plant itself."
     ),
     quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
     full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},

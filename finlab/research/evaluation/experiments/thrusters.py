@@ -37,8 +37,8 @@ random ones."""
 FRONT = 0.14  # how far the front thrusters are ahead [m]
 SURVEYED = 0.005  # by how much places differ from the drawing [m]
 FAR = 1e3  # times a target, surely out of reach
-DELIVERED = 1e-3  # missing wrench over the yardstick up to which a target counts as delivered
-ALIKE = 1e-5  # missing wrench over the yardstick up to which two are alike
+DELIVERED = 1e-3  # missing wrench over the wrench scale up to which a target counts as delivered
+ALIKE = 1e-5  # missing wrench over the wrench scale up to which two are alike
 DOMAIN = 0x7A05  # leads the seed of the draws
 
 
@@ -134,7 +134,7 @@ def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
 
 
 def missing_by_group(missing: Array, order: Order) -> Array:
-    """Sizes (N, G) of what is missing (N, 6), over the yardstick, in each group of axes."""
+    """Sizes (N, G) of what is missing (N, 6), over the wrench scale, in each group of axes."""
     groups = Policy("priority", order=order).groups
     return np.stack([np.linalg.norm(missing[:, axes], axis=1) for axes in groups], axis=1)
 
@@ -187,7 +187,7 @@ experiment = Experiment(
     note=(
         "Targets lie along the wrenches of uniform commands. Not delivered: clipped, or coupled "
         "aside. "
-        "Missing: over the robot's yardstick. The first axes are those that the autopilot means "
+        "Missing: over the robot's wrench scale. The first axes are those that the autopilot means "
         "to keep "
         "(PX4: roll and pitch, then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, "
         "then the "

@@ -1,0 +1,92 @@
+/* A foil near to a command: its curve of lift and drag by the angle, and the tangent of that curve,
+   which stands for it in a step of foil_drag.c. */
+#include "internal.h"
+
+/* Share of its range that a foil turns in a step: in all thrice, if need be. */
+#define TRUST (R(3.0) / ROUNDS)
+
+/* The last lift coefficient of a foil's table, and behind it the angle of attack [rad] at which
+   it has that: beyond, it stalls and drags more. */
+const real *fl_lift_end(const real *block, const fl_actuator *a) {
+  const real *curve = block + (int)a->command_table;
+  return curve + 2 * (int)curve[0] - 1;
+}
+
+/* A foil at an angle: force, cost and their slopes; all of the tangent but its curvature. */
+void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real command[3] = {angle, 0, 0};
+  real force[3];
+  real by[3][3];
+  fl_force_of_command(block, i, command, force, by);
+  const real lift = force[0];
+  const real d_lift = by[0][0];
+  const real drag = force[1] + a->pressure_area * a->zero_lift_drag;
+  const real d_drag = by[0][1];
+  memcpy(tangent->force, force, sizeof tangent->force);
+  memcpy(tangent->force_slope, by[0], sizeof tangent->force_slope);
+  tangent->cost = a->flow_speed * drag + a->uncertainty_cost * (lift * lift + drag * drag);
+  tangent->cost_slope =
+      a->flow_speed * d_drag + 2 * a->uncertainty_cost * (lift * d_lift + drag * d_drag);
+}
+
+/* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less
+   the worth of its force at prices s of lift and drag. */
+void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
+                     fl_tangent *tangent, fl_set *set) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real low = box->command_min[i][0];
+  const real high = box->command_max[i][0];
+  const real most_turn = TRUST * (high - low);
+  const real apart = CLOSE * (high - low) + TINY;
+  fl_tangent other;
+  fl_foil_at(block, i, angle + apart, &other);
+  fl_foil_at(block, i, angle, tangent);
+  /* Change of the slope of cost - s.force over `apart`. */
+  const real change = other.cost_slope - tangent->cost_slope - dot(s, other.force_slope, 2) +
+                      dot(s, tangent->force_slope, 2);
+  tangent->curvature =
+      fl_larger(FABS(change) / apart, CLOSE * a->flow_speed * a->pressure_area + TINY);
+  const real most_cost = tangent->cost + FABS(tangent->cost_slope) * most_turn +
+                         tangent->curvature * most_turn * most_turn;
+  set->force_min = fl_larger(low - angle, -most_turn);
+  set->force_max = fl_smaller(high - angle, most_turn);
+  set->tangent = tangent;
+  set->cost_at_min = most_cost;
+  set->cost_at_max = most_cost;
+}
+
+/* Forces along the rows of commands, and their cost [W]. */
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
+                          real force[][2]) {
+  real cost = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    force[i][0] = 0;
+    force[i][1] = 0;
+    if (work->span.is_lost[i]) continue;
+    real along[3];
+    fl_force_of_command(block, i, command[i], along, 0);
+    real size;
+    if (is_plane(a)) {
+      force[i][0] = along[1];
+      force[i][1] = along[2];
+      size = size_of(force[i]);
+    } else {
+      force[i][0] = a->command_sign * along[0];
+      size = force[i][0];
+    }
+    if (a->gauge_table > 0)
+      size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
+    if (fl_is_foil(a)) {
+      fl_tangent tangent;
+      fl_foil_at(block, i, command[i][0], &tangent);
+      force[i][1] = tangent.force[1];
+      cost += tangent.cost;
+      continue;
+    }
+    if (a->command_kind == FL_POD && command[i][1] < 0) size = -size;
+    cost += fl_power_of_force(block, i, size);
+  }
+  return cost;
+}
