@@ -22,6 +22,7 @@ def graph() -> ImportGraph:
         ("finlab/core/src/jets.c", "tests/core/test_core.py"),
         ("finlab/core/src/jets.c", "tests/interaction/test_jets.py"),
         ("finlab/core/src/foil_drag.c", "tests/allocation/dual/test_drag.py"),
+        ("finlab/core/src/set_gaps.c", "tests/core/test_set_gaps.py"),
         ("finlab/allocation/baselines/ipopt.py", "tests/allocation/baselines/test_ipopt.py"),
         ("finlab/actuators/thruster.py", "tests/actuators/test_laws.py"),
         ("finlab/layout/damage.py", "tests/allocation/test_damage_of_robots.py"),
@@ -34,6 +35,18 @@ def test_a_change_selects_its_tests(graph: ImportGraph, changed: str, nearest: s
     distance = min(test.distance for test in tests if test.file == nearest)
     assert distance <= 3
     assert sum(test.seconds for test in tests) <= 80.0
+
+
+def test_tests_that_are_called_after_a_c_file_are_the_nearest(graph: ImportGraph) -> None:
+    tests = near_tests(graph, ["finlab/core/src/jets.c"], seconds=3.0)
+    assert tests[0].file == "tests/interaction/test_jets.py"
+
+
+def test_a_registry_imports_what_it_names(graph: ImportGraph) -> None:
+    assert "finlab/allocation/dual/method.py" in graph.imports("finlab/allocation/methods.py")
+    assert "finlab/actuators/rudder.py" in graph.imports("finlab/actuators/kinds.py")
+    tests = near_tests(graph, ["finlab/actuators/azimuth.py"])
+    assert "tests/allocation/dual/test_either_way.py" in {test.file for test in tests}
 
 
 def test_nearer_tests_come_first_among_those_that_take_as_long(graph: ImportGraph) -> None:

@@ -5,13 +5,12 @@ A file is known by its path from the top of the tree, such as `finlab/layout/dam
 from a file to what it imports. What is not said by an import statement is found, too:
 
 - a name that a package only passes on leads to the file that defines it: `from finlab import
-Allocator` to
-  `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
-- a module that is loaded by name, where its full name stands as a string;
+  Allocator` to `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
+- a module that is loaded by name, where its full name stands as a string, as in registries
+  (`module:Class`);
 - a fixture, by the name of an argument, leads to its `conftest.py`;
 - `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares
-its name
-  with a C file does the same work or calls it.
+  its name with a C file does the same work or calls it.
 """
 
 import ast
@@ -137,15 +136,17 @@ class ImportGraph:
         return found
 
     def _loaded(self, text: str) -> set[str]:
-        """Files of a string that is a module's full name; of one that ends in a dot, such as the
-        beginning of `f"finlab.cli.{verb}"`, all modules in that package."""
+        """Files of a string that is a module's full name, alone or before a colon and the name of
+        something in it, as in registries; of one that ends in a dot, such as the beginning of
+        `f"finlab.cli.{verb}"`, all modules in that package."""
+        module, _, _ = text.partition(":")
         if not text.startswith(("finlab.", "webapp.")):
             return set()
         if text.endswith("."):
             return {
                 path for name, path in self.file_of.items() if name.rpartition(".")[0] == text[:-1]
             }
-        return self._module(text)
+        return self._module(module)
 
     @staticmethod
     def _only_passes_on(tree: ast.Module) -> bool:

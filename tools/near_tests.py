@@ -53,7 +53,7 @@ CALLS_THE_CORE = {
     "tests/allocation/test_contract.py": 1,
     "tests/allocation/dual": 1,
     "tests/allocation": 2,
-    "tests/interaction": 2,
+    "tests/interaction": 1,
     "tests/forces": 2,
 }
 """Tests of what calls the core in C, and how many imports they are off a C file at most."""
@@ -241,10 +241,13 @@ def is_test_file(file: str) -> bool:
 
 
 def kinship(test: str, source: str) -> int:
-    """The distance of a test file that its name and its folder say: where its folder mirrors that
-    of the changed file 0 if it is called after it and FOLDER if not, elsewhere 99; of C files see
+    """The distance of a test file that its name and its folder say: 0 if it is called after the
+    changed file and its folder mirrors that of the file, FOLDER if its folder alone does, elsewhere
+    99. Of C files, whose tests stand in several folders, the name is enough; for the others see
     CALLS_THE_CORE."""
     if source.endswith((".c", ".h")):
+        if Path(test).stem == f"test_{Path(source).stem}" and not test.startswith("tests/webapp/"):
+            return 0
         called = [far for place, far in CALLS_THE_CORE.items() if Path(test).is_relative_to(place)]
         return min(called, default=99)
     parts = Path(source).parent.parts

@@ -60,6 +60,8 @@ def random_commands(low: Array, high: Array) -> Array:
         ),
         (AzimuthLaw, [azimuth(), azimuth(force=(3.0, 20.0))]),
         (AzimuthLaw, [azimuth(model=TABLE)] * 2),
+        (AzimuthLaw, [azimuth(force=(-30.0, 40.0), dead_band=15.0), azimuth(dead_band=8.0)]),
+        (ThrusterLaw, [thruster(dead_band=20.0), thruster(model=TABLE, dead_band=6.0)]),
         (RudderLaw, [rudder(deflection=(-1.2, 1.2)), rudder(drag=0.1, stall=0.3)]),
     ],
 )
@@ -177,6 +179,36 @@ def test_a_rudder_stalls_turns_its_sign_astern_and_rests_at_rest() -> None:
     np.testing.assert_allclose(astern[:, 1:], -ahead[:, 1:], atol=1e-12)
     assert not law.force(delta).any() and not law.power(delta).any()
     assert not law.force(delta, np.zeros(3)).any()
+
+
+def coefficients_with_stall(
+    slope: float, drag: float, induced: float, stall: float, a: float
+) -> Array:
+    """Coefficients (2,) of lift and drag by Beard and McLain (2012), section 4.2, with a sharpness
+    of 50."""
+    below, above = math.exp(-50.0 * (a - stall)), math.exp(50.0 * (a + stall))
+    sigma = (1.0 + below + above) / ((1.0 + below) * (1.0 + above))
+    lift = slope * a
+    plate = (
+        2.0 * math.copysign(1.0, a) * math.sin(a) ** 2 * math.cos(a),
+        drag + 2.0 * math.sin(a) ** 2,
+    )
+    smooth = lift, drag + induced * lift**2
+    return (1.0 - sigma) * np.array(smooth) + sigma * np.array(plate)
+
+
+def test_a_foil_stalls_as_its_source_says() -> None:
+    rudders = [rudder(stall=0.3, drag=0.02), rudder(lift_slope=2.0, stall=0.6, aspect_ratio=4.0)]
+    law = RudderLaw(rudders)
+    for angle in np.linspace(-1.5, 1.5, 301):
+        told = law.coefficients(np.array([angle, angle]))
+        for i, part in enumerate(rudders):
+            expected = coefficients_with_stall(
+                part.slope, part.drag, part.induced, part.stall, float(angle)
+            )
+            np.testing.assert_allclose(
+                [told.lift[i], told.drag[i]], expected, rtol=1e-9, atol=1e-12
+            )
 
 
 def hybrid() -> Layout:

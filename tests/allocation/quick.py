@@ -13,6 +13,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "paper": {"n_candidates": 4, "n_steps": 2},
     "ipopt": {"n_starts": 1},
     "sqp": {"n_starts": 1, "n_steps": 5},
+    "paper_sqp": {"n_starts": 1, "n_steps": 5},
 }
 
 

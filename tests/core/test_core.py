@@ -71,6 +71,21 @@ def test_a_damaged_block_is_refused(heavy: Core, field: str, value: float, code:
         Core(block, 8)
 
 
+@pytest.mark.parametrize("kind", ["azimuths", "fins uneven", "rudders"])
+def test_no_number_of_a_block_may_be_none(kind: str) -> None:
+    """Every field of the head and of every actuator, and every number of a table."""
+    block = core_of(Allocator(load(random_robot(kind, 1, 3))))._block
+    assert checked(block) == 0
+    tables = np.random.default_rng(0).integers(
+        tables_begin(int(head_of(block)["n"])), len(block), 50
+    )
+    for place in [*range(tables_begin(int(head_of(block)["n"]))), *tables.tolist()]:
+        for bad in (np.nan, np.inf):
+            damaged = block.copy()
+            damaged[place] = bad
+            assert checked(damaged) != 0, f"number {place} is {bad}"
+
+
 def test_a_block_cut_short_is_refused(heavy: Core) -> None:
     for length in (0, 1, tables_begin(0), len(heavy._block) - 1):
         assert checked(heavy._block[:length].copy()) != 0

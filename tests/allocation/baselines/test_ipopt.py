@@ -1,5 +1,6 @@
 """IPOPT, and the model-based methods on strong fins and long levers, or when their time is up."""
 
+import math
 import time
 import warnings
 from dataclasses import replace
@@ -7,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finlab.actuators.response import Plane, RadialTable, price_grid
 from finlab.allocation import Allocator
+from finlab.allocation.baselines.ipopt import _Plane
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
@@ -16,7 +19,7 @@ from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
 from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
 
-pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
 
 
@@ -152,3 +155,84 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
     assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
     patient = Allocator(layout, "sqp", time_limit_s=60.0).allocate(target)
     assert patient.err_norm < 1e-5 and patient.power < hasty.power
+
+
+PLANES = [
+    (-np.pi, np.pi, 0.0, False),
+    (-1.0, 0.6, 0.0, False),
+    (-2.5, 2.0, 0.0, False),
+    (0.3, 0.3, 0.0, False),
+    (-np.pi, np.pi, 0.05, True),
+    (-0.7, 1.0, 0.1, True),
+]
+"""Arcs [rad], least shares of the largest force, and whether forces are uneven."""
+
+
+def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
+    """A plane of forces up to 20 N at F^1.5 watts."""
+    top = 1.5 * np.sqrt(20.0)
+    force = np.clip((price_grid(top) / 1.5) ** 2, 20.0 * least, 20.0)
+    table = RadialTable.of_forces(top, force, (20.0 * least) ** 1.5)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    around = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
+    gauge = 1.0 + 0.1 * np.cos(around - 0.5) if is_uneven else None
+    return Plane(np.eye(2, 6), table, middle=middle, half=half, gauge=gauge)
+
+
+@pytest.mark.parametrize("case", PLANES)
+def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
+    case: tuple[float, float, float, bool],
+) -> None:
+    plane, least = plane_of(*case), case[2]
+    share = casadi.MX.sym("share", 2)
+    part = _Plane(casadi, plane, share)
+    told = casadi.Function("told", [share], [part.cost, *(value for value, _, _ in part.limits)])
+    strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
+    assert part.full_cost == pytest.approx(20.0**1.5, rel=1e-3)
+    rng = np.random.default_rng(1)
+    judged = set[bool]()
+    for _ in range(300):
+        angle = plane.middle + rng.uniform(-1.0, 1.0) * min(1.5 * plane.half + 0.1, np.pi)
+        size = rng.uniform(0.0, 1.3)
+        cost, *values = (
+            float(each) for each in told(size * np.array([np.cos(angle), np.sin(angle)]))
+        )
+        radius = 1.0 if plane.gauge is None else 1.0 + 0.1 * np.cos(angle - 0.5)
+        of_most = size * strongest / radius
+        off = abs(math.remainder(angle - plane.middle, 2.0 * np.pi)) - plane.half
+        outside = max(of_most - 1.0, least - of_most if least else -1.0, size * off)
+        if abs(outside) < 0.02:
+            continue  # too near to an edge to tell
+        kept = all(
+            low - 1e-6 <= one <= high + 1e-6
+            for one, (_, low, high) in zip(values, part.limits, strict=True)
+        )
+        assert kept == (outside < 0.0), (angle, size)
+        judged.add(kept)
+        if kept:
+            assert cost == pytest.approx((20.0 * of_most) ** 1.5, rel=1e-2, abs=0.05)
+    assert False in judged
+
+
+@pytest.mark.parametrize("case", PLANES)
+def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
+    case: tuple[float, float, float, bool],
+) -> None:
+    plane = plane_of(*case)
+    part = _Plane(casadi, plane, casadi.MX.sym("share", 2))
+    rng = np.random.default_rng(2)
+    drawn = np.array([part.random(rng) for _ in range(300)])
+    off = [math.remainder(math.atan2(y, x) - plane.middle, 2.0 * np.pi) for x, y in drawn]
+    assert np.abs(off).max() <= plane.half + 1e-9
+    assert min(off) <= -0.9 * plane.half and max(off) >= 0.9 * plane.half
+    size = np.hypot(*drawn.T)
+    assert size.max() <= 1.0 and size.max() > 0.9 and size.min() < 0.1
+
+
+@pytest.mark.parametrize("kind", ["thrusters", "rudders", "azimuths", "fins"])
+def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> None:
+    layout = load(random_robot(kind, 1, 7))
+    flow = random_flow(kind, 1, 7)
+    program = AnyRobot("ipopt").method(layout).at(flow)._program
+    most = AnyRobot().method(layout).at(flow).compiled.robot.largest_power
+    assert sum(part.full_cost for part in program._parts) == pytest.approx(most, rel=0.02)

@@ -5,15 +5,18 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
 from finlab.allocation.dual.robot import POINTS, _usual_price, gauge_numbers
 from finlab.arrays import Array
-from finlab.layout import load_layout
+from finlab.core.fields import actuators_of
+from finlab.layout import Azimuth, Layout, load_layout
 from tests.any_robot import AnyRobot
 from tests.mixed_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
 
-DENSE = np.linspace(0.0, 2.0 * math.pi, 200_001)
+DENSE = np.linspace(0.0, 2.0 * math.pi, 20_001)
 
 
 def uneven(direction: Array) -> Array:
@@ -32,10 +35,17 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
         # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the
         # best psi.
         worth = uneven(DENSE) * np.cos(angle - DENSE)
-        best = int(worth.argmax())
-        assert support[place] == pytest.approx(worth[best], abs=1e-6)
-        derivative = -uneven(DENSE[best]) * math.sin(angle - DENSE[best])
-        assert slope[place] == pytest.approx(derivative, abs=1e-4)
+        first = DENSE[int(worth.argmax())]
+        ends = (first - 1e-3, first + 1e-3)
+        best = minimize_scalar(
+            lambda psi, angle=angle: -float(uneven(psi) * math.cos(angle - psi)),
+            bounds=ends,
+            method="bounded",
+            options={"xatol": 1e-10},
+        )
+        assert support[place] == pytest.approx(-best.fun, abs=3e-7)
+        derivative = -uneven(best.x) * math.sin(angle - best.x)
+        assert slope[place] == pytest.approx(float(derivative), abs=5e-5)
         assert own[place] == pytest.approx(float(uneven(np.array(angle))), abs=2e-5)
     np.testing.assert_array_equal(kept, deflection)
 
@@ -54,6 +64,26 @@ def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
     ahead = 1.5 * T200["forward"] * math.sqrt(T200_FORCE[1])
     astern = 1.5 * T200["reverse"] * math.sqrt(-T200_FORCE[0])
     assert _usual_price(response) == pytest.approx(max(ahead, astern), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("ends", "reverse", "half", "is_needed"),
+    [
+        ((-30.0, 40.0), 0.3, math.pi, False),  # all round, as strong and as cheap ahead
+        ((-30.0, 40.0), 0.5, math.pi, False),
+        ((-30.0, 40.0), 0.2, math.pi, True),  # cheaper in reverse
+        ((-50.0, 40.0), 0.3, math.pi, True),  # stronger
+        ((-30.0, 40.0), 0.3, 2.0, True),  # not all round
+    ],
+)
+def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
+    ends: tuple[float, float], reverse: float, half: float, is_needed: bool
+) -> None:
+    model = PowerLaw(0.3, reverse)
+    pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
+    own = actuators_of(AnyRobot().method(Layout("one", (pod,))).compiled.robot.block)[0]
+    assert own["force_min"] == pytest.approx(ends[0])
+    assert own["force_min_needed"] == (own["force_min"] if is_needed else 0.0)
 
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:

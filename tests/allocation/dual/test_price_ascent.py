@@ -1,0 +1,64 @@
+"""Raised prices prove nearly as much as drawn commands allow: beside a linear program over their
+mixtures."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from finlab.allocation import Allocator
+from finlab.allocation.dual.price_ascent import raised_price
+from finlab.arrays import Array
+from finlab.layout import load_layout
+from finlab.physics import Plant
+
+DRAWN = 400
+
+
+def commands_around(plant: Plant, command: Array, rng: np.random.Generator) -> Array:
+    """Commands (DRAWN, n, 3) near a command and anywhere within the limits."""
+    low, high = plant.layout.lower, plant.layout.upper
+    spread = np.geomspace(1e-3, 1.0, DRAWN)[:, None, None] * rng.uniform(
+        -1.0, 1.0, (DRAWN, *command.shape)
+    )
+    drawn = np.clip(command + spread * (high - low), low, high)
+    drawn[0] = command
+    return np.asarray(drawn)
+
+
+def proved(price: Array, wrench: Array, given: Array, power: Array) -> float:
+    """What prices (6,) prove of forces' wrenches (n, K, 6) and power (n, K): the dual value [W]."""
+    return float(price @ wrench - (given @ price - power).max(axis=1).sum())
+
+
+def least_of_mixtures(wrench: Array, given: Array, power: Array, scale: Array) -> float:
+    """Least power of mixtures of each actuator's commands that give a wrench."""
+    n, count = power.shape
+    ones = np.kron(np.eye(n), np.ones(count))
+    wrenches = given.reshape(n * count, 6).T / scale[:, None]
+    rows = np.concatenate([wrenches, ones])
+    right = np.concatenate([wrench / scale, np.ones(n)])
+    found = linprog(power.ravel(), A_eq=rows, b_eq=right, bounds=(0.0, None))
+    assert found.success
+    return float(found.fun)
+
+
+@pytest.mark.parametrize("name", ["A", "bluerov2_heavy"])
+@pytest.mark.parametrize("off", [0.8, 1.0, 1.3])
+def test_prices_are_raised_to_what_mixtures_of_commands_take(name: str, off: float) -> None:
+    layout = load_layout(name)
+    plant = Plant(layout)
+    rng = np.random.default_rng(1)
+    target = 0.5 * plant.wrench(plant.sample(rng, (1,))[0])
+    answer = Allocator(layout).allocate(target)
+    assert answer.reachable and answer.prices is not None
+    begun = off * answer.prices
+    raised = raised_price(plant, answer.scale, answer.wrench, begun, answer.command)
+
+    drawn = commands_around(plant, answer.command, rng)
+    given = np.einsum("kna,naw->nkw", plant.force(drawn), plant.effectiveness)
+    power = plant.power(drawn).T
+    value = proved(raised, answer.wrench, given, power)
+    most = least_of_mixtures(answer.wrench, given, power, answer.scale)
+    # What one draw proves of another: its commands are elsewhere.
+    assert value >= proved(begun, answer.wrench, given, power) - 0.02 * answer.power
+    assert most - 0.03 * answer.power <= value <= most + 1e-6 * answer.power

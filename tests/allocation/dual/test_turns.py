@@ -1,0 +1,136 @@
+"""Answers where jets meet, in turns: where they begin anew, and how far they go along a ray."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from finlab.allocation import Allocator
+from finlab.allocation.dual.turns import ASIDE, RANDOM, WALSH, _turned_aside
+from finlab.allocation.policy import CLOSEST
+from finlab.arrays import ROUNDS, Array
+from finlab.core.calls import STILL
+from finlab.interaction.jets import Jets
+from finlab.layout import Layout, load_layout
+from finlab.layout.load import parse_layout
+from finlab.physics import Plant
+from finlab.research.random_layouts import random_jet_robot
+from tests.mixed_robots import bluerov2_heavy
+
+MOST_STEPS = 540.0
+"""Steps of the turns of all questions: what they took when this was written, and a tenth more."""
+
+
+def test_other_beginnings_turn_planes_and_change_sizes() -> None:
+    rng = np.random.default_rng(1)
+    lines = np.array([False, True, False, False, True, False])
+    force = rng.normal(size=(6, 2))
+    force[lines, 1] = 0.0
+    starts = _turned_aside(force, lines)
+    patterns = len(WALSH) + 1
+    assert starts.shape == (patterns + RANDOM, 6, 2)
+
+    complex_force = force[:, 0] + 1j * force[:, 1]
+    turned = (starts[..., 0] + 1j * starts[..., 1]) / complex_force
+    # By the patterns each plane turns by the same angle, one way or the other, and keeps its size.
+    np.testing.assert_allclose(np.abs(turned[:patterns, ~lines]), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(np.angle(turned[:patterns, ~lines])), ASIDE, rtol=1e-12)
+    signs = np.sign(np.angle(turned[:patterns, ~lines]))
+    np.testing.assert_allclose(
+        signs[:8].T @ signs[:8], 8.0 * np.eye(4), atol=1e-12
+    )  # independent of each other
+    np.testing.assert_array_equal(signs[8], -signs[0])
+    # At random angles and sizes differ, and no line turns.
+    assert (np.abs(turned) <= 2.0).all() and np.abs(
+        np.abs(turned[patterns:, ~lines]) - 1.0
+    ).min() > 1e-6
+    assert np.unique(np.angle(turned[patterns:, ~lines]).round(9)).size == 4 * RANDOM
+    np.testing.assert_allclose(turned[:, lines].imag, 0.0, atol=1e-12)
+    assert np.unique(turned[:, lines].real.round(9)).size == 2 * (patterns + RANDOM)
+    assert (turned[:, lines].real >= 0.0).all()
+
+
+def largest_share(layout: Layout, target: Array, scale: Array, start: Array) -> float:
+    """The largest share of a wrench that SLSQP finds, from a command (n, 3) and from commands near
+    to it."""
+    plant = Plant(layout)
+    counts = np.array(plant.counts)
+    along = (target / scale)[counts]
+    used = layout.upper > layout.lower
+
+    def full(x: Array) -> Array:
+        command = layout.lower.copy()
+        command[used] += x[:-1] * (layout.upper - layout.lower)[used]
+        return command
+
+    def missing(x: Array) -> Array:
+        return np.asarray((plant.wrench(full(x)) / scale)[counts] - x[-1] * along)
+
+    best = 0.0
+    rng = np.random.default_rng(2)
+    own = ((start - layout.lower) / np.where(used, layout.upper - layout.lower, 1.0))[used]
+    for spread in (0.0, 0.1, 0.3):
+        first = np.clip(own + spread * rng.normal(size=own.shape), 0.0, 1.0)
+        found = minimize(
+            lambda x: -x[-1],
+            np.append(first, 0.3),
+            method="SLSQP",
+            bounds=[(0.0, 1.0)] * len(first) + [(0.0, 2.0)],
+            constraints={"type": "eq", "fun": missing},
+            options={"maxiter": 100},
+        )
+        if np.abs(missing(found.x)).max() < 1e-6:
+            best = max(best, float(found.x[-1]))
+    return best
+
+
+@pytest.mark.parametrize("name", ["heavy", "catamaran"])
+def test_a_direction_goes_as_far_as_steps_on_commands_find(name: str) -> None:
+    whole = parse_layout(bluerov2_heavy()) if name == "heavy" else load_layout(name)
+    layout = replace(whole, interaction=Jets())
+    allocator = Allocator(layout)
+    rng = np.random.default_rng(3)
+    drawn = Plant(layout).wrench(Plant(layout).sample(rng, (2,)))
+    for target in 4.0 * drawn:
+        answer = allocator.allocate(target, policy="direction")
+        along = np.nan_to_num(target / answer.scale) * (~np.isnan(answer.target))
+        share = float(along @ (answer.wrench / answer.scale) / (along @ along))
+        assert 0.05 < share < 1.0
+        other = largest_share(layout, target, answer.scale, answer.command)
+        assert share >= other * (1.0 - 2e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_direction_is_kept_on_its_ray_whatever_the_robot(seed: int) -> None:
+    rng = np.random.default_rng([4, seed])
+    layout = replace(random_jet_robot(rng, "robot", (4, 7)), interaction=Jets())
+    plant = Plant(layout)
+    allocator = Allocator(layout)
+    for target in 5.0 * plant.wrench(plant.sample(rng, (3,))):
+        answer = allocator.allocate(target, policy="direction")
+        along = target / answer.scale
+        given = answer.wrench / answer.scale
+        share = float(along @ given / (along @ along))
+        assert np.linalg.norm(given - share * along) <= 1e-5
+        assert answer.err_norm == pytest.approx(
+            (1.0 - share) * np.linalg.norm(along), rel=1e-4, abs=1e-6
+        )
+
+
+def test_turns_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
+    """Each turn is exact on the model that is linear at the last answer: a fault of that model costs
+    turns, or ends elsewhere."""
+    steps = 0.0
+    for seed in range(4):
+        rng = np.random.default_rng([5, seed])
+        layout = replace(random_jet_robot(rng, "robot", (4, 7)), interaction=Jets())
+        plant = Plant(layout)
+        dual = Allocator(layout)._whole.method
+        for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
+            laws = dual.forces(target[None], CLOSEST, None, STILL)
+            ended = dual.whole.settled(
+                target, laws.force[0], ROUNDS, CLOSEST, laws.prices[0], STILL, most_steps=1e6
+            )
+            steps += ended.steps
+    assert steps <= MOST_STEPS

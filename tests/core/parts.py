@@ -1,0 +1,324 @@
+"""The functions that the core's files share, called one by one, and robots of which to ask them.
+
+The library exports them without promising them (`finlab/core/src/internal.h`), so what stands here
+is for tests alone. Structs are read from the headers: a field more changes nothing."""
+
+import ctypes
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab import core
+from finlab.actuators.thrust_model import PowerLaw
+from finlab.allocation import Allocator
+from finlab.arrays import Array
+from finlab.core.fields import Record, actuators_of, head_of, struct
+from finlab.core.library import PATH, library
+from finlab.layout import Azimuth, Layout
+from finlab.layout.load import parse_layout
+from finlab.physics.plant import Plant
+from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
+
+CORE = Path(core.__path__[0])
+REAL = ctypes.c_double
+MOST = 64
+"""Most actuators of a robot."""
+FIN, POD = 2, 1
+"""Forms of commands, FL_FIN and FL_POD."""
+_MEMBER = re.compile(r"^\s*(fl_real|int|const fl_tangent \*)\s*([^;]*);", re.M)
+
+
+def _members(header: str, name: str) -> list[tuple[str, Any]]:
+    """Fields of a struct that a header defines, such as `typedef struct { ... } fl_set;`."""
+    text = (CORE / header).read_text(encoding="utf-8")
+    body = text[: text.index(f"}} {name};")].rpartition("typedef struct {")[2]
+    body = re.sub(r"/\*.*?\*/", "", body, flags=re.S)
+    kinds: dict[str, Any] = {
+        "fl_real": REAL,
+        "int": ctypes.c_int,
+        "const fl_tangent *": ctypes.c_void_p,
+    }
+    fields = list[tuple[str, Any]]()
+    for kind, names in _MEMBER.findall(body):
+        for member in names.split(","):
+            found = re.match(r"\s*(\w+)(?:\[(\w+)\])?", member)
+            assert found is not None
+            count = found[2]
+            fields.append((found[1], kinds[kind] * int(count) if count else kinds[kind]))
+    return fields
+
+
+class Set(ctypes.Structure):
+    """What one actuator may give: `fl_set`."""
+
+    _fields_ = _members("fl_work.h", "fl_set")
+
+
+class Span(ctypes.Structure):
+    """What the actuators span: `fl_span`."""
+
+    _fields_ = [
+        ("lost", ctypes.c_ubyte * MOST),
+        ("counts", ctypes.c_ubyte * 6),
+        ("scale", REAL * 6),
+        ("basis", REAL * 6 * 6),
+        ("matrix", REAL * 6 * 2 * MOST),
+        ("beside", REAL * 6),
+        ("range", ctypes.c_int),
+    ]
+
+
+class Beginning(ctypes.Structure):
+    """How a work area begins: `fl_work`."""
+
+    _fields_ = [("span", Span), ("is_whole", ctypes.c_int), ("set", Set * MOST)]
+
+
+class Tangent(ctypes.Structure):
+    """A foil near to a command: `fl_tangent`."""
+
+    _fields_ = _members("fl_work.h", "fl_tangent")
+
+
+class Box(ctypes.Structure):
+    """Commands that are allowed: `fl_box`."""
+
+    _fields_ = [("low", REAL * 3 * MOST), ("high", REAL * 3 * MOST), ("free", ctypes.c_int * MOST)]
+
+
+class Response(ctypes.Structure):
+    """The answer to a price: `response`."""
+
+    _fields_ = [
+        ("force", REAL * 2),
+        *((name, REAL) for name in ("xx", "xy", "yy", "conjugate", "angle")),
+    ]
+
+
+class LineResponse(ctypes.Structure):
+    """The answer along one direction: `line_response`."""
+
+    _fields_ = [(name, REAL) for name in ("force", "slope", "conjugate")]
+
+
+class GaugePoint(ctypes.Structure):
+    """A support function: `gauge_point`."""
+
+    _fields_ = [(name, REAL) for name in ("value", "slope", "bend")]
+
+
+class ForceRange(ctypes.Structure):
+    """What commands within a box give: `force_range`."""
+
+    _fields_ = [(name, REAL) for name in ("low", "high", "middle", "half")]
+
+
+@cache
+def functions() -> ctypes.PyDLL:
+    """The library once more, with what its internal functions return."""
+    assert library()
+    made = ctypes.PyDLL(str(PATH))
+    returns: dict[str, Any] = {
+        "fl_response": Response,
+        "fl_force_of_price": LineResponse,
+        "fl_limited_response": LineResponse,
+        "fl_gauge_support": GaugePoint,
+        "fl_force_range": ForceRange,
+        **dict.fromkeys(
+            (
+                *(
+                    "fl_power_of_force",
+                    "fl_power_and_price",
+                    "fl_marginal_cost",
+                    "fl_support_of_set",
+                ),
+                *("fl_gauge_radius", "fl_gauge_lean", "fl_largest_slope", "fl_refine_commands"),
+                *("fl_drag_of_lift", "fl_dual_value"),
+            ),
+            REAL,
+        ),
+    }
+    for name, kind in returns.items():
+        getattr(made, name).restype = kind
+    return made
+
+
+def at(values: Array) -> ctypes.c_void_p:
+    """Where an array of numbers lies."""
+    assert values.dtype == np.float64 and values.flags["C_CONTIGUOUS"]
+    return ctypes.c_void_p(values.ctypes.data)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot in the core, and what judges it."""
+
+    layout: Layout
+    plant: Plant
+    """In the flow of the block."""
+    block: Array
+    axes: Array
+    """Axes (n, 3, 3) of the laws' forces in the actuators' own ones, in rows."""
+
+    @property
+    def n(self) -> int:
+        """How many actuators it has."""
+        return self.layout.n
+
+    @property
+    def head(self) -> Record:
+        """Fields of the whole robot."""
+        return head_of(self.block)
+
+    @property
+    def actuators(self) -> Record:
+        """Fields of each actuator (n,)."""
+        return actuators_of(self.block)
+
+    def table(self, place: float) -> Array:
+        """The numbers of the block from a place on."""
+        return self.block[int(place) :]
+
+    def is_plane(self, i: int) -> bool:
+        """Whether an actuator pushes in a plane."""
+        own = self.actuators[i]
+        return bool(own["rows"] == 2.0 and own["flow_speed"] == 0.0)
+
+    def work(self) -> Any:
+        """A work area that is prepared."""
+        made = ctypes.create_string_buffer(library().fl_sizes(3))
+        assert functions().fl_prepare(at(self.block), made) == 0
+        return made
+
+    def whole_box(self) -> Box:
+        """The limits of all commands."""
+        box = Box()
+        for i, own in enumerate(self.actuators):
+            box.low[i][:] = own["command_min"]
+            box.high[i][:] = own["command_max"]
+            box.free[i] = int(own["is_free_angle"] != 0.0)
+        return box
+
+    def set_of(self, i: int, low: float, high: float, middle: float, half: float) -> Set:
+        """A set between two forces [N], in an arc [rad]."""
+        made = Set()
+        limits = (REAL(low), REAL(high), REAL(middle), REAL(half))
+        functions().fl_limit_set(at(self.block), i, ctypes.byref(made), *limits)
+        return made
+
+    def whole_set(self, i: int) -> Set:
+        """All that an actuator may give."""
+        own = self.actuators[i]
+        return self.set_of(
+            i, own["force_min"], own["force_max"], own["sector_center"], own["sector_half_angle"]
+        )
+
+    def power(self, i: int, force: float) -> float:
+        """Power [W] of a size of force [N], of planes below 0 in reverse."""
+        return float(functions().fl_power_of_force(at(self.block), i, REAL(force)))
+
+    def drag(self, i: int, lift: float) -> float:
+        """Drag [N], beyond that at rest, of a foil's lift [N]; 0 of all else."""
+        return float(functions().fl_drag_of_lift(at(self.block), i, REAL(lift)))
+
+    def radius(self, i: int, angle: float) -> float:
+        """Share of the table's force in a direction [rad]."""
+        gauge = self.actuators[i]["gauge_table"]
+        if gauge == 0.0:
+            return 1.0
+        return float(functions().fl_gauge_radius(at(self.table(gauge)), REAL(angle)))
+
+    def force(self, i: int, command: Array) -> tuple[Array, Array]:
+        """Force (3,) of a command (3,) along the law's axes, and its derivatives (3 commands, 3
+        axes)."""
+        force = np.zeros(3)
+        slope = np.zeros((3, 3))
+        functions().fl_force_of_command(at(self.block), i, at(command), at(force), at(slope))
+        return force, slope
+
+    def response(self, i: int, limits: Set, price: Array) -> Response:
+        """The answer of an actuator to prices (2,) along its rows."""
+        made: Response = functions().fl_response(at(self.block), i, ctypes.byref(limits), at(price))
+        return made
+
+    def answer(self, wrench: Array, **asked: Any) -> Record:
+        """The answer to a wrench (6,), with other fields of the question."""
+        question, _kept = question_of(wrench, asked)
+        answer = np.zeros(1, struct("fl_answer"))
+        places = ctypes.c_void_p(question.ctypes.data), ctypes.c_void_p(answer.ctypes.data)
+        assert functions().fl_answer_one(at(self.block), self.work(), *places) == 0
+        return answer[0]
+
+    def sets_now(self, **asked: Any) -> list[Set]:
+        """What each actuator may give in a question, by its fields."""
+        question, _kept = question_of(np.zeros(6), asked)
+        work = self.work()
+        place = ctypes.c_void_p(question.ctypes.data)
+        assert functions().fl_prepare_question(at(self.block), work, place)
+        return [Set.from_buffer_copy(one) for one in Beginning.from_buffer(work).set[: self.n]]
+
+
+def question_of(wrench: Array, asked: dict[str, Any]) -> tuple[Record, list[Any]]:
+    """A question as the core reads it, and the arrays at which it points."""
+    question = np.zeros(1, struct("fl_question"))
+    question["wrench"] = wrench
+    kept = list[Any]()
+    for name, value in asked.items():
+        if isinstance(value, np.ndarray):
+            kept.append(np.ascontiguousarray(value))
+            value = kept[-1].ctypes.data
+        question[name] = value
+    return question, kept
+
+
+def in_the_core(layout: Layout, flow: Array | None = None) -> Robot:
+    """A robot of the default method, in a flow."""
+    method = Allocator(layout)._whole.method.at(flow)  # type: ignore[attr-defined]
+    made = method.compiled.robot
+    return Robot(layout, method.plant, made.block.copy(), made.axes)
+
+
+def pods_either_way(seed: int) -> Layout:
+    """Pods that push either way, in arcs of any width, some with a dead band."""
+    rng = np.random.default_rng(seed)
+    pods = []
+    for k, half in enumerate((0.15, 0.8, 2.2, math.pi)):
+        most = rng.uniform(20.0, 60.0)
+        middle = rng.uniform(-3.0, 3.0) if half == 0.15 else rng.uniform(-0.5, 0.5)
+        arc = (-math.pi, math.pi) if half == math.pi else (middle - half, middle + half)
+        ends = (-rng.uniform(0.3, 1.3) * most, most)
+        pods.append(
+            Azimuth(
+                f"p{k}",
+                tuple(rng.uniform(-0.5, 0.5, 3)),
+                (0.0, 0.0, 1.0),
+                (1.0, 0.0, 0.0),
+                ends,
+                PowerLaw(0.3, 0.3 * rng.uniform(0.7, 2.0), float(rng.choice([1.5, 1.8]))),
+                arc,
+                dead_band=float(rng.choice([0.0, 3.0])),
+                rate=float(2.0 * most),
+                turn_rate=1.0,
+            )
+        )
+    return Layout("pods", tuple(pods))
+
+
+EITHER_WAY = "pods either way"
+ROBOTS = (*KINDS, EITHER_WAY)
+"""Names of robots: kinds, and pods that push either way."""
+
+
+@cache
+def robot_of(name: str, number: int = 0, seed: int = 71) -> Robot:
+    """A robot by its name, with dead bands and rates where a kind has them."""
+    if name == EITHER_WAY:
+        return in_the_core(pods_either_way(seed + number))
+    rng = np.random.default_rng([seed, number])
+    mapping = with_dead_bands(with_rates(random_robot(name, number, seed)), rng)
+    return in_the_core(parse_layout(mapping), random_flow(name, number, seed))

@@ -1,0 +1,161 @@
+"""What may be given in a tick: the forces of commands that drives can reach, and what turning costs
+there."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.allocation.rates import Rates
+from finlab.arrays import Array
+from tests.core.parts import FIN, POD, ROBOTS, Robot, Set, robot_of
+
+PERIOD_S = 0.1
+LEAST_POWER = 1e-3
+"""Share of full power that counts as mean power at least."""
+
+
+def commands_before(robot: Robot, rng: np.random.Generator) -> Array:
+    """Commands (n, 3) of a tick before, some of them at a limit."""
+    lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+    share = rng.random(lower.shape)
+    share = np.where(rng.random(share.shape) < 0.15, np.round(share), share)
+    return np.ascontiguousarray(np.minimum(lower + share * (upper - lower), upper))
+
+
+def given_in_box(robot: Robot, i: int, low: Array, high: Array) -> tuple[Array, Array]:
+    """Forces (N,) [N] of commands within a box along their directions, and these directions
+    [rad]."""
+    own = robot.actuators[i]
+    share = np.stack(np.meshgrid(*3 * [[0.0, 0.25, 0.5, 0.75, 1.0]]), axis=-1).reshape(-1, 3)
+    commands = low + share * (high - low)
+    force = np.array([robot.force(i, command)[0] for command in commands])
+    if own["command_kind"] == POD:
+        return commands[:, 1], commands[:, 0]
+    if own["command_kind"] == FIN:
+        return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
+    return (own["command_sign"] if own["command_kind"] == 0.0 else 1.0) * force[:, 0], 0.0 * force[
+        :, 0
+    ]
+
+
+def check_set(robot: Robot, i: int, told: Set, low: Array, high: Array) -> None:
+    """A set has the forces of the commands between two ends, and none else but for a little."""
+    own = robot.actuators[i]
+    size, angle = given_in_box(robot, i, low, high)
+    slack = 0.02 * own["row_force_max"][0]
+    ways = [(told.force_min, told.force_max, 0.0)]
+    if told.is_flipped:
+        ways = [(-told.force_max, -told.force_min, math.pi)]
+    elif told.force_max_reverse > 0.0:
+        ways = [(-told.force_max_reverse, told.force_max, 0.0)]
+    ((least, most, turned),) = ways
+    band = own["dead_band"]
+    if band > 0.0 and least < band and most > -band:
+        return  # the band takes some of it: tests of sets have that
+    assert size.min() == pytest.approx(least, abs=slack)
+    assert size.max() == pytest.approx(most, abs=slack)
+    if robot.is_plane(i) and told.sector_half_angle < 3.0:
+        off = [
+            math.remainder(one - told.sector_center - turned, 2.0 * math.pi)
+            for one in angle[np.abs(size) > slack]
+        ]
+        if off:
+            assert np.abs(off).max() == pytest.approx(told.sector_half_angle, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("ticks", [1, 4])
+def test_a_set_in_a_tick_is_what_commands_near_the_last_ones_give(name: str, ticks: int) -> None:
+    for number in range(2):
+        robot = robot_of(name, number)
+        rng = np.random.default_rng([1, number])
+        step = robot.layout.rates * PERIOD_S * ticks
+        for _ in range(2):
+            previous = commands_before(robot, rng)
+            box = Rates(robot.plant, step).box(previous)
+            sets = robot.sets_now(previous=previous, ticks=ticks)
+            for i, told in enumerate(sets):
+                assert told.turn_cost == 0.0
+                own = robot.actuators[i]
+                whole = (box.lower[i] <= own["command_min"]).all() and (
+                    box.upper[i] >= own["command_max"]
+                ).all()
+                if whole or own["gauge_table"] != 0.0 or own["unevenness"] != 0.0:
+                    continue  # all that it may give, or another force in each direction
+                check_set(robot, i, told, box.lower[i], box.upper[i])
+
+
+@pytest.mark.parametrize("name", ["azimuths", "mixed", "pods either way"])
+def test_turning_costs_by_the_mean_power_of_the_commands_before(name: str) -> None:
+    for number in range(2):
+        robot = robot_of(name, number)
+        rng = np.random.default_rng([2, number])
+        full = np.array(
+            [
+                max(robot.power(i, own["force_max"]), robot.power(i, own["force_min"]))
+                for i, own in enumerate(robot.actuators)
+            ]
+        )
+        for scale in (1.0, 0.0):
+            previous = commands_before(robot, rng)
+            pods = robot.actuators["command_kind"] == POD
+            previous[pods, 1] *= scale
+            lost = np.arange(robot.n) == robot.n - 1
+            power = sum(power_of(robot, i, previous[i]) for i in range(robot.n) if not lost[i])
+            mean = max(power, LEAST_POWER * full[~lost].sum()) / (~lost).sum()
+            toward = np.where(rng.random(robot.n) < 0.5, np.nan, rng.uniform(-3.0, 3.0, robot.n))
+            sets = robot.sets_now(
+                previous=previous,
+                calm=2.0,
+                ticks=3,
+                angles_wanted=toward,
+                lost=lost.astype(np.uint8),
+            )
+            for i, told in enumerate(sets):
+                if not pods[i] or lost[i]:
+                    assert told.turn_cost == 0.0
+                    continue
+                step = robot.layout.rates[i, 0] * PERIOD_S
+                assert told.turn_cost == pytest.approx(2.0 * mean / (3.0 * step), rel=1e-3)
+                angle = previous[i, 0] if math.isnan(toward[i]) else toward[i]
+                off = math.remainder(
+                    told.turn_origin - angle - math.pi * told.is_flipped, 2.0 * math.pi
+                )
+                assert off == pytest.approx(0.0, abs=1e-9)
+                assert abs(told.turn_origin - told.sector_center) <= math.pi + 1e-9
+
+
+def power_of(robot: Robot, i: int, command: Array) -> float:
+    """Power [W] of a command by the core's tables."""
+    own = robot.actuators[i]
+    force, _ = robot.force(i, command)
+    if own["command_kind"] == POD:
+        size = command[1]
+    elif robot.is_plane(i):
+        size = math.hypot(force[1], force[2]) / robot.radius(i, math.atan2(force[2], force[1]))
+    else:
+        size = own["command_sign"] * force[0]
+    return robot.power(i, min(max(float(size), float(own["force_min"])), float(own["force_max"])))
+
+
+@pytest.mark.parametrize("name", ["azimuths", "fins", "thrusters"])
+def test_what_is_unknown_or_lost_is_no_tick(name: str) -> None:
+    robot = robot_of(name)
+    rng = np.random.default_rng(3)
+    previous = commands_before(robot, rng)
+    previous[0] = np.nan
+    lost = (np.arange(robot.n) == 1).astype(np.uint8)
+    sets = robot.sets_now(previous=previous, calm=2.0, lost=lost)
+    whole = robot.sets_now()
+    for field in (
+        "force_min",
+        "force_max",
+        "sector_center",
+        "sector_half_angle",
+        "cost_at_min",
+        "cost_at_max",
+        "turn_cost",
+    ):
+        assert getattr(sets[0], field) == getattr(whole[0], field)
+    assert sets[1].force_min == sets[1].force_max == sets[1].cost_at_max == 0.0
