@@ -46,7 +46,7 @@ def test_a_registry_imports_what_it_names(graph: ImportGraph) -> None:
     assert "finlab/allocation/dual/method.py" in graph.imports("finlab/allocation/methods.py")
     assert "finlab/actuators/rudder.py" in graph.imports("finlab/actuators/kinds.py")
     tests = near_tests(graph, ["finlab/actuators/azimuth.py"])
-    assert "tests/allocation/dual/test_either_way.py" in {test.file for test in tests}
+    assert "tests/allocation/dual/test_reversing_pods.py" in {test.file for test in tests}
 
 
 def test_nearer_tests_come_first_among_those_that_take_as_long(graph: ImportGraph) -> None:

@@ -74,7 +74,7 @@ def test_a_damaged_block_is_refused(heavy: Core, field: str, value: float, code:
 @pytest.mark.parametrize("kind", ["azimuths", "fins uneven", "rudders"])
 def test_no_number_of_a_block_may_be_none(kind: str) -> None:
     """Every field of the head and of every actuator, and every number of a table."""
-    block = core_of(Allocator(load(random_robot(kind, 1, 3))))._block
+    block = core_of_layout(load(random_robot(kind, 1, 3)))._block
     assert checked(block) == 0
     tables = np.random.default_rng(0).integers(
         tables_begin(int(head_of(block)["n"])), len(block), 50
