@@ -1,33 +1,33 @@
-"""Types of arrays, shares that stand for nothing, one formula for numpy, torch and CasADi, small
-systems."""
+"""Types of arrays, relative tolerances, and what numpy, torch and CasADi have in common; all of
+finlab uses it."""
 
 import sys
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-"""Numbers in double precision."""
+"""An array in double precision."""
 AnyArray = NDArray[Any]
-"""Numbers of a type that is given elsewhere: of single precision, complex, whole or truth values,
-too."""
+"""An array of any type of number: of single precision, complex, whole or truth values, too."""
 Values = Any
-"""A numpy array, a tensor or a symbol."""
+"""A numpy array, a torch tensor or a CasADi symbol."""
 
 ROUNDING = 1e-12
-"""Share of a value that the rounding of sums may take."""
+"""Relative error that the rounding of sums may have."""
 NOTHING = 1e-9
-"""Share from which on a thing counts as there: far above rounding, far below what anybody can
+"""Share of a quantity below which it counts as 0: far above rounding, far below what anybody can
 feel."""
 NEARLY = 1e-6
-"""Share of a thing that may be missing where it counts as whole."""
+"""Share of a quantity that may be missing where it counts as whole."""
 FINE = 1e-5
-"""Share by which a compiled table may be off between its points."""
+"""Relative error that a table may have between its points."""
 CLOSE = 1e-4
-"""Share that is not worth another search."""
+"""Relative gain that is not worth another search."""
 ROUNDS = 12
-"""Most times that something is repeated that mostly settles after a few."""
+"""Most iterations of a search that mostly settles after a few."""
 
 
 def library_of(value: Any) -> Any:
@@ -42,14 +42,24 @@ def library_of(value: Any) -> Any:
     return sys.modules[module] if module in ("torch", "casadi") else np
 
 
-try:
-    from numpy.linalg import _umath_linalg as _lapack
-except ImportError:
-    _lapack = np.linalg  # type: ignore[misc]
-
-
 def solve(matrix: Array, right: Array) -> AnyArray:
-    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast; NaN
-    where one is singular."""
-    solution: AnyArray = _lapack.solve(matrix, right)
+    """Solves linear systems, of which some may be singular.
+
+    Args:
+        matrix: matrices (..., m, m).
+        right: right sides (..., m, k), with as many axes.
+
+    Returns:
+        Solutions (..., m, k), broadcast; NaN where a matrix is singular.
+    """
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        batch = np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2])
+    matrices = np.broadcast_to(matrix, (*batch, *matrix.shape[-2:]))
+    rights = np.broadcast_to(right, (*batch, *right.shape[-2:]))
+    solution: AnyArray = np.full(rights.shape, np.nan, np.result_type(matrix, right))
+    for index in np.ndindex(batch):
+        with suppress(np.linalg.LinAlgError):
+            solution[index] = np.linalg.solve(matrices[index], rights[index])
     return solution

@@ -1,8 +1,10 @@
-"""Thrusters that turn, all round or within an arc: pods, and tilts.
+"""Thrusters that turn, all round or within an arc: azimuths (pods) and tilts.
 
 Command: (angle [rad], force [N], 0). Own frame: turn_axis, zero, turn_axis x zero; at the angle a
 the force points along cos(a) zero + sin(a) (turn_axis x zero).
 """
+
+from __future__ import annotations  # help() then prints `Newtons`, not the bounds of one
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,9 +14,26 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from msgspec import Meta
 
-from finlab.actuators import actuator
+from finlab.actuators.actuator import (
+    ACROSS,
+    Command,
+    CommandNumber,
+    Diameter,
+    Faults,
+    Kind,
+    Metres,
+    Place,
+    Seconds,
+    TurnRate,
+    TurnRateDegrees,
+    Uncertainty,
+    held_limits,
+    weakened,
+)
 from finlab.actuators.propeller import (
+    FORMULAS,
     T200,
+    T200_FORCE,
     ForceRate,
     OpenWater,
     Propeller,
@@ -22,30 +41,33 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
     form_of,
-    given_force,
+    usable_force,
 )
 from finlab.actuators.response import Form, Group, Plane
 from finlab.actuators.thrust_model import Newtons, PowerLaw, ThrustModel, check_force
 from finlab.actuators.thrust_power import ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, is_full_turn
+from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector3, is_full_turn
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
+"""End of an arc [rad]; a turn in degrees, converted, may exceed `TURN` by rounding."""
 AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
+"""The same in a file [deg]."""
 
 
 class AzimuthLaw(PropellerLaw):
-    """The law of n turning thrusters, whose commands are angle [rad] and force [N]."""
+    """Law of n turning thrusters: at angle a [rad] the force T [N] is T (cos a, sin a) along the
+    second and third own axis."""
 
     column = 1
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
-        size = self.given(command)
-        force[..., 1] = size * np.cos(command[..., 0])
-        force[..., 2] = size * np.sin(command[..., 0])
+        thrust = self.thrust(command)
+        force[..., 1] = thrust * np.cos(command[..., 0])
+        force[..., 2] = thrust * np.sin(command[..., 0])
         return force
 
     def force_and_jacobian(
@@ -56,64 +78,73 @@ class AzimuthLaw(PropellerLaw):
         jacobian[..., 0, 1] = -force[..., 2]
         jacobian[..., 0, 2] = force[..., 1]
         angle = command[..., 0]
-        free = self.given(command) == command[..., 1]
-        jacobian[..., 1, 1] = np.cos(angle) * free
-        jacobian[..., 1, 2] = np.sin(angle) * free
+        # In the dead band the force does not follow its command.
+        is_outside = self.thrust(command) == command[..., 1]
+        jacobian[..., 1, 1] = np.cos(angle) * is_outside
+        jacobian[..., 1, 2] = np.sin(angle) * is_outside
         return force, jacobian
 
 
 class AzimuthGroup(Group):
-    """What the turning thrusters of a robot offer for prices."""
+    """Responses to prices of m turning thrusters (Eq. 5)."""
 
-    def __init__(self, azimuths: Sequence["Azimuth"], effectiveness: Array) -> None:
-        """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+    def __init__(self, azimuths: Sequence[Azimuth], effectiveness: Array) -> None:
+        """Tabulates the responses.
+
+        Args:
+            azimuths: m turning thrusters.
+            effectiveness: wrench (m, 3, 6) of 1 N along each own axis [1, m], body frame.
+        """
         low, high = np.array([azimuth.arc for azimuth in azimuths]).T
-        self._given = np.array([given_force(azimuth) for azimuth in azimuths])
+        self._limits = np.array([usable_force(azimuth) for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
-        middle, half = _arcs(low, high)
-        self.responses = [
-            _plane(azimuth, matrix[1:], float(middle[i]), float(half[i]))
-            for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
-        ]
+        center, half_angle = _arcs(low, high)
+        self.responses = []
+        for i, azimuth in enumerate(azimuths):
+            matrix = effectiveness[i, 1:]
+            self.responses.append(_plane(azimuth, matrix, float(center[i]), float(half_angle[i])))
 
     @property
     def forms(self) -> list[Form]:
-        return [form_of("pod", given) for given in self._given]
+        return [form_of("pod", limits) for limits in self._limits]
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
-        least, most = (self._given if ends is None else ends).T
-        ahead = self._power.worth(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
-        astern = self._power.worth(-back, np.minimum(least, 0.0), np.minimum(most, 0.0))
+        least, most = (self._limits if ends is None else ends).T
+        ahead = self._power.conjugate(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
+        astern = self._power.conjugate(-back, np.minimum(least, 0.0), np.minimum(most, 0.0))
         either = np.maximum(ahead, astern)
         return np.where(least >= 0.0, ahead, np.where(most < 0.0, astern, either))
 
 
-def _plane(azimuth: "Azimuth", matrix: Array, middle: float, half: float) -> Plane:
-    """What one offers; `matrix` (2, 6) is the wrench per newton."""
-    least, most = given_force(azimuth)
+def _plane(azimuth: Azimuth, matrix: Array, center: float, half_angle: float) -> Plane:
+    """Response of one turning thruster; `matrix` (2, 6) is its wrench per newton [1, m] along its
+    second and third own axis, `center` and `half_angle` are those of its arc [rad]."""
+    least, most = usable_force(azimuth)
     if 0.0 < least < azimuth.dead_band:
-        least = 0.0  # what it is told then gives no force, and takes no power
+        least = 0.0  # a command within the dead band gives no force, and takes no power
     table = radial_table(azimuth.model, 1, max(least, 0.0), max(most, 0.0))
     reverse = radial_table(azimuth.model, -1, max(-most, 0.0), -least) if least < 0.0 else None
-    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse, high=most)
+    return Plane(
+        matrix, table, center, half_angle, band=azimuth.dead_band, reverse=reverse, high=most
+    )
 
 
 def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
-    """Middles and halves (m,) of arcs [rad]; pi is the half of a full turn."""
-    return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))
+    """Centers and half angles (m,) of arcs from `low` to `high` (m,) [rad]; pi is the half of a
+    full turn."""
+    half_angle = np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))
+    return 0.5 * (low + high), half_angle
 
 
-class AzimuthCommand(
-    actuator.Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}
-):
+class AzimuthCommand(Command, frozen=True, rename={"angle": "angle_rad", "force": "force_n"}):
     """The command of a thruster that turns, by name."""
 
     angle: float
     """Angle of its force from `zero` towards turn_axis x zero [rad]."""
     force: float
-    """[N]."""
+    """Force along that direction, signed [N]."""
     input: float | None = None
-    """As for a `ThrusterCommand`."""
+    """Input for that force by its table, in the table's unit; None of one with a power law."""
 
     @property
     def words(self) -> str:
@@ -122,95 +153,84 @@ class AzimuthCommand(
 
 @dataclass(frozen=True)
 class Azimuth(Propeller):
-    """A thruster that turns; its command is angle and force. Checked on construction."""
+    """A thruster that turns; its command is angle and force. Checked on construction.
+
+    Args:
+        name: unique within its layout.
+        position: where the force acts, body frame [m].
+        turn_axis: axis about which it turns, unit vector, body frame [1].
+        zero: direction of the force at angle 0, unit vector, body frame [1]; it turns towards
+            turn_axis x zero.
+        force: least and most force [N]: the least below 0 where it also pushes against its
+            direction, above 0 where it cannot stop.
+        model: electrical power over the force [W]: `PowerLaw` or `PowerTable`.
+        arc: least and greatest angle [rad]; a full turn means any angle.
+        dead_band: forces smaller than this, other than 0, cannot be held [N].
+        torque_per_newton: reaction torque about the direction of the force, per force, signed [m].
+        turn_rate: largest change of the angle [rad/s]; None: nothing limits it.
+        time_constant: time in which the force comes to 63 % of a new command [s].
+        rate: largest change of the commanded force [N/s]; None: nothing limits it.
+        uncertainty: standard deviation of its force [N]; None: nothing is known of it.
+        diameter: diameter of the propeller, for its jet [m]; None: estimated from the force.
+        open_water: thrust coefficient at rest, and the advance ratio of no thrust [1]; None:
+            unknown.
+        hangs: whether damage has left it a single force of any sign, that of both limits (a truth
+            value, which no file has).
+
+    Raises:
+        LayoutError: a value is out of its bounds; the message names the argument.
+    """
 
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
         "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
-        "turn_rate": ("turn_rate_deg_s", actuator.TurnRateDegrees),
+        "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
     }
-    LAW = AzimuthLaw
-    GROUP = AzimuthGroup
-    NUMBERS = (("angle", "rad"), ("force", "N"))
-    COMMAND = AzimuthCommand
-    LIMITS = ("arc", "force")
-    RATES = ("turn_rate", "rate")
-    AXES = ("turn_axis", "zero")
-    POINTED = 1
-    PUSHES = (1, 2)
-    LAGS = 1
-    THRUST = 1
-    ANGLE = 0
-    ARC = "arc"
-    FAULTS = ("weak", "stuck", "running")
-    LOOKS = "pod"
-    OTHER = "Turns about"
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
-    BOXES = (
-        actuator.Box(
-            "Force [N]", "force", "Least and most; above 0: it cannot stop.", 1.0, pair=True
-        ),
-        actuator.Box(
-            "Arc [°]",
-            "arc",
-            "Least and greatest angle from zero; −180 to 180 is any.",
-            5.0,
-            True,
-            pair=True,
-        ),
-        actuator.Box(
-            "Turn rate [°/s]", "turn_rate", "How fast it turns; 0: at once.", 5.0, True, True
-        ),
-        *Propeller.BOXES,
-    )
+    """Arc of one as the app adds it [rad]."""
     type: ClassVar[str] = "azimuth"
+    KIND: ClassVar[Kind] = Kind(
+        law=AzimuthLaw,
+        group=AzimuthGroup,
+        command=AzimuthCommand,
+        numbers=(
+            CommandNumber(name="angle", unit="rad", limits="arc", rate="turn_rate", aims=True),
+            CommandNumber(name="force", unit="N", limits="force", rate="rate", lags=True),
+        ),
+        axes=("turn_axis", "zero"),
+        pushes_along=("zero", ACROSS),
+        pointed="zero",
+        drawn_as="pod",
+        faults=("weak", "stuck", "running"),
+        arc="arc",
+        models=FORMULAS,
+    )
 
     name: Name
-    """Unique within its layout."""
-    position: actuator.Place
-    """Where the force acts, body frame [m]."""
+    position: Place
     turn_axis: Direction3
-    """Unit vector about which the thruster turns, body frame."""
     zero: Direction3
-    """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x
-    zero."""
     force: tuple[Newtons, Newtons]
-    """Least and most force [N]: below 0 for one that also pushes against its angle, above 0 for one
-    that cannot stop."""
     model: ThrustModel
-    """What power it takes."""
     arc: tuple[Angle, Angle] = (-math.pi, math.pi)
-    """Least and greatest angle [rad]; a full turn means any angle."""
     dead_band: Threshold = 0.0
-    """Forces smaller than this, other than 0, cannot be held [N]."""
-    torque_per_newton: actuator.Metres = 0.0
-    """Reaction torque about the direction of the force, per force, signed [m]."""
-    turn_rate: actuator.TurnRate | None = None
-    """How fast it turns at most [rad/s]; None where nothing limits it."""
-    time_constant: actuator.Seconds = 0.1
-    """Time in which the force comes to 63 % of a new one [s]."""
+    torque_per_newton: Metres = 0.0
+    turn_rate: TurnRate | None = None
+    time_constant: Seconds = 0.1
     rate: ForceRate | None = None
-    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
-    uncertainty: actuator.Uncertainty | None = None
-    """How far its force may be from that; None where nothing is known of it."""
-    diameter: actuator.Diameter | None = None
-    """Of the propeller [m], for its jet; None where it is guessed from the force."""
+    uncertainty: Uncertainty | None = None
+    diameter: Diameter | None = None
     open_water: OpenWater | None = None
-    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are
-    unknown."""
     hangs: bool = False
-    """Whether damage has left it a single force, that of both limits, of any sign; no file says
-    so."""
 
     def check_together(self) -> None:
         """See `Actuator`."""
         super().check_together()
         least, most = self.force
-        hangs = self.hangs and least == most
+        hangs = self.hangs and least == most  # damage may leave a force of any sign
         if not hangs and not (least < most and most > 0.0):
             raise LayoutError(
                 f"expected a most force above 0 and above the least, got {least:g} and {most:g}; "
-                "turn `zero` "
-                "round where it only pulls",
+                "turn `zero` round where it only pulls",
                 "force",
             )
         if not hangs and self.dead_band > self.force[1]:
@@ -228,19 +248,15 @@ class Azimuth(Propeller):
     @classmethod
     def sample(cls) -> Self:
         """See `Actuator`: a T200 of Blue Robotics at 16 V on a pod."""
-        up = (0.0, 0.0, 1.0)
-        rate = math.radians(120)
-        force = (0.0, 51.44)
-        model = PowerLaw(T200.forward)
         return cls(
-            cls.type,
-            (0.0, 0.0, 0.0),
-            up,
-            (1.0, 0.0, 0.0),
-            force,
-            model,
-            cls.SAMPLE_ARC,
-            turn_rate=rate,
+            name=cls.type,
+            position=(0.0, 0.0, 0.0),
+            turn_axis=(0.0, 0.0, 1.0),
+            zero=(1.0, 0.0, 0.0),
+            force=(0.0, T200_FORCE),
+            model=PowerLaw(T200.forward),
+            arc=cls.SAMPLE_ARC,
+            turn_rate=math.radians(120),
         )
 
     def neutral(self, now: Array | None = None) -> Array:
@@ -250,29 +266,48 @@ class Azimuth(Propeller):
             row[0] = now[0]
         return row
 
-    def damaged(self, faults: actuator.Faults) -> Self:
-        left = faults.weak
-        low, high = self.force
-        force = (
-            self.force if left is None else actuator.weakened((max(low, left * low), high), left)
-        )
+    def damaged(self, faults: Faults) -> Self:
+        force = self.force
+        if faults.weak is not None:
+            low, high = force
+            force = weakened((max(low, faults.weak * low), high), faults.weak)
         angle = faults.stuck if faults.running is None else faults.running[0]
-        held = replace(self, force=force, arc=actuator.held_limits(angle, self.arc))
-        return held if faults.running is None else held.hung(faults.running[1])
+        left = replace(self, force=force, arc=held_limits(angle, self.arc))
+        return left if faults.running is None else left.hung(faults.running[1])
 
     @property
-    def joints(self) -> Iterator[tuple[str, Vector, tuple[float, float] | None]]:
-        yield (
-            "_mount",
-            self.turn_axis,
-            None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc,
-        )
+    def joints(self) -> Iterator[tuple[str, Vector3, tuple[float, float] | None]]:
+        limits = None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc
+        yield "_mount", self.turn_axis, limits
         yield "", self.zero, None
 
 
 @dataclass(frozen=True)
 class Tilt(Azimuth):
-    """An azimuth thruster that turns within an arc. Checked on construction."""
+    """An azimuth thruster that turns within an arc. Checked on construction.
+
+    Args:
+        name: unique within its layout.
+        position: where the force acts, body frame [m].
+        turn_axis: axis about which it turns, unit vector, body frame [1].
+        zero: direction of the force at angle 0, unit vector, body frame [1].
+        arc: least and greatest angle [rad]; it has to be given.
+        force: least and most force [N].
+        model: electrical power over the force [W].
+        dead_band: forces smaller than this, other than 0, cannot be held [N].
+        torque_per_newton: reaction torque about the direction of the force, per force, signed [m].
+        turn_rate: largest change of the angle [rad/s].
+        time_constant: time in which the force comes to 63 % of a new command [s].
+        rate: largest change of the commanded force [N/s].
+        uncertainty: standard deviation of its force [N].
+        diameter: diameter of the propeller [m].
+        open_water: thrust coefficient at rest, and the advance ratio of no thrust [1].
+        hangs: whether damage has left it a single force, as of an `Azimuth` (a truth value).
+
+    Raises:
+        LayoutError: a value is out of its bounds, or the arc is a full turn; the message names the
+            argument.
+    """
 
     type: ClassVar[str] = "tilt"
     SAMPLE_ARC = (-math.pi / 3, math.pi / 3)

@@ -1,9 +1,9 @@
-"""The kinds of actuator there are, and what follows for the actuators of a robot. A kind is one
-line here; it is imported when a robot has one.
+"""The kinds of actuator there are, by name, and the laws and responses of a robot's actuators by
+kind. A kind is one line here; its module is imported when a robot has one.
 
-Kinds that stand elsewhere are in modules that `FINLAB_KINDS` names, with commas between; each adds
-its own to `KINDS`, which refuses what is no kind. A module that cannot be imported is a
-`FinlabError`.
+Kinds outside finlab are in modules that the environment variable `FINLAB_KINDS` names, with commas
+between; each adds its own to `KINDS`, which refuses a class that is no kind. A module that cannot
+be imported is a `FinlabError`.
 """
 
 import os
@@ -14,7 +14,7 @@ from pkgutil import resolve_name
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.actuator import Actuator, Places
+from finlab.actuators.actuator import Actuator, Indices
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.arrays import Array
@@ -22,13 +22,15 @@ from finlab.errors import FinlabError
 
 
 class Kinds(MutableMapping[str, type[Actuator]]):
-    """Kinds by the type that layouts give them, each imported when it is asked for. Raises
-    FinlabError where one is added that is none: it lacks what the contract asks for, whose name the
-    sentence says."""
+    """Kinds by the type that layouts give them, each imported on first use.
 
-    def __init__(self, homes: dict[str, str]) -> None:
-        """Takes types of actuators -> where their classes stand, `module:Class`."""
-        self._kinds: dict[str, str | type[Actuator]] = dict(homes)
+    Raises:
+        FinlabError: a class that is added is no kind; the sentence names what it lacks.
+    """
+
+    def __init__(self, paths: dict[str, str]) -> None:
+        """Takes types of actuators -> their classes, as `module:Class`."""
+        self._kinds: dict[str, str | type[Actuator]] = dict(paths)
 
     def __getitem__(self, name: str) -> type[Actuator]:
         kind = self._kinds[name]
@@ -37,7 +39,7 @@ class Kinds(MutableMapping[str, type[Actuator]]):
         return kind
 
     def __setitem__(self, name: str, kind: type[Actuator]) -> None:
-        """Adds a kind, or puts another one in its place."""
+        """Adds a kind, or replaces one."""
         from finlab.actuators.kind_check import check_kind
 
         check_kind(name, kind)
@@ -68,50 +70,79 @@ KINDS = Kinds(
 """Type of an actuator in a layout -> its class."""
 
 
-def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places, by kind. Raises DataError: a bad
-    table."""
-    groups: list[tuple[Places, ActuatorLaw]] = []
-    for places, kind in _kinds(actuators):
-        groups += [(places[among], law) for among, law in kind.laws([actuators[i] for i in places])]
+def laws_of(actuators: Sequence[Actuator]) -> list[tuple[Indices, ActuatorLaw]]:
+    """Returns the laws of a robot's n actuators, by kind.
+
+    Args:
+        actuators: n actuators.
+
+    Returns:
+        Laws, each with the indices of its m actuators among the n.
+
+    Raises:
+        DataError: a table that a law reads is bad.
+    """
+    laws: list[tuple[Indices, ActuatorLaw]] = []
+    for indices, kind in _by_kind(actuators):
+        for indices_in_kind, law in kind.laws([actuators[i] for i in indices]):
+            laws.append((indices[indices_in_kind], law))
+    return laws
+
+
+def groups_of(actuators: Sequence[Actuator], effectiveness: Array) -> list[tuple[Indices, Group]]:
+    """Returns the responses to prices of a robot's n actuators, by kind (Eq. 5).
+
+    Args:
+        actuators: n actuators.
+        effectiveness: wrench (n, 3, 6) of 1 N along each own axis [1, m], body frame.
+
+    Returns:
+        Groups, each with the indices of its m actuators among the n.
+
+    Raises:
+        DataError: a table that a law reads is bad.
+    """
+    groups: list[tuple[Indices, Group]] = []
+    for indices, kind in _by_kind(actuators):
+        group = kind.KIND.group([actuators[i] for i in indices], effectiveness[indices])
+        groups.append((indices, group))
     return groups
 
 
-def groups_of(actuators: Sequence[Actuator], effectiveness: Array) -> list[tuple[Places, Group]]:
-    """Returns the answers to prices of a robot's actuators by kind, with their places;
-    `effectiveness` (n, 3, 6) is the wrench of 1 N along their own axes. Errors as for
-    `FinGroup`."""
-    kinds = [(places, kind, [actuators[i] for i in places]) for places, kind in _kinds(actuators)]
-    return [(places, kind.GROUP(parts, effectiveness[places])) for places, kind, parts in kinds]
-
-
-def _kinds(actuators: Sequence[Actuator]) -> Iterator[tuple[Places, type[Actuator]]]:
-    """The kinds of a robot's actuators, in the order in which they come, with their places; those
-    that share their law (tilts are azimuths) are one."""
-    laws = [type(part).LAW for part in actuators]
+def _by_kind(actuators: Sequence[Actuator]) -> Iterator[tuple[Indices, type[Actuator]]]:
+    """Indices (m,) of a robot's actuators of each kind, in the order in which kinds first occur;
+    kinds with the same law (tilts are azimuths) count as one."""
+    laws = [type(actuator).KIND.law for actuator in actuators]
     for law in dict.fromkeys(laws):
-        places = np.array([i for i, own in enumerate(laws) if own is law])
-        yield places, type(actuators[places[0]])
+        indices = np.array([i for i, own in enumerate(laws) if own is law])
+        yield indices, type(actuators[indices[0]])
 
 
 def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
-    """Which commands (n, 3) are angles; whether they may turn freely depends on their limits."""
-    return np.array([[k == part.ANGLE for k in range(3)] for part in actuators])
+    """Returns which numbers of the commands (n, 3) are angles that aim the force; whether one may
+    turn all round depends on its limits."""
+    is_angle = np.zeros((len(actuators), 3), dtype=np.bool_)
+    for i, actuator in enumerate(actuators):
+        if actuator.KIND.aiming_number is not None:
+            is_angle[i, actuator.KIND.aiming_number] = True
+    return is_angle
 
 
 def import_kinds(module: str) -> None:
-    """Imports a module that `FINLAB_KINDS` names, which adds its kinds. Raises FinlabError: it
-    cannot be imported, or one of its kinds is none."""
+    """Imports a module that `FINLAB_KINDS` names, which adds its kinds.
+
+    Raises:
+        FinlabError: it cannot be imported, or a class that it adds is no kind.
+    """
     try:
         import_module(module)
     except FinlabError as error:
         raise FinlabError(f"FINLAB_KINDS: {error}") from error
-    except Exception as error:  # whatever somebody else's module does
-        said = " ".join(f"{type(error).__name__}: {error}".split())
+    except Exception as error:  # anything: the module is not finlab's
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise FinlabError(
-            f"FINLAB_KINDS: the module {module!r} cannot be imported ({said:.200}); put it where "
-            "Python "
-            "finds it, such as in PYTHONPATH, mend it, or leave it out"
+            f"FINLAB_KINDS: the module {module!r} cannot be imported ({reason:.200}); put it where "
+            "Python finds it, such as in PYTHONPATH, mend it, or leave it out"
         ) from error
 
 

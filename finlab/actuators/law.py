@@ -1,14 +1,14 @@
-"""Base of the laws of actuators: command to force in its own frame, and to power, with derivatives.
+"""Base of the laws of actuators: command to force in the own frame, and to power, with derivatives.
 
 Own frames are those of `finlab.layout`, of a fin: shaft, zero, shaft x zero. A law's parameters are
-numbers, or arrays (n,) where it speaks for n actuators at once. Laws of fins are written once, for
+numbers, or arrays (n,) where it holds for n actuators at once. Laws of fins are written once, for
 numpy's arrays, torch's tensors (which training differentiates by itself) and CasADi's symbols;
-derivatives in closed form stand beside them. The other laws work with numpy's arrays.
+derivatives in closed form stand with them. The other laws work with numpy's arrays.
 
 The power of a fin is that of a rigid plate that beats in still water, its inertia and its drag: it
 turns as theta = A sin(2 pi f t) about its zero direction against the torque J theta'' + K theta'
-|theta'|. Driving costs power; braking wins none back. The mean over a cycle of max(torque theta',
-0) has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 = sin.
+|theta'|. Driving costs power; braking recovers none. The mean over a cycle of max(torque theta', 0)
+has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 = sin.
 """
 
 import math
@@ -25,7 +25,12 @@ from finlab.arrays import Array, Values, library_of
 OWN_INERTIA = 0.0097
 """Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot
 description has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its centre 0.09 m from the shaft."""
+OWN_LENGTH = 0.20
+"""Length of that fin [m]."""
+OWN_WIDTH = 0.10
+"""Width of that fin [m]."""
 EIGHT_PI2 = 8.0 * math.pi**2
+"""(2 pi)^3 / pi: of the mean power of a beat."""
 
 
 @dataclass(frozen=True)
@@ -33,16 +38,19 @@ class Blade:
     """A rectangular plate that beats about one of its edges; U-CAT's where nothing else is known.
 
     Fields are numbers, or arrays (n,) for n fins.
+
+    Args:
+        length: from the shaft to the tip [m]; U-CAT's robot description has 0.22, its simulator
+            0.18.
+        width: along the shaft [m].
+        density: density of the water [kg/m^3].
+        drag_coefficient: that of a plate broadside to the flow [1].
     """
 
-    length: Any = 0.20
-    """From the shaft to the tip [m]; U-CAT's robot description has 0.22, its simulator 0.18."""
-    width: Any = 0.10
-    """Along the shaft [m]."""
+    length: Any = OWN_LENGTH
+    width: Any = OWN_WIDTH
     density: Any = 1000.0
-    """Of the water [kg/m^3]."""
     drag_coefficient: Any = 2.0
-    """Of a plate broadside to the flow."""
 
     @property
     def virtual_mass(self) -> Any:
@@ -57,7 +65,7 @@ class Blade:
     @property
     def own_inertia(self) -> Any:
         """Moment of inertia [kg m^2] of the blade itself: U-CAT's, in proportion to W L^3."""
-        return OWN_INERTIA * (self.length / 0.20) ** 3 * (self.width / 0.10)
+        return OWN_INERTIA * (self.length / OWN_LENGTH) ** 3 * (self.width / OWN_WIDTH)
 
     @cached_property
     def inertia(self) -> Any:
@@ -71,38 +79,48 @@ class Blade:
 
     @cached_property
     def _drag_over_inertia(self) -> Any:
+        """K / J [1/rad]."""
         return self.drag / self.inertia
 
     def power(self, amplitude: Values, frequency: Values) -> Values:
-        """Returns the mean mechanical power [W] at half amplitude [rad] and frequency [Hz]."""
-        drag, inertia = self._shares(amplitude)
+        """Returns the mean mechanical power of a beat.
+
+        Args:
+            amplitude: half amplitude A (...) [rad].
+            frequency: frequency f (...) [Hz].
+
+        Returns:
+            8 pi^2 f^3 A^2 (k A + j) (...) [W], where k and j are the parts of drag and inertia.
+        """
+        drag, inertia = self._parts(amplitude)
         beat = amplitude * frequency
         return EIGHT_PI2 * frequency * beat * beat * (drag * amplitude + inertia)
 
     def power_gradient(self, amplitude: Values, frequency: Values) -> tuple[Values, Values]:
-        """Returns the power's derivatives by amplitude [W/rad] and frequency [W/Hz]."""
-        drag, inertia = self._shares(amplitude)
+        """Returns the derivatives of `power` by amplitude (...) [W/rad] and by frequency (...)
+        [W/Hz]. Those of k and j by the amplitude cancel, since s0 is where the torque is 0."""
+        drag, inertia = self._parts(amplitude)
         scale = EIGHT_PI2 * frequency * frequency * amplitude
         by_amplitude = scale * frequency * (3.0 * drag * amplitude + 2.0 * inertia)
-        return by_amplitude, 3.0 * scale * amplitude * (drag * amplitude + inertia)
+        by_frequency = 3.0 * scale * amplitude * (drag * amplitude + inertia)
+        return by_amplitude, by_frequency
 
-    def _shares(self, amplitude: Values) -> tuple[Values, Values]:
-        """The parts of drag (over A) and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
+    def _parts(self, amplitude: Values) -> tuple[Values, Values]:
+        """Parts of drag, over A, and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
         sqrt = library_of(amplitude).sqrt
-        twice = 2.0 * self._drag_over_inertia * amplitude
-        # Where the torque changes sign: s0 = (drag / inertia) A (1 - s0^2). The mean does not
-        # change with s0.
-        end = twice / (1.0 + sqrt(1.0 + twice * twice))
-        squared = end * end
-        drag = self.drag * (end * (1.0 - squared / 3.0) + 2.0 / 3.0)
-        return drag, 0.5 * self.inertia * (1.0 - squared)
+        # The torque changes sign where s0 = (K A / J) (1 - s0^2).
+        twice_ratio = 2.0 * self._drag_over_inertia * amplitude
+        s0 = twice_ratio / (1.0 + sqrt(1.0 + twice_ratio * twice_ratio))
+        s0_squared = s0 * s0
+        drag = self.drag * (s0 * (1.0 - s0_squared / 3.0) + 2.0 / 3.0)
+        inertia = 0.5 * self.inertia * (1.0 - s0_squared)
+        return drag, inertia
 
 
 class ActuatorLaw(ABC):
     """Command to force and power of one actuator, or of n actuators that share a law.
 
-    `inflow` is the velocity (..., n, 3) [m/s] of their places through the water, in their own
-    frames; None at rest. Laws that do not feel the flow pass over it.
+    Of one actuator the axis n is left out of all shapes.
     """
 
     feels_flow: bool = False
@@ -110,42 +128,67 @@ class ActuatorLaw(ABC):
 
     @abstractmethod
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """Returns the force (..., n, 3) [N], of fins the mean over a beat, in own frames, of
-        commands (..., n, 3), in single or double precision as the commands are."""
+        """Returns the force of commands.
+
+        Args:
+            command: commands (..., n, 3) [rad, Hz or N, by kind].
+            inflow: velocity (..., n, 3) of the actuators' points through the water, own frames
+                [m/s]; None at rest. Laws that do not feel the flow ignore it.
+
+        Returns:
+            Forces (..., n, 3), own frames [N], of fins the mean over a beat; in single or double
+            precision as the commands are.
+        """
 
     @abstractmethod
     def force_and_jacobian(
         self, command: Array, inflow: Array | None = None
     ) -> tuple[Array, Array]:
-        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3
-        axes)."""
+        """Returns the force, and its derivative by the command.
+
+        Args:
+            command: commands (..., n, 3).
+            inflow: as for `force`.
+
+        Returns:
+            Forces (..., n, 3) [N], and derivatives (..., n, 3 numbers of the command, 3 axes).
+        """
 
     @abstractmethod
     def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """Returns the power (..., n) [W] of commands (..., n, 3), of fins the mechanical one."""
+        """Returns the power of commands.
+
+        Args:
+            command: commands (..., n, 3).
+            inflow: as for `force`.
+
+        Returns:
+            Power (..., n) [W], of fins the mechanical one.
+        """
 
     @abstractmethod
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """Returns the power's derivatives (..., n, 3) by each command."""
+        """Returns the derivatives (..., n, 3) of `power` by each number of the command."""
 
 
 class FinLaw(ActuatorLaw):
-    """The law of one flapping fin, or of n fins that share a model. Commands are half amplitude
-    [rad], frequency [Hz] and zero direction [rad]."""
+    """Base of the laws of one flapping fin, or of n fins with the same model. Commands are half
+    amplitude [rad], frequency [Hz] and zero direction [rad]."""
 
     uniform: bool = True
-    """Whether the size of the force is the same whatever the zero direction."""
+    """Whether the size of the force does not depend on the zero direction."""
     blade: Blade = Blade()
-    """The plate whose beating takes power, where nothing better is known."""
+    """The plate whose beating takes power, where no power was measured."""
 
     offset: Any = 0.0
-    """Angle [rad] from the zero direction to the thrust, where the law has one for all."""
+    """Angle from the zero direction to the thrust, of a law that has one for all commands [rad]."""
     unevenness: tuple[float, float] = (0.0, 0.0)
-    """e and phi_e: how the size depends on the zero direction, as 1 + e cos(phi - phi_e)."""
+    """e [1] and phi_e [rad] of the factor 1 + e cos(phi - phi_e), by which the size of the force
+    depends on the zero direction phi."""
     measured: bool = False
     """Whether it is a table of forces rather than a formula."""
     notes: tuple[str, ...] = ()
-    """What to know of the law, a sentence each."""
+    """Remarks of a table's file, a sentence each."""
 
     @property
     def has_power(self) -> bool:
@@ -154,18 +197,23 @@ class FinLaw(ActuatorLaw):
 
     @abstractmethod
     def grid_numbers(self, lower: Array, upper: Array) -> Array:
-        """Returns the law of one fin within limits (3,) as a grid for the core; see `grid_numbers`:
-        forces along own axes, or their size alone, without the unevenness."""
+        """Returns the law of one fin as a grid for the core, see `hermite_grid.grid_numbers`: of
+        the forces along own axes, or of their size alone, without the unevenness.
+
+        Args:
+            lower: least command (3,) [rad, Hz, rad].
+            upper: greatest command (3,).
+        """
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
         return self.blade.power(command[..., 0], command[..., 1])
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        jacobian = np.zeros(command.shape)
-        jacobian[..., 0], jacobian[..., 1] = self.blade.power_gradient(
-            command[..., 0], command[..., 1]
-        )
-        return jacobian
+        by_amplitude, by_frequency = self.blade.power_gradient(command[..., 0], command[..., 1])
+        gradient = np.zeros(command.shape)
+        gradient[..., 0] = by_amplitude
+        gradient[..., 1] = by_frequency
+        return gradient
 
 
 class PlanarLaw(FinLaw):
@@ -179,21 +227,33 @@ class PlanarLaw(FinLaw):
     """
 
     def grid_numbers(self, lower: Array, upper: Array) -> Array:
-        """See `FinLaw`: of the size."""
-        even = 1.0 + self.unevenness[0]
-        around = self.unevenness[1]
-        return size_numbers(lambda a, f: np.asarray(self.thrust(a, f, around) / even), lower, upper)
+        """See `FinLaw`: of the size, which is largest, by 1 + e, at phi_e."""
+        e, phi_e = self.unevenness
+
+        def size(amplitude: Array, frequency: Array) -> Array:
+            return np.asarray(self.thrust(amplitude, frequency, phi_e) / (1.0 + e))
+
+        return size_numbers(size, lower, upper)
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
-        """Returns the size [N] of the force at half amplitude [rad], frequency [Hz], zero direction
-        [rad]."""
+        """Returns the size of the force.
+
+        Args:
+            amplitude: half amplitude A (...) [rad].
+            frequency: frequency f (...) [Hz].
+            zero_direction: zero direction phi (...) [rad].
+
+        Returns:
+            Thrust (...) [N].
+        """
 
     @abstractmethod
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
-        """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
+        """Returns the derivatives of `thrust` by amplitude (...) [N/rad], by frequency (...) [N/Hz]
+        and by zero direction (...) [N/rad]."""
 
     @final
     def force(self, command: Values, inflow: Array | None = None) -> Values:
@@ -204,8 +264,7 @@ class PlanarLaw(FinLaw):
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
         if xp is np:
-            # Half the time of `stack`, which counts: every answer of an allocator is judged by
-            # this.
+            # Half the time of `stack`: the plant evaluates this for every answer of an allocator.
             force = np.zeros((*thrust.shape, 3), thrust.dtype)
             np.cos(direction, out=force[..., 1])
             np.sin(direction, out=force[..., 2])
@@ -220,18 +279,22 @@ class PlanarLaw(FinLaw):
     def force_and_jacobian(
         self, command: Array, inflow: Array | None = None
     ) -> tuple[Array, Array]:
-        parts = command[..., 0], command[..., 1], command[..., 2]
-        direction = parts[2] + self.offset
+        amplitude = command[..., 0]
+        frequency = command[..., 1]
+        zero_direction = command[..., 2]
+        direction = zero_direction + self.offset
         cos = np.cos(direction)
         sin = np.sin(direction)
-        thrust = self.thrust(*parts)
+        thrust = self.thrust(amplitude, frequency, zero_direction)
         force = np.zeros((*thrust.shape, 3))
         jacobian = np.zeros((*thrust.shape, 3, 3))
         force[..., 1] = thrust * cos
         force[..., 2] = thrust * sin
-        for k, slope in enumerate(self.thrust_gradient(*parts)):
+        gradient = self.thrust_gradient(amplitude, frequency, zero_direction)
+        for k, slope in enumerate(gradient):
             jacobian[..., k, 1] = slope * cos
             jacobian[..., k, 2] = slope * sin
+        # The force turns with the zero direction.
         jacobian[..., 2, 1] -= force[..., 2]
         jacobian[..., 2, 2] += force[..., 1]
         return force, jacobian

@@ -1,5 +1,5 @@
-"""The propeller of thrusters, fixed or turning: its description, its law, and its input for a
-force."""
+"""What thrusters with a fixed axis and turning ones have in common: a propeller, with its limits,
+its power, its jet, and its input for a force."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from finlab.actuators.actuator import Actuator, Box, Command
+from finlab.actuators.actuator import Actuator, Command
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
@@ -19,22 +19,35 @@ from finlab.arrays import NEARLY, NOTHING, AnyArray, Array, Values
 from finlab.errors import AllocationError
 
 ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
+"""A rate of change of a force [N/s]."""
 Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
-T200 = PowerLaw(0.997, 1.449)
-"""Power of a T200 of Blue Robotics at 16 V."""
-T200_FORCE, T200_DIAMETER = 51.44, 0.076
-"""Its largest force [N], and the diameter of its propeller [m]."""
-LEAST_DIAMETER = 1e-3
-"""The smallest diameter that a propeller may have [m]."""
+"""A size of a force [N]."""
 OpenWater = tuple[
     Annotated[float, Meta(ge=1e-3, le=10.0)], Annotated[float, Meta(ge=1e-2, le=10.0)]
 ]
-LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
+"""Thrust coefficient Kt at rest, and the advance ratio J at which there is no thrust [1]."""
+T200 = PowerLaw(forward=0.997, reverse=1.449)
+"""Power [W] of a T200 of Blue Robotics at 16 V, over the force [N]."""
+T200_FORCE = 51.44
+"""Its largest force ahead [N]."""
+T200_FORCE_ASTERN = -39.91
+"""Its largest force astern [N]."""
+T200_DIAMETER = 0.076
+"""Diameter of its propeller [m]."""
+LEAST_DIAMETER = 1e-3
+"""The smallest diameter that a propeller may have [m]."""
+LEAST_FORCE = 1e-9
+"""Force [N] at least, by which the power of a table's end is divided."""
+LEAST_FACTOR = 1e-6
+"""Power at 1 N [W] that a law made of a table has at least."""
+FORMULAS = ("power_law",)
+"""Types of `ThrustModel` that need no measurements."""
+LAW_FIELDS = tuple(field.name for field in fields(PowerLaw))
+"""Parameters of a `PowerLaw`."""
 
 
 class Propeller(Actuator):
-    """Base of thrusters, fixed or turning: limits of the force [N], dead band, power, jet; see
-    `Actuator`."""
+    """Base of thrusters, fixed or turning; `Thruster` says what its fields mean."""
 
     KEYS: ClassVar[Mapping[str, str]] = {
         "position": "position_m",
@@ -45,37 +58,6 @@ class Propeller(Actuator):
         "rate": "rate_n_s",
         "diameter": "diameter_m",
     }
-    BOXES: ClassVar[tuple[Box, ...]] = (
-        Box("Dead band [N]", "dead_band", "Forces smaller than this, but 0, cannot be held."),
-        Box("Rate [N/s]", "rate", "How fast the force changes; 0: at once.", free=True),
-        Box("Lag [s]", "time_constant", "Time to 63 % of a new command.", 0.05),
-        Box(
-            "Diameter [m]",
-            "diameter",
-            "Of the propeller, for its jet; 0: by its force.",
-            0.01,
-            free=True,
-        ),
-        Box("Torque/force [m]", "torque_per_newton", "Reaction torque, signed.", 0.001),
-    )
-    LAW_BOXES = (
-        Box(
-            "Ahead [W]",
-            "forward",
-            "Power at 1 N; F newtons take it times F^exponent.",
-            law="power_law",
-        ),
-        Box(
-            "Astern [W]",
-            "reverse",
-            "The same of a negative force; 0: as ahead.",
-            free=True,
-            law="power_law",
-        ),
-        Box("Exponent", "exponent", "1.5 is that of an ideal propeller at rest.", law="power_law"),
-    )
-
-    MODELS = ("power_law",)
     UNSAID: ClassVar[tuple[str, ...]] = ("hangs",)
 
     force: tuple[float, float]
@@ -87,19 +69,23 @@ class Propeller(Actuator):
     hangs: bool
 
     def hung(self, force: float) -> Self:
-        """Returns it with a force [N] as its only one, at which it hangs whatever is asked.
+        """Returns it with a single force, which it keeps whatever is commanded.
 
-        The propeller is the same: a jet that was guessed from the largest force stays as it is.
-        Raises AllocationError: it cannot give that force, which is not clipped, since then the
-        others would make up for a force that is not there.
+        The propeller is the same: a jet that was estimated from the largest force stays as it is.
+
+        Args:
+            force: the force that it keeps [N].
+
+        Raises:
+            AllocationError: it cannot give that force, which is not clipped, since the others
+                would then compensate for a force that is not there.
         """
         least, most = self.force
         rounding = NEARLY * max(-least, most)
         if not least - rounding <= force <= most + rounding:
             raise AllocationError(
                 f"damage of {self.name!r}: expected a force from {least:g} to {most:g} N, which "
-                "is what this "
-                f"{self.type} can give, got {force:g} N"
+                f"is what this {self.type} can give, got {force:g} N"
             )
         held = min(max(force, least), most)
         diameter = self.diameter or max(self.jet, LEAST_DIAMETER)
@@ -107,34 +93,38 @@ class Propeller(Actuator):
 
     @property
     def jet(self) -> float:
-        """See `Actuator`: its diameter, or that at which its largest force loads the disc as a
-        T200's."""
-        return self.diameter or T200_DIAMETER * math.sqrt(max(map(abs, self.force)) / T200_FORCE)
+        """See `Actuator`: the diameter of its propeller, or that at which its largest force per
+        area of the disc is a T200's."""
+        if self.diameter:
+            return self.diameter
+        largest = max(map(abs, self.force))
+        return T200_DIAMETER * math.sqrt(largest / T200_FORCE)
 
     @property
     def advance(self) -> float | None:
         """See `Actuator`. Along the line `Kt = Kt0 (1 - J / J0)`, `J = V / (n D)` (Fossen, 2011,
-        section
-        9.4), the loss is `J / J0`, and the jet's speed at rest is `n D sqrt(8 Kt0 / pi)`."""
+        section 9.4), the loss is `J / J0`, and the jet's speed at rest is `n D sqrt(8 Kt0 / pi)`.
+        """
         if self.open_water is None:
             return None
-        at_rest, none_at = self.open_water
-        return math.sqrt(8.0 * at_rest / math.pi) / none_at
+        Kt0, J0 = self.open_water
+        return math.sqrt(8.0 * Kt0 / math.pi) / J0
 
     def with_value(self, key: str, value: Any) -> Self:
-        if key not in LAW_KEYS:
+        if key not in LAW_FIELDS:
             return super().with_value(key, value)
-        known = isinstance(self.model, PowerLaw)
-        return replace(self, model=replace(self.model, **{key: value})) if known else self
+        if not isinstance(self.model, PowerLaw):
+            return self
+        return replace(self, model=replace(self.model, **{key: value}))
 
-    def with_model(self, kind: str) -> Self:
-        return (
-            replace(self, model=_law_of(self.model)) if isinstance(self.model, PowerTable) else self
-        )
+    def with_model(self, model_type: str) -> Self:
+        if not isinstance(self.model, PowerTable):
+            return self
+        return replace(self, model=_law_of(self.model))
 
     def scaled(self, share: float) -> Self:
-        """See `Actuator`. The command is the force that it gives: one of 0.8 has limits of 0.8 as
-        much, and takes the power of force / 0.8."""
+        """See `Actuator`. The command is the force itself: of 0.8 of the force the limits are 0.8
+        as large, and a force takes the power that force / 0.8 took."""
         return replace(
             self,
             force=(share * self.force[0], share * self.force[1]),
@@ -144,113 +134,141 @@ class Propeller(Actuator):
         )
 
     def command(self, row: Array) -> Command | None:
-        """See `Actuator`: with what its table says to send for it."""
+        """See `Actuator`: with the input for its force, where it has a table."""
         if np.isnan(row[0]):
             return None
-        numbers = row[: len(self.NUMBERS)].tolist()
-        sent = input_of(self.model, row[len(self.NUMBERS) - 1])
-        return self.COMMAND(*numbers, None if sent is None else float(sent))
+        numbers = row[: len(self.KIND.numbers)].tolist()
+        table_input = input_of(self.model, row[len(self.KIND.numbers) - 1])
+        return self.KIND.command(*numbers, None if table_input is None else float(table_input))
 
     def commands(self, rows: Array) -> Command:
-        """See `Actuator`: with what its table says to send for each."""
-        numbers = rows[:, : len(self.NUMBERS)].T
-        sent = input_of(self.model, numbers[-1])
-        if sent is not None:
-            sent.setflags(write=False)
-        return self.COMMAND(*numbers, sent)
+        """See `Actuator`: with the inputs for their forces, where it has a table."""
+        numbers = rows[:, : len(self.KIND.numbers)].T
+        table_input = input_of(self.model, numbers[-1])
+        if table_input is not None:
+            table_input.setflags(write=False)
+        return self.KIND.command(*numbers, table_input)
 
 
 def input_of(model: ThrustModel, force: ArrayLike) -> Array | None:
-    """Returns what a table says to send for forces (...) [N], in the table's unit; None for a power
-    law.
+    """Returns the inputs of a propeller for forces, by its table.
 
-    Where several inputs give no force, the middle of them stops the propeller.
+    Args:
+        model: power law or table.
+        force: forces (...) [N].
+
+    Returns:
+        Inputs (...) in the table's unit, interpolated linearly, for a force of 0 the middle of the
+        inputs that give none; None for a power law.
     """
     if not isinstance(model, PowerTable):
         return None
     force = np.asarray(force, np.float64)
     inputs, forces, _ = model.columns
-    first = np.searchsorted(forces, 0.0, "left")
-    last = np.searchsorted(forces, 0.0, "right")
-    ahead = slice(max(last - 1, 0), None)
-    astern = slice(0, first + 1)
-    sent: Array = np.where(
+    first_zero = np.searchsorted(forces, 0.0, "left")
+    past_zero = np.searchsorted(forces, 0.0, "right")
+    ahead = slice(max(past_zero - 1, 0), None)
+    astern = slice(0, first_zero + 1)
+    result: Array = np.where(
         force > 0.0,
         np.interp(force, forces[ahead], inputs[ahead]),
         np.interp(force, forces[astern], inputs[astern]),
     )
-    if first < last:
-        sent = np.where(force == 0.0, 0.5 * (inputs[first] + inputs[last - 1]), sent)
-    return sent
+    if first_zero < past_zero:
+        middle = 0.5 * (inputs[first_zero] + inputs[past_zero - 1])
+        result = np.where(force == 0.0, middle, result)
+    return result
 
 
-def given_force(part: Any) -> tuple[float, float]:
-    """Returns the least and the most force [N] that one gives of `force` with its `dead_band`: none
-    where all of its commands lie in the band."""
-    least, most = part.force
+def usable_force(propeller: Any) -> tuple[float, float]:
+    """Returns the least and most force [N] of a propeller, its `force`; (0, 0) where all of it lies
+    within the `dead_band`."""
+    least, most = propeller.force
     largest = max(-least, most)
-    return (least, most) if largest >= part.dead_band * (1.0 - NOTHING) else (0.0, 0.0)
+    if largest >= propeller.dead_band * (1.0 - NOTHING):
+        return least, most
+    return 0.0, 0.0
 
 
-def form_of(kind: Literal["thruster", "pod"], given: Array, sign: float = 1.0) -> Form:
-    """Returns how the forces of one become commands, by the least and most force (2,) that it gives
-    [N] and the sign of a thruster's command: the law of one whose commands all lie in its dead band
-    gives nothing."""
-    gives_nothing = not given.any()
+def form_of(kind: Literal["thruster", "pod"], limits: Array, sign: float = 1.0) -> Form:
+    """Returns how forces of a propeller become commands.
+
+    Args:
+        kind: whether its axis is fixed.
+        limits: its usable force, least and most (2,) [N]; zeros for one that gives none.
+        sign: sign of a thruster's command for a force along its `Line`.
+    """
+    gives_nothing = not limits.any()
     return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, sign=sign)
 
 
 def _law_of(table: PowerTable) -> PowerLaw:
+    """A power law, exponent 1.5, through both ends of a table."""
     _, force, power = table.columns
-    least, most = (
-        float(f"{max(power[k] / max(abs(force[k]), 1e-9) ** 1.5, 1e-6):.4g}") if force[k] else None
-        for k in (0, -1)
-    )
-    return PowerLaw(most or least or 1.0, least)
+    forward = _factor(force[-1], power[-1])
+    reverse = _factor(force[0], power[0])
+    return PowerLaw(forward or reverse or 1.0, reverse)
+
+
+def _factor(force: float, power: float) -> float | None:
+    """Power at 1 N [W], to four digits, where P ~ F^1.5 passes through a point (N, W); None at a
+    force of 0."""
+    if not force:
+        return None
+    factor = power / max(abs(force), LEAST_FORCE) ** 1.5
+    return float(f"{max(factor, LEAST_FACTOR):.4g}")
 
 
 def _scaled(model: ThrustModel, share: float) -> ThrustModel:
+    """The model of a propeller with `share` of the force at each power."""
     if isinstance(model, PowerTable):
-        return replace(
-            model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows)
-        )
-    more = share**-model.exponent
-    reverse = None if model.reverse is None else more * model.reverse
-    return PowerLaw(more * model.forward, reverse, model.exponent)
+        rows = tuple((command, share * force, power) for command, force, power in model.rows)
+        return replace(model, rows=rows)
+    # P = c (F / share)^e
+    factor = share**-model.exponent
+    reverse = None if model.reverse is None else factor * model.reverse
+    return PowerLaw(factor * model.forward, reverse, model.exponent)
 
 
-def force_words(force: float, angle: str, sent: float | None) -> str:
-    """Returns a force [N] in words, with what is to be sent for it."""
-    return f"{round(force, 3) + 0.0:.3f} N{angle}" + ("" if sent is None else f", input {sent:.5g}")
+def force_words(force: float, angle: str, table_input: float | None) -> str:
+    """Returns a command as text: force [N], angle in words, and input where there is one."""
+    words = f"{round(force, 3) + 0.0:.3f} N{angle}"
+    return words if table_input is None else f"{words}, input {table_input:.5g}"
 
 
 class PropellerLaw(ActuatorLaw):
-    """n propellers, one of whose commands is a force; there is none within the dead band."""
+    """Base of the laws of n propellers: one number of the command is the force, which is 0 within
+    the dead band."""
 
     column: int
-    """Which of the three commands it is."""
+    """Index of that number in a command (3,)."""
 
-    def __init__(self, parts: Sequence[Propeller]) -> None:
+    def __init__(self, propellers: Sequence[Propeller]) -> None:
         """Takes n thrusters, or n that turn."""
-        self.power_curve = ThrustPower([part.model for part in parts])
-        self.dead_band = np.array([part.dead_band for part in parts])
+        self.power_curve = ThrustPower([propeller.model for propeller in propellers])
+        self.dead_band = np.array([propeller.dead_band for propeller in propellers])
 
-    def given(self, command: Values) -> Any:
-        """Returns the forces (..., n) [N] of commands (..., n, 3)."""
-        return held(command[..., self.column], self.dead_band)
+    def thrust(self, command: Values) -> Any:
+        """Returns the signed forces (..., n) [N] of commands (..., n, 3)."""
+        return outside_dead_band(command[..., self.column], self.dead_band)
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes
-        none."""
-        return self.power_curve.watts(self.given(command))
+        """See `ActuatorLaw`: electrical power, with the motor's loss; turning takes none."""
+        return self.power_curve.watts(self.thrust(command))
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         gradient = np.zeros(command.shape)
-        gradient[..., self.column] = self.power_curve.marginal(self.given(command))
+        gradient[..., self.column] = self.power_curve.marginal(self.thrust(command))
         return gradient
 
 
-def held(force: AnyArray, dead_band: Array, rest: Array | float = 0.0) -> AnyArray:
-    """Returns the forces (..., n) [N] that come of commanded ones: `rest` within the dead bands
-    (n,) [N]."""
-    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), rest, force))
+def outside_dead_band(force: AnyArray, dead_band: Array, inside: Array | float = 0.0) -> AnyArray:
+    """Returns the forces that propellers give for commanded ones.
+
+    Args:
+        force: commanded forces (..., n) [N].
+        dead_band: dead bands (n,) [N].
+        inside: forces within the dead band [N].
+    """
+    is_inside = np.abs(force) < dead_band * (1.0 - NOTHING)
+    return np.asarray(np.where(is_inside, inside, force))

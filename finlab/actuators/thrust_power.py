@@ -1,9 +1,13 @@
-"""Propellers: the law that thrusters share, and their power over the force, a power law or a convex
-curve through a table of measurements."""
+"""Power of propellers over their force, as functions of arrays: power laws, and convex curves
+through tables of measurements; and their response to a price (Eq. 5), as a table.
+
+`finlab.actuators.thrust_model` has what a layout file says; the laws and groups of thrusters and of
+turning ones, and the rudder's, use what is here.
+"""
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,177 +15,225 @@ from finlab.actuators.response import RadialTable, price_grid
 from finlab.actuators.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 from finlab.arrays import NOTHING, AnyArray, Array
 
+LEAST_SHARE = 1e-6
+"""Least distance of an inserted knot from its neighbours, over their distance [1]."""
+LEAST_RISE = 1e-300
+"""Least rise of a slope between two points, so that equal slopes divide by no zero [W/N]."""
+
 
 class PowerCurve(Protocol):
-    """Watts over newtons, of one propeller or of n: convex, least at rest."""
+    """Power over force, of one propeller or of n: convex, least at rest."""
 
-    def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
+    def power_and_marginal_cost(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Returns the power (..., n) [W] of forces (..., n) [N], and its derivative by the force,
+        the marginal cost (..., n) [W/N]."""
 
-    def answer(self, price: Array) -> Array:
-        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
+    def response(self, price: Array) -> Array:
+        """Returns the forces (..., n) [N] whose marginal cost is a price (..., n) [W/N]."""
 
 
-class ByPower:
-    """Watts that grow with a power of the force, of n propellers."""
+class PowerLaws:
+    """Power laws of n propellers, P = c |F|^e."""
 
     def __init__(self, models: Sequence[PowerLaw]) -> None:
         """Takes n models."""
-        self.forward = np.array([model.forward for model in models])
-        self.reverse = np.array(
-            [model.forward if model.reverse is None else model.reverse for model in models]
-        )
+        forward = []
+        reverse = []
+        for model in models:
+            forward.append(model.forward)
+            reverse.append(model.forward if model.reverse is None else model.reverse)
+        self.forward = np.array(forward)
+        self.reverse = np.array(reverse)
         self.exponent = np.array([model.exponent for model in models])
 
-    def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
-        slope = np.where(force < 0.0, -self.reverse, self.forward) * np.abs(force) ** (
-            self.exponent - 1.0
-        )
-        return slope * force, self.exponent * slope
+    def power_and_marginal_cost(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """See `PowerCurve`: c |F|^e, and its derivative e c |F|^(e - 1) with the sign of F."""
+        factor = np.where(force < 0.0, -self.reverse, self.forward)
+        power_over_force = factor * np.abs(force) ** (self.exponent - 1.0)
+        return power_over_force * force, self.exponent * power_over_force
 
-    def answer(self, price: Array) -> Array:
-        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
+    def response(self, price: Array) -> Array:
+        """See `PowerCurve`: the inverse of the marginal cost, (|v| / (e c))^(1 / (e - 1))."""
         factor = self.exponent * np.where(price < 0.0, self.reverse, self.forward)
         size: Array = (np.abs(price) / factor) ** (1.0 / (self.exponent - 1.0))
         return np.copysign(size, price)
 
 
-class Curve:
-    """Watts over the force's size of one side: convex, quadratic between knots, its slope from 0 at
-    rest."""
+class ConvexCurve:
+    """Power over the force's size through the points of one side of a table: convex, quadratic
+    between knots, with slope 0 at rest (Schumaker, 1983)."""
 
-    def __init__(self, size: Array, watts: Array) -> None:
-        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots
-        between are those of Schumaker (1983): quadratic splines that keep the shape."""
+    def __init__(self, size: Array, power: Array) -> None:
+        """Places the knots of a quadratic spline that keeps the points' shape.
+
+        Args:
+            size: sizes of the force (K,) [N], rising from 0.
+            power: power (K,) [W] at each, convex.
+        """
         step = np.diff(size)
-        chord = np.diff(watts) / step
+        chord = np.diff(power) / step
         slope = np.zeros_like(size)
         slope[1:-1] = (chord[:-1] * step[1:] + chord[1:] * step[:-1]) / (step[1:] + step[:-1])
+        # At the last point as if the chord's slope were met in the middle of a parabola.
         slope[-1] = max(1.5 * chord[-1] - 0.5 * slope[-2], chord[-1])
-        below = chord - slope[:-1]
-        above = slope[1:] - chord
-        total = np.maximum(below + above, 1e-300)
-        share = np.clip(np.where(above < below, above, total - below) / total, 1e-6, 1.0 - 1e-6)
-        between = 2.0 * chord - slope[:-1] * share - slope[1:] * (1.0 - share)
-        gaps = np.arange(1, len(size))
-        self.size = np.insert(size, gaps, size[:-1] + share * step)
-        """Sizes of the force [N] at the knots."""
-        marginal = np.maximum.accumulate(np.maximum(np.insert(slope, gaps, between), 0.0))
-        self.marginal = marginal + NOTHING * slope[-1] * self.size / size[-1]
-        """Marginal cost [W/N] there."""
-        gain = 0.5 * (self.marginal[1:] + self.marginal[:-1]) * np.diff(self.size)
-        self.watts = watts[0] + np.insert(np.cumsum(gain), 0, 0.0)
-        """Power [W] there."""
 
-    def at(self, size: AnyArray) -> tuple[Array, Array]:
-        """Returns power [W] and marginal cost [W/N] of sizes [N]; beyond the last knot on with its
-        slope."""
+        # One knot is inserted in each interval, where both its parabolas can have the slopes at
+        # the interval's ends.
+        rise_before = chord - slope[:-1]
+        rise_after = slope[1:] - chord
+        rise = np.maximum(rise_before + rise_after, LEAST_RISE)
+        first_part = np.where(rise_before < rise_after, rise_after, rise - rise_before)
+        share = np.clip(first_part / rise, LEAST_SHARE, 1.0 - LEAST_SHARE)
+        slope_between = 2.0 * chord - slope[:-1] * share - slope[1:] * (1.0 - share)
+        after_each = np.arange(1, len(size))
+        self.size = np.insert(size, after_each, size[:-1] + share * step)
+        """Sizes of the force at the knots (2 K - 1,) [N]."""
+        marginal_cost = np.insert(slope, after_each, slope_between)
+        marginal_cost = np.maximum.accumulate(np.maximum(marginal_cost, 0.0))
+        # A little steeper, so that each price has one answer.
+        self.marginal_cost = marginal_cost + NOTHING * slope[-1] * self.size / size[-1]
+        """Marginal cost there [W/N]."""
+        gain = 0.5 * (self.marginal_cost[1:] + self.marginal_cost[:-1]) * np.diff(self.size)
+        self.power = power[0] + np.insert(np.cumsum(gain), 0, 0.0)
+        """Power there [W]."""
+
+    def power_and_marginal_cost(self, size: AnyArray) -> tuple[Array, Array]:
+        """See `PowerCurve`, for sizes of the force; beyond the last knot the last parabola goes
+        on."""
         i = np.clip(np.searchsorted(self.size, size, "right") - 1, 0, len(self.size) - 2)
         step = size - self.size[i]
-        bend = (self.marginal[i + 1] - self.marginal[i]) / (self.size[i + 1] - self.size[i])
-        return self.watts[i] + step * (self.marginal[i] + 0.5 * bend * step), self.marginal[
-            i
-        ] + bend * step
+        rise = self.marginal_cost[i + 1] - self.marginal_cost[i]
+        curvature = rise / (self.size[i + 1] - self.size[i])
+        power = self.power[i] + step * (self.marginal_cost[i] + 0.5 * curvature * step)
+        return power, self.marginal_cost[i] + curvature * step
 
-    def answer(self, price: Array) -> Array:
-        """Returns the sizes [N] that are worth most at prices [W/N] from 0 on."""
-        return np.interp(price, self.marginal, self.size)
+    def response(self, price: Array) -> Array:
+        """See `PowerCurve`: sizes of the force at prices from 0 on."""
+        return np.interp(price, self.marginal_cost, self.size)
 
 
-class Sides:
-    """Watts over newtons of a table, forward and reverse, each side a `Curve`."""
+class Side(NamedTuple):
+    """One side of a table, forward or reverse."""
+
+    curve: ConvexCurve
+    """Power over the size of its forces."""
+    sign: float
+    """Sign of its forces."""
+
+
+class TableCurves:
+    """Power over force of a table: forward and reverse, each a `ConvexCurve`."""
 
     def __init__(self, model: PowerTable) -> None:
         """Makes the curves of the sides that the table has."""
         _, force, power = model.columns
         self.rest = float(power.min())
         """Power at rest [W]."""
-        self.curves = []
-        """Curves with the sign of their forces, of the sides that there are."""
+        self.sides: list[Side] = []
         for sign in (1.0, -1.0):
-            size, watts = side_points(force, power, int(sign))
-            watts = np.minimum.accumulate(watts[::-1])[::-1]
-            watts[0] = self.rest
+            size, side_power = side_points(force, power, int(sign))
+            side_power = np.minimum.accumulate(side_power[::-1])[::-1]
+            side_power[0] = self.rest
             if len(size) > 1:
-                self.curves.append((Curve(*lower_hull(size, watts)), sign))
+                self.sides.append(Side(ConvexCurve(*lower_hull(size, side_power)), sign))
 
-    def at(self, force: AnyArray) -> tuple[Array, Array]:
-        """Returns power [W] and marginal cost [W/N] of forces [N]."""
-        marginal = 0.0 * force  # NaN of a lost one stays
-        watts = self.rest + marginal
-        for curve, sign in self.curves:
-            on = force * sign > 0.0
-            watts[on], slope = curve.at(sign * force[on])
-            marginal[on] = sign * slope
-        return watts, marginal
+    def power_and_marginal_cost(self, force: AnyArray) -> tuple[Array, Array]:
+        """See `PowerCurve`."""
+        marginal_cost = 0.0 * force  # keeps the NaN of a lost actuator
+        power = self.rest + marginal_cost
+        for curve, sign in self.sides:
+            is_here = force * sign > 0.0
+            power[is_here], slope = curve.power_and_marginal_cost(sign * force[is_here])
+            marginal_cost[is_here] = sign * slope
+        return power, marginal_cost
 
-    def answer(self, price: Array) -> Array:
-        """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is
-        not."""
+    def response(self, price: Array) -> Array:
+        """See `PowerCurve`; 0 for prices of a side that the table does not have."""
         force = np.zeros_like(price)
-        for curve, sign in self.curves:
-            on = price * sign > 0.0
-            force[on] = sign * curve.answer(sign * price[on])
+        for curve, sign in self.sides:
+            is_here = price * sign > 0.0
+            force[is_here] = sign * curve.response(sign * price[is_here])
         return force
 
 
-_sides_of = lru_cache(maxsize=256)(Sides)
+_curves_of = lru_cache(maxsize=256)(TableCurves)
 
 
 class ThrustPower:
-    """Watts over newtons, convex, of n propellers, whatever their models; those of one model
-    together."""
+    """Power over force, convex, of n propellers, whatever their models; those with the same model
+    are evaluated together."""
 
     def __init__(self, models: Sequence[ThrustModel | PowerCurve]) -> None:
         """Takes n models, or curves themselves."""
-        kinds = [None if isinstance(model, PowerLaw) else model for model in models]
+        power_laws = [model for model in models if isinstance(model, PowerLaw)]
+        # All power laws are one group, equal tables and curves one each.
+        keys = [None if isinstance(model, PowerLaw) else model for model in models]
         self._groups: list[tuple[AnyArray | slice, PowerCurve]] = []
-        for kind in dict.fromkeys(kinds):
-            own = [i for i, other in enumerate(kinds) if other == kind]
-            laws = [model for model in models if isinstance(model, PowerLaw)]
-            places = slice(None) if len(own) == len(models) else np.array(own)
-            curve = _sides_of(kind) if isinstance(kind, PowerTable) else kind
-            self._groups.append((places, ByPower(laws) if curve is None else curve))
+        for key in dict.fromkeys(keys):
+            own = [i for i, other in enumerate(keys) if other == key]
+            indices = slice(None) if len(own) == len(models) else np.array(own)
+            curve: PowerCurve
+            if key is None:
+                curve = PowerLaws(power_laws)
+            elif isinstance(key, PowerTable):
+                curve = _curves_of(key)
+            else:
+                curve = key
+            self._groups.append((indices, curve))
 
     def watts(self, force: AnyArray) -> AnyArray:
-        """Returns the power [W] of forces (..., n) [N], negative ones in reverse."""
-        return self._both(force, 0)
+        """Returns the power (..., n) [W] of forces (..., n) [N], negative ones in reverse."""
+        power: AnyArray = np.empty(np.shape(force))
+        for indices, curve in self._groups:
+            power[..., indices], _ = curve.power_and_marginal_cost(force[..., indices])
+        return power
 
     def marginal(self, force: AnyArray) -> AnyArray:
-        """Returns its derivative [W/N] by the force."""
-        return self._both(force, 1)
+        """Returns the derivative (..., n) [W/N] of the power by forces (..., n) [N]."""
+        marginal_cost: AnyArray = np.empty(np.shape(force))
+        for indices, curve in self._groups:
+            _, marginal_cost[..., indices] = curve.power_and_marginal_cost(force[..., indices])
+        return marginal_cost
 
-    def answer(self, price: Array) -> Array:
-        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
+    def response(self, price: Array) -> Array:
+        """Returns the forces (..., n) [N] whose marginal cost is a price (..., n) [W/N]."""
         force = np.empty(price.shape)
-        for places, power in self._groups:
-            force[..., places] = power.answer(price[..., places])
+        for indices, curve in self._groups:
+            force[..., indices] = curve.response(price[..., indices])
         return force
 
-    def worth(self, price: Array, least: Array, most: Array) -> Array:
-        """Returns the most [W] that forces from `least` to `most` (n,) [N] are worth at prices
-        (..., n) [W/N]."""
-        force = np.clip(self.answer(price), least, most)
-        return np.asarray(price * force - self.watts(force))
+    def conjugate(self, price: Array, least: Array, most: Array) -> Array:
+        """Returns the convex conjugate of the power over an interval of forces (Eq. 4).
 
-    def _both(self, force: AnyArray, which: int) -> AnyArray:
-        result: AnyArray = np.empty(np.shape(force))
-        for places, power in self._groups:
-            result[..., places] = power.at(force[..., places])[which]
-        return result
+        Args:
+            price: prices of the force (..., n) [W/N].
+            least: least force (n,) [N].
+            most: largest force (n,) [N].
+
+        Returns:
+            max v F - P(F) over the interval (..., n) [W].
+        """
+        force = np.clip(self.response(price), least, most)
+        return np.asarray(price * force - self.watts(force))
 
 
 def radial_table(
     model: ThrustModel | PowerCurve, sign: int, least: float, most: float
 ) -> RadialTable:
-    """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least`
-    to `most` [N]."""
-    own = ThrustPower([model])
+    """Returns the response of one propeller to a price, in one sense, as a table.
+
+    Args:
+        model: its power over the force.
+        sign: 1 forward, -1 in reverse.
+        least: least size of the force [N].
+        most: largest size of the force [N].
+    """
+    power = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
-    top = abs(float(own.marginal(ends)[1, 0]))
+    top = abs(float(power.marginal(ends)[1, 0]))
     if least == most:
         # The force is the same at any price, but a table needs prices.
         top = max(top, NOTHING)
-    force = np.clip(sign * own.answer(sign * price_grid(top)[:, None])[:, 0], least, most)
-    return RadialTable.of_forces(top, force, float(own.watts(ends)[0, 0]))
+    response = sign * power.response(sign * price_grid(top)[:, None])[:, 0]
+    force = np.clip(response, least, most)
+    return RadialTable.of_forces(top, force, float(power.watts(ends)[0, 0]))

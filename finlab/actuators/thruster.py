@@ -1,8 +1,10 @@
-"""Thrusters with a fixed axis: the force is the command, but none in the dead band.
+"""Thrusters with a fixed axis: the command is the force, which is 0 in the dead band.
 
-Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts.
-The reaction torque of the propeller is part of the effectiveness.
+Command: (force [N], 0, 0). Own frame: axis, and two axes across it, along which nothing acts. The
+reaction torque of the propeller is part of the effectiveness.
 """
+
+from __future__ import annotations  # help() then prints `Newtons`, not the bounds of one
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,17 +13,21 @@ from typing import ClassVar, Self
 import numpy as np
 
 from finlab.actuators.actuator import (
-    Box,
     Command,
+    CommandNumber,
     Diameter,
     Faults,
+    Kind,
     Metres,
     Place,
     Seconds,
     Uncertainty,
 )
 from finlab.actuators.propeller import (
+    FORMULAS,
     T200,
+    T200_FORCE,
+    T200_FORCE_ASTERN,
     ForceRate,
     OpenWater,
     Propeller,
@@ -29,7 +35,7 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
     form_of,
-    given_force,
+    usable_force,
 )
 from finlab.actuators.response import Form, Group, Line
 from finlab.actuators.thrust_model import Newtons, ThrustModel, check_force
@@ -41,13 +47,13 @@ from finlab.files.schema import Name
 
 
 class ThrusterLaw(PropellerLaw):
-    """The law of n thrusters with a fixed axis, whose command is the force [N]."""
+    """Law of n thrusters with a fixed axis: force along the first own axis [N]."""
 
     column = 0
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
-        force[..., 0] = self.given(command)
+        force[..., 0] = self.thrust(command)
         return force
 
     def force_and_jacobian(
@@ -60,34 +66,40 @@ class ThrusterLaw(PropellerLaw):
 
 
 class ThrusterGroup(Group):
-    """What the thrusters of a robot offer for prices."""
+    """Responses to prices of m thrusters (Eq. 5)."""
 
-    def __init__(self, thrusters: Sequence["Thruster"], effectiveness: Array) -> None:
-        """Takes thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+    def __init__(self, thrusters: Sequence[Thruster], effectiveness: Array) -> None:
+        """Tabulates the responses.
+
+        Args:
+            thrusters: m thrusters.
+            effectiveness: wrench (m, 3, 6) of 1 N along each own axis [1, m], body frame.
+        """
         self._sign = np.array([1.0 if thruster.force[1] > 0.0 else -1.0 for thruster in thrusters])
-        self.responses = [
-            _line(thruster, sign * matrix[0])
-            for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
-        ]
-        self._limits = np.array([given_force(thruster) for thruster in thrusters])
+        self.responses = []
+        for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True):
+            self.responses.append(_line(thruster, sign * matrix[0]))
+        self._limits = np.array([usable_force(thruster) for thruster in thrusters])
         self._power = ThrustPower([thruster.model for thruster in thrusters])
 
     @property
     def forms(self) -> list[Form]:
-        pairs = zip(self._limits, self._sign, strict=True)
-        return [form_of("thruster", given, sign) for given, sign in pairs]
+        forms = []
+        for limits, sign in zip(self._limits, self._sign, strict=True):
+            forms.append(form_of("thruster", limits, sign))
+        return forms
 
     def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
         if ends is None:
-            return self._power.worth(self._sign * price, *self._limits.T)
+            return self._power.conjugate(self._sign * price, *self._limits.T)
         low, high = np.sort(self._sign[:, None] * ends, axis=1).T
-        return self._power.worth(self._sign * price, low, high)
+        return self._power.conjugate(self._sign * price, low, high)
 
 
-def _line(thruster: "Thruster", along: Array) -> Line:
-    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in
-    reverse."""
-    least, most = given_force(thruster)
+def _line(thruster: Thruster, along: Array) -> Line:
+    """Response of one thruster; `along` (6,) is its wrench per newton [1, m], of one whose force is
+    never positive that of a negative force."""
+    least, most = usable_force(thruster)
     if most <= 0.0:
         return Line(along, radial_table(thruster.model, -1, -most, -least), band=thruster.dead_band)
     reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
@@ -101,7 +113,7 @@ class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
     force: float
     """Force along its axis [N], signed."""
     input: float | None = None
-    """What its table says to send for it, in the table's unit; None for a power law."""
+    """Input for that force by its table, in the table's unit; None of one with a power law."""
 
     @property
     def words(self) -> str:
@@ -110,60 +122,63 @@ class ThrusterCommand(Command, frozen=True, rename={"force": "force_n"}):
 
 @dataclass(frozen=True)
 class Thruster(Propeller):
-    """A thruster with a fixed axis; its command is the force. Checked on construction."""
+    """A thruster with a fixed axis; its command is the force. Checked on construction.
 
-    LAW = ThrusterLaw
-    GROUP = ThrusterGroup
-    NUMBERS = (("force", "N"),)
-    COMMAND = ThrusterCommand
-    LIMITS = ("force",)
-    RATES = ("rate",)
-    AXES = ("axis",)
-    PUSHES = (0,)
-    THRUST = 0
-    TURNS = False
-    FAULTS = ("weak", "stuck", "running")
-    LOOKS = "thruster"
-    BOXES = (
-        Box(
-            "Force [N]",
-            "force",
-            "Least and most along the axis; astern it is negative.",
-            1.0,
-            pair=True,
-        ),
-        *Propeller.BOXES,
-    )
+    Args:
+        name: unique within its layout.
+        position: where the force acts, body frame [m].
+        axis: direction of the force on the robot for a positive command, unit vector, body frame
+            [1].
+        force: least and most force along `axis` [N]; one of them is 0 where it pushes one way only.
+        model: electrical power over the force [W]: `PowerLaw` or `PowerTable`.
+        dead_band: forces smaller than this, other than 0, cannot be held [N].
+        torque_per_newton: reaction torque about the axis per force, signed [m].
+        time_constant: time in which the force comes to 63 % of a new command [s].
+        rate: largest change of the commanded force [N/s]; None: nothing limits it.
+        uncertainty: standard deviation of its force [N]; None: nothing is known of it.
+        diameter: diameter of the propeller, for its jet [m]; None: estimated from the force.
+        open_water: thrust coefficient at rest, and the advance ratio of no thrust [1]; None:
+            unknown.
+        hangs: whether damage has left it a single force of any sign, that of both limits (a truth
+            value, which no file has).
+
+    Raises:
+        LayoutError: a value is out of its bounds; the message names the argument.
+
+    Example:
+        >>> import finlab
+        >>> power = finlab.PowerLaw(0.997, 1.449)
+        >>> finlab.Thruster("bow", (0.4, 0, 0), (0, 1, 0), (-39.9, 51.4), power).force
+        (-39.9, 51.4)
+    """
+
     type: ClassVar[str] = "thruster"
+    KIND: ClassVar[Kind] = Kind(
+        law=ThrusterLaw,
+        group=ThrusterGroup,
+        command=ThrusterCommand,
+        numbers=(CommandNumber(name="force", unit="N", limits="force", rate="rate"),),
+        axes=("axis",),
+        pushes_along=("axis",),
+        pointed="axis",
+        drawn_as="thruster",
+        faults=("weak", "stuck", "running"),
+        models=FORMULAS,
+    )
 
     name: Name
-    """Unique within its layout."""
     position: Place
-    """Where the force acts, body frame [m]."""
     axis: Direction3
-    """Unit vector, body frame: direction of the force on the robot for a positive force."""
     force: tuple[Newtons, Newtons]
-    """Least and most force [N]; one of them is 0 where the thruster pushes one way only."""
     model: ThrustModel
-    """What power it takes."""
     dead_band: Threshold = 0.0
-    """Forces smaller than this, other than 0, cannot be held [N]."""
     torque_per_newton: Metres = 0.0
-    """Reaction torque about the axis per force, signed [m]."""
     time_constant: Seconds = 0.1
-    """Time in which the force comes to 63 % of a new one [s]."""
     rate: ForceRate | None = None
-    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
     uncertainty: Uncertainty | None = None
-    """How far its force may be from that; None where nothing is known of it."""
     diameter: Diameter | None = None
-    """Of the propeller [m], for its jet; None where it is guessed from the force."""
     open_water: OpenWater | None = None
-    """Thrust coefficient at rest and the advance ratio of no thrust; None where they are
-    unknown."""
     hangs: bool = False
-    """Whether damage has left it a single force, that of both limits, of any sign; no file says
-    so."""
 
     def check_together(self) -> None:
         """See `Actuator`."""
@@ -186,11 +201,18 @@ class Thruster(Propeller):
     @classmethod
     def sample(cls) -> Self:
         """See `Actuator`: a T200 of Blue Robotics at 16 V, as shipped layouts have it."""
-        return cls("thruster", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-39.91, 51.44), T200)
+        return cls(
+            name="thruster",
+            position=(0.0, 0.0, 0.0),
+            axis=(1.0, 0.0, 0.0),
+            force=(T200_FORCE_ASTERN, T200_FORCE),
+            model=T200,
+        )
 
     def damaged(self, faults: Faults) -> Self:
-        left = faults.weak
-        low, high = self.force
-        weak = self if left is None else replace(self, force=(left * low, left * high))
+        weak = self
+        if faults.weak is not None:
+            low, high = self.force
+            weak = replace(self, force=(faults.weak * low, faults.weak * high))
         force = faults.stuck if faults.running is None else faults.running[0]
         return weak if force is None else weak.hung(force)

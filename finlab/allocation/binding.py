@@ -51,12 +51,12 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
         slack = WITHIN * (high - low) + ROUNDING
         at_low = row <= low + slack
         at_high = row >= high - slack
-        if actuator.BY_FLOW:
+        if actuator.KIND.driven_by_flow:
             # The deflection is all that a foil is told; the flow says how it pushes.
             if not is_full_turn(high[0] - low[0]):
                 at_end_of_arc[..., i] = (at_low | at_high)[..., 0]
             continue
-        angle = NO_ANGLE if actuator.ANGLE is None else actuator.ANGLE
+        angle = NO_ANGLE if actuator.KIND.aiming_number is None else actuator.KIND.aiming_number
         sizes = np.arange(3) != angle
         at_full_thrust[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)
         if angle != NO_ANGLE and not is_full_turn(high[angle] - low[angle]):
@@ -105,7 +105,7 @@ def rate_words(layout: Layout, previous: Array, command: Array, period_s: float)
     for actuator, row_previous, row in rows:
         max_change = np.array(actuator.rates) * period_s
         change = np.abs(row - row_previous)
-        angle = actuator.ANGLE
+        angle = actuator.KIND.aiming_number
         if angle is not None:
             change[angle] = abs(float(wrapped(row[angle] - row_previous[angle])))
         if (np.isfinite(max_change) & (change >= (1.0 - WITHIN) * max_change)).any():
@@ -126,9 +126,9 @@ def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
     words: list[str] = []
     for actuator, row in zip(layout.actuators, command, strict=True):
         dead_band = getattr(actuator, "dead_band", 0.0)
-        if dead_band <= 0.0 or actuator.THRUST is None:
+        if dead_band <= 0.0 or actuator.KIND.force_number is None:
             continue
-        if abs(row[actuator.THRUST]) <= (1.0 + WITHIN) * dead_band:
+        if abs(row[actuator.KIND.force_number]) <= (1.0 + WITHIN) * dead_band:
             words.append(f"dead band of {actuator.name}")
     return tuple(words)
 

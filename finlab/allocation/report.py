@@ -289,7 +289,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 
 def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
     """What needs a flow and has none, what a flow leaves unknown, or that no actuator feels it."""
-    foils = [actuator for actuator in layout.actuators if actuator.BY_FLOW]
+    foils = [actuator for actuator in layout.actuators if actuator.KIND.driven_by_flow]
     if flow is None:
         return (_nothing_at_rest(foils),) if foils else ()
     if layout.interaction is not None:
@@ -302,7 +302,7 @@ def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
             return ()
         return (f"what speed takes from {guessed} is guessed: no open_water is known of them",)
     if not foils:
-        kind_by_flow = next(name for name, kind in KINDS.items() if kind.BY_FLOW)
+        kind_by_flow = next(name for name, kind in KINDS.items() if kind.KIND.driven_by_flow)
         return (
             f"the flow is without effect: layout {layout.name} has no {kind_by_flow}, and what "
             "speed through the water takes from other actuators is not known",
@@ -310,7 +310,7 @@ def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
     with_table = []
     for actuator in layout.actuators:
         model = getattr(actuator, "model", None)
-        if not actuator.BY_FLOW and model and model.type == "table":
+        if not actuator.KIND.driven_by_flow and model and model.type == "table":
             with_table.append(actuator.name)
     if not with_table:
         return ()

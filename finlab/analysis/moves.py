@@ -90,7 +90,7 @@ def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
 def is_mirrored(part: Actuator, other: Actuator, tolerance: float = MIRROR_TOLERANCE) -> bool:
     """Says whether two actuators of a type are each other's mirror image, within [m, rad]: fins
     with their shafts, others whichever way their axes count."""
-    count = len(part.AXES)
+    count = len(part.KIND.axes)
     image = np.array(part.frame)[:count] * MIRROR
     axes = np.array(other.frame)[:count]
     apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()

@@ -254,7 +254,7 @@ def monitored(loop: ClosedLoop) -> str:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
     for name, held in damage.stuck.items():
-        turns = loop.layout.part(name).TURNS
+        turns = loop.layout.part(name).KIND.sticks_at_angle
         words.append(
             f"{name} stuck at " + (f"{math.degrees(held):.0f} deg" if turns else f"{held:.3g} N")
         )

@@ -183,8 +183,9 @@ def features_of(part: Actuator) -> dict[str, float]:
     else:
         for name, axis in zip(("first axis", "second axis"), part.frame, strict=False):
             found |= {f"{name} {one}": float(value) for one, value in zip("xyz", axis, strict=True)}
-    for (name, unit), low, high in zip(part.NUMBERS, part.lower, part.upper, strict=False):
-        found |= {f"{name}_min [{unit}]": float(low), f"{name}_max [{unit}]": float(high)}
+    for number, low, high in zip(part.KIND.numbers, part.lower, part.upper, strict=False):
+        found[f"{number.name}_min [{number.unit}]"] = float(low)
+        found[f"{number.name}_max [{number.unit}]"] = float(high)
     return found
 
 

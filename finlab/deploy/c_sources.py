@@ -166,7 +166,7 @@ def _rows_of_commands(layout: Layout, prefix: str) -> str:
     """An enumeration of the rows of commands, with the meaning of their numbers."""
     lines = []
     for name, part in zip(layout.names, layout.actuators, strict=True):
-        numbers = ", ".join(f"{label} [{unit}]" for label, unit in part.NUMBERS)
+        numbers = ", ".join(number.label for number in part.KIND.numbers)
         lines.append(f"  {prefix}_{_identifier(name).upper()}, /* {name}: {numbers} */")
     rows = "\n".join(lines)
     return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"

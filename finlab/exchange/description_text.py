@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree
 
-from finlab.axes import Vector
+from finlab.axes import Vector3
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import DERIVATIVES
 from finlab.layout import Actuator, Body, Layout
@@ -70,9 +70,9 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         parts.append(form["link"].format(**own, inertial=inertial))
         parts.append(form["joint"].format(**own, kind=kind, axis=_text(axis), limit=limit))
     for part in layout.actuators:
-        if part.THRUST is not None:
-            low = part.lower[part.THRUST]
-            high = part.upper[part.THRUST]
+        if part.KIND.force_number is not None:
+            low = part.lower[part.KIND.force_number]
+            high = part.upper[part.KIND.force_number]
             limits = {"min_thrust_cmd": low, "max_thrust_cmd": high}
             dead_band = getattr(part, "dead_band", 0.0)
             band = {"deadband": dead_band} if dead_band else {}
@@ -91,7 +91,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     exchange.note(
         "A robot description has no place for power, reaction torques, rates and buoyancy."
     )
-    if any(part.THRUST is None for part in layout.actuators):
+    if any(part.KIND.force_number is None for part in layout.actuators):
         exchange.note(
             "Others than thrusters are joints that push nothing; --fins names the fins among them."
         )
@@ -101,7 +101,9 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _links(part: Actuator) -> Iterator[tuple[str, str, Vector, Vector, tuple[float, float] | None]]:
+def _links(
+    part: Actuator,
+) -> Iterator[tuple[str, str, Vector3, Vector3, tuple[float, float] | None]]:
     """Links of an actuator: name, parent, place seen from it [m], axis, and limits of the angle
     [rad]."""
     parent = ROOT

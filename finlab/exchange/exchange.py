@@ -10,7 +10,7 @@ import numpy as np
 
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
-from finlab.axes import Vector
+from finlab.axes import Vector3
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Thruster
 
@@ -107,7 +107,7 @@ class Exchange:
         return layout.without(others) if others else layout
 
 
-def vector(values: Array) -> Vector:
+def vector(values: Array) -> Vector3:
     """Returns numbers (3,) as plain ones; rounding errors of 0 become 0."""
     x, y, z = (0.0 if abs(value) < 1e-15 else float(value) for value in values)
     return x, y, z

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import TURN, Vector
+from finlab.axes import TURN, Vector3
 from finlab.errors import LayoutError
 from finlab.exchange.description import (
     ADDED,
@@ -258,7 +258,7 @@ def body_of(robot: Description, exchange: Exchange) -> Body:
         exchange.note(
             "Its buoyancy is not read: it is taken for the weight, at the centre of gravity."
         )
-    moments: Vector | None = None
+    moments: Vector3 | None = None
     if robot.inertia is None:
         exchange.note("A link with a mass has no inertia, so that of the body is unknown.")
     else:

@@ -18,7 +18,8 @@ from msgspec import Meta, inspect
 
 from finlab.errors import FinlabError, LayoutError
 
-Kind = TypeVar("Kind")
+Checkable = TypeVar("Checkable")
+"""A type that plain values are checked against."""
 
 _PLACE = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[(\.\.\.)\]")
@@ -35,11 +36,11 @@ def shown(value: Any) -> str:
 
 def checked(
     values: Any,
-    kind: type[Kind],
+    kind: type[Checkable],
     error: type[FinlabError] = LayoutError,
     source: str = "",
     key: str = "",
-) -> Kind:
+) -> Checkable:
     """Returns plain values, such as those of a file, in a type: a `msgspec.Struct`, or any that
     msgspec knows.
 

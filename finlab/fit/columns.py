@@ -188,7 +188,10 @@ def read_columns(
 
 def command_columns(layout: Layout) -> list[list[str]]:
     """Returns for each actuator the columns of its command, `NAME.number`, such as `bow.force`."""
-    return [[f"{part.name}.{name}" for name, _ in part.NUMBERS] for part in layout.actuators]
+    columns = []
+    for part in layout.actuators:
+        columns.append([f"{part.name}.{number.name}" for number in part.KIND.numbers])
+    return columns
 
 
 def commands_in(values: Mapping[str, Array], layout: Layout) -> Array:

@@ -21,7 +21,7 @@ FLAT = 1e-5
 """Thickness, as a share of the size, below which a hull counts as flat."""
 
 
-Kind = Literal["force", "torque"]
+WrenchHalf = Literal["force", "torque"]
 
 MAX_ROUNDS = 8
 SPECK = 1e-5
@@ -36,7 +36,7 @@ class AttainableSet:
     """A convex polytope of forces or torques that can be had with all else at zero, body frame [N]
     or [N m]. Every vertex is attained, of wide arcs and forces of a flow by convex hulls."""
 
-    kind: Kind
+    kind: WrenchHalf
     vertices: Array
     """Corners (V, 3)."""
     faces: NDArray[np.intp]
@@ -61,7 +61,7 @@ class AttainableSet:
         return html([title, table], lambda: body_picture(title, unit, self))
 
 
-def _hull_of(points: Array, kind: Kind) -> AttainableSet:
+def _hull_of(points: Array, kind: WrenchHalf) -> AttainableSet:
     """The convex hull of points (P, 3), at least one."""
     center = points.mean(axis=0)
     _, extent, axes = np.linalg.svd(points - center, full_matrices=True)
@@ -96,7 +96,7 @@ def _hull_of(points: Array, kind: Kind) -> AttainableSet:
     return AttainableSet(kind, points[corners], none, outline, dimension, normals, offsets)
 
 
-def _body(points: Array, kind: Kind) -> AttainableSet:
+def _body(points: Array, kind: WrenchHalf) -> AttainableSet:
     hull = ConvexHull(points)
     corners = hull.vertices
     place = np.zeros(len(points), dtype=np.intp)
@@ -115,7 +115,7 @@ def _body(points: Array, kind: Kind) -> AttainableSet:
 
 def attainable_set(
     layout: Layout,
-    kind: Kind,
+    kind: WrenchHalf,
     *,
     lost: Collection[str] = (),
     tolerance: float = TOLERANCE,
@@ -151,7 +151,7 @@ def attainable_set(
     return replace(result, gap=max(float(beyond.max()), 0.0))
 
 
-def _support(sets: ForceSets, kind: Kind) -> Callable[[Array], tuple[Array, Array]]:
+def _support(sets: ForceSets, kind: WrenchHalf) -> Callable[[Array], tuple[Array, Array]]:
     """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,): by
     the solver, in each convex part; those near the origin are the origin."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))

@@ -15,44 +15,54 @@ from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.layout import Layout
 
-FINE, COARSE = 1e-8, 1e-3
-"""How close answers are, as a share of the strongest actuator's wrench: those to be shown, and
-those that say where to look on."""
-BESIDE = 1e-6
-"""Share of it that may be left beside the wrench asked for."""
+FINE = 1e-8
+"""Gap of answers that are shown, over the strongest actuator's wrench [1]."""
+COARSE = 1e-3
+"""Gap of answers that only begin a search, over the same [1]."""
+OFF_RAY = 1e-6
+"""Most by which a wrench may miss the ray that it is to lie on, over the same [1]."""
+CROSSED = 1e-6
+"""Scaled wrench by which the ends of a range may cross, from rounding [N]."""
 UNPROVEN = 1e-3
-"""Gap, as a share of the size plus one, from which no force counts as found."""
+"""Gap, over the size plus one, above which no force counts as a proof [1]."""
 
 
 class Largest(NamedTuple):
-    """Largest scaled wrenches of R questions."""
+    """Largest scaled wrenches along R rays."""
 
     size: Array
-    """How much the actuators can give (R,) [N]; proven to be no less than the truth."""
+    """Upper bounds of the distances from the rays' origins (R,) [N]."""
     gap: Array
-    """The truth is at most this much smaller (R,) [N]."""
+    """Upper bound less the distance that forces prove (R,) [N]."""
     force: Array
-    """Planar forces (R, n, 2) [N] that give it."""
+    """Planar forces (R, n, 2) [N] that prove it."""
     normal: Array
-    """Direction (R, m) of the plane that touches the set of wrenches there, not normalized."""
+    """Normal (R, m) of the plane that bounds the set of wrenches there, not normalized."""
 
 
 def largest(
     sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: float = FINE
 ) -> Largest:
-    """Returns the largest scaled wrenches along unit `ray` (R, m) from points `origin` (R, m); the
-    size is minus infinity where there are none.
+    """Returns the largest scaled wrenches along rays.
 
-    Each is bracketed: a plane lies outside of the set of all wrenches, and the forces lie inside.
-    `close` is as `FINE`.
+    Each is bracketed: a plane bounds the set of all wrenches from outside, and forces lie inside.
+
+    Args:
+        sets: sets of forces of R robots.
+        ray: unit directions (R, m).
+        origin: points where the rays begin (R, m) [N].
+        close: gap at which the search ends, over the strongest actuator's wrench [1].
+
+    Returns:
+        The largest wrenches; of a ray that does not meet the set the size is minus infinity.
     """
     origin = np.broadcast_to(origin, ray.shape)
     size, normal, force = sets.reach(origin, ray, close)
     wrench = sets.wrench(force)
     along = ((wrench - origin) * ray).sum(-1)
-    # A wrench that is not where it was asked for proves nothing.
-    extra = np.linalg.norm(wrench - origin - along[:, None] * ray, axis=-1)
-    proven = np.where(extra <= max(BESIDE, 3.0 * close) * sets.unit, along, 0.0)
+    # A wrench off the ray proves nothing.
+    off_ray = np.linalg.norm(wrench - origin - along[:, None] * ray, axis=-1)
+    proven = np.where(off_ray <= max(OFF_RAY, 3.0 * close) * sets.unit, along, 0.0)
     return Largest(size, np.maximum(size - proven, 0.0), force, normal)
 
 
@@ -60,8 +70,9 @@ def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> 
     """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero;
     none where rest is out of reach and the direction meets nothing."""
     result = largest(sets, direction, close=close)
-    unmet = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
-    result.size[unmet] = result.gap[unmet] = 0.0
+    is_unproven = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
+    result.size[is_unproven] = 0.0
+    result.gap[is_unproven] = 0.0
     return result
 
 
@@ -77,10 +88,6 @@ def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array,
         v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap)
     )
     return size, float((size - proven).max())
-
-
-NOTHING = 1e-6
-"""Scaled wrench [N] by which the ends of a range may pass each other and it still is one."""
 
 
 class Ranges(NamedTuple):
@@ -110,7 +117,7 @@ def axis_ranges(
     rays, held = (np.tile(rows, (len(parts.radius) // len(axes), 1)) for rows in (axes, held))
     size = largest(parts, rays, held).size.reshape(-1, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
-    there = size.sum(axis=1) >= -NOTHING
+    there = size.sum(axis=1) >= -CROSSED
     high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
     return Ranges(
         *[np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)]
@@ -129,9 +136,12 @@ RANK_TOLERANCE = 1e-6
 """Share of the largest singular value below which another counts as zero."""
 N_RANDOM = 24
 """Random directions from which the weakest one is sought, beside axes and singular vectors."""
-N_WALKS, FINE_WALKS, KEPT = 4, 20, 6
-"""Steps from face to face of the set of wrenches, and further ones from the best ends, of so
-many."""
+N_WALKS = 4
+"""Steps from face to face of the set of wrenches."""
+FINE_WALKS = 20
+"""Further steps from the best ends."""
+KEPT = 6
+"""Ends from which these begin."""
 
 
 class Extent(NamedTuple):

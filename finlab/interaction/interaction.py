@@ -1,9 +1,9 @@
-"""The contract of an interaction: what the jets of a robot's actuators take from its forces.
+"""The contract of an interaction: how the jets of a robot's actuators change its wrench.
 
 A robot's layout names a model of interaction, a formula or a network
-(`finlab.interaction.INTERACTIONS`). It gives the force that comes at each actuator's place beside
-the actuator's own, from the forces of all. Forces are in the body frame; derivatives are those by
-the forces, not by the commands.
+(`finlab.interaction.INTERACTIONS`). From the forces of all actuators it gives a further force at
+the point of each, and so the wrench offset. The plant adds it. Forces are in the body frame;
+derivatives are by the forces, not by the commands.
 """
 
 import math
@@ -18,114 +18,147 @@ from finlab.core.library import library
 from finlab.files.schema import Checked
 
 DENSITY = 1000.0
-"""Of the water [kg/m^3]."""
+"""Density of the water [kg/m^3]."""
 STILL = 0.03
-"""Speed [m/s] of a jet below which it counts as none; it keeps derivatives finite at rest."""
+"""Speed of a jet below which it counts as none [m/s]; it keeps derivatives finite at rest."""
+LEAST_AREA = 1e-12
+"""Area added to each disc, so that an actuator without one divides by no zero [m^2]."""
+CONSTANTS = 10
+"""Numbers of the formula of jets that the core takes."""
 STEP = 1e-30
 """Imaginary step of derivatives: those of smooth formulas are exact (Squire and Trapp, 1998)."""
 
 
-class Places(NamedTuple):
-    """Where n actuators push, and what their jets meet."""
+class JetGeometry(NamedTuple):
+    """The points and jets of n actuators, and the hull that jets may meet."""
 
     position: Array
-    """(n, 3) [m]."""
+    """Points where the forces act (n, 3), body frame [m]."""
     diameter: Array
-    """Diameters (n,) [m] of the jets where they begin; 0 of an actuator without one."""
+    """Diameters (n,) of the jets where they begin [m]; 0 of an actuator without one."""
     advance: Array
-    """Share of thrust (n,) lost per speed along the thrust over that of the jet."""
+    """Relative loss of thrust (n,) per speed along the thrust over the jet's speed [1]."""
     hull: Array
-    """Centre and half axes (2, 3) [m] of the ellipsoid that stands for the hull; half axes of 0 for
-    none."""
+    """Centre and half axes (2, 3) of the ellipsoid that approximates the hull, body frame [m]; half
+    axes of 0 for none."""
 
 
 class Jet(NamedTuple):
-    """The jets of n actuators; smooth where they end."""
+    """The jets of n actuators, as smooth functions of their forces."""
 
     thrust: AnyArray
-    """(..., n) [N]."""
+    """Sizes of the forces (..., n) [N], above 0 at rest."""
     ahead: AnyArray
-    """Directions (..., n, 3) of the forces, shorter than 1 near rest; the jets flow against
-    them."""
+    """Directions (..., n, 3) of the forces, body frame, shorter than 1 near rest; the jets flow
+    against them."""
     speed: AnyArray
-    """(..., n) [m/s], `sqrt(2 T / (rho A))` of an actuator disc at rest."""
+    """Speed of the jets (..., n) [m/s], `sqrt(2 T / (rho A))` of an actuator disc at rest."""
 
 
 def jets_of(force: AnyArray, diameter: Array) -> Jet:
-    """Returns the jets of forces (..., n, 3) [N], real or complex."""
-    area = 0.25 * np.pi * diameter**2 + 1e-12
-    least = 0.5 * DENSITY * area * STILL**2
-    thrust = np.sqrt((force * force).sum(-1) + least * least)
-    return Jet(thrust, force / thrust[..., None], np.sqrt(2.0 * thrust / (DENSITY * area)))
+    """Returns the jets of forces.
+
+    Args:
+        force: forces (..., n, 3), body frame [N], real or complex.
+        diameter: diameters (n,) of the jets [m].
+    """
+    area = 0.25 * np.pi * diameter**2 + LEAST_AREA
+    thrust_at_rest = 0.5 * DENSITY * area * STILL**2
+    thrust = np.sqrt((force * force).sum(-1) + thrust_at_rest * thrust_at_rest)
+    speed = np.sqrt(2.0 * thrust / (DENSITY * area))
+    return Jet(thrust, force / thrust[..., None], speed)
 
 
 class Interaction(ABC):
-    """What a plant asks of an interaction of one robot's actuators."""
+    """The interaction of one robot's n actuators, as its plant uses it."""
 
     @abstractmethod
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
-        """Returns the wrench (..., 6) [N, N m] that comes beside forces (..., n, 3) [N]; velocities
-        (..., n, 3) [m/s] of the places through the water, body frame, None at rest."""
+        """Returns the wrench offset.
+
+        Args:
+            force: forces of the actuators (..., n, 3), body frame [N].
+            inflow: velocities (..., n, 3) of their points through the water, body frame [m/s]; None
+                at rest.
+
+        Returns:
+            Wrenches (..., 6) to be added to that of the forces [N, N m], body frame.
+        """
 
     @abstractmethod
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset`, and its derivatives (..., n, 3, 6) by the forces."""
+        """Returns `offset` (..., 6), and its derivatives (..., n, 3, 6) by the forces [1, m];
+        arguments as for `offset`."""
 
     @abstractmethod
     def deviation(self, force: Array) -> Array:
-        """Returns the standard deviation (..., 6) [N, N m] of the wrench by what is uncertain of
-        it."""
+        """Returns the standard deviation (..., 6) of the wrench offset [N, N m] at forces (..., n,
+        3) [N], from what is uncertain of the model."""
 
 
-class AtPlaces(Interaction):
-    """An interaction that is a force at each actuator's place."""
+class PointInteraction(Interaction):
+    """An interaction that is a further force at the point of each actuator."""
 
-    def __init__(self, places: Places, constants: Sequence[float] | None = None) -> None:
-        """Takes the places of the n actuators, and the constants of the formula of jets; None where
-        something else says what jets take."""
-        self.places = places
-        arms = np.cross(places.position[:, None], np.eye(3))
-        self.lever: Array = np.concatenate([np.broadcast_to(np.eye(3), arms.shape), arms], axis=-1)
-        """Wrench (n, 3, 6) of 1 N along the body's axes at each place."""
-        head = [
-            len(self.lever),
-            constants is not None,
-            DENSITY,
-            STILL,
-            *(constants or np.zeros(10)),
-        ]
-        rows = np.column_stack([places.position, places.diameter, places.advance])
+    def __init__(self, geometry: JetGeometry, constants: Sequence[float] | None = None) -> None:
+        """Prepares one robot.
+
+        Args:
+            geometry: points and jets of its n actuators, and its hull.
+            constants: the `CONSTANTS` numbers of the formula of jets; None for a model with another
+                one, of which the core then computes the loss by speed alone.
+        """
+        self.geometry = geometry
+        arms = np.cross(geometry.position[:, None], np.eye(3))
+        axes = np.broadcast_to(np.eye(3), arms.shape)
+        self.lever: Array = np.concatenate([axes, arms], axis=-1)
+        """Wrench (n, 3, 6) of 1 N along the body's axes at each point [1, m]."""
+        n = len(self.lever)
+        has_formula = constants is not None
+        numbers = np.zeros(CONSTANTS) if constants is None else constants
+        head = [n, has_formula, DENSITY, STILL, *numbers]
+        rows = np.column_stack([geometry.position, geometry.diameter, geometry.advance])
         self.table: Array = np.concatenate(
-            [head, places.hull.ravel(), rows.ravel()], dtype=np.float64
+            [head, geometry.hull.ravel(), rows.ravel()], dtype=np.float64
         )
-        """The numbers of finlab/core/src/jets.c."""
+        """The numbers that finlab/core/src/jets.c reads."""
 
     @abstractmethod
     def at_rest(self, force: Array) -> Array:
-        """Returns the forces (..., n, 3) [N] that come beside forces (..., n, 3) [N] in still
-        water."""
+        """Returns the further forces (..., n, 3) [N] at forces (..., n, 3) [N] in still water, body
+        frame."""
 
     def by_core(
-        self, force: Array, inflow: Array | None, steep: bool
+        self, force: Array, inflow: Array | None, with_slope: bool
     ) -> tuple[Array, Array, Array]:
-        """Returns what the core gives for forces (..., n, 3): forces of the same shape by the
-        formula, where it counts, and by what speed takes, the wrench (..., 6), and its derivatives
-        (..., n, 3, 6) where `steep`."""
+        """Returns what the core computes: the formula of jets, where the model has its constants,
+        and the loss of thrust by speed.
+
+        Args:
+            force: forces (..., n, 3), body frame [N].
+            inflow: velocities (..., n, 3) of the points through the water, body frame [m/s]; None
+                at rest.
+            with_slope: whether derivatives are needed.
+
+        Returns:
+            Further forces (..., n, 3) [N], their wrench (..., 6) [N, N m], and its derivatives
+            (..., n, 3, 6) by the forces, an empty array without `with_slope`.
+        """
         shape = force.shape if inflow is None else np.broadcast_shapes(force.shape, inflow.shape)
-        force = np.ascontiguousarray(np.broadcast_to(force, shape))
-        change = np.empty(shape)
-        met = None if inflow is None else np.ascontiguousarray(np.broadcast_to(inflow, shape))
-        wrench = np.empty((*shape[:-2], 6))
-        slope = np.empty((*shape, 6) if steep else 0)
         count = math.prod(shape[:-2])
-        ins = (
+        force = np.ascontiguousarray(np.broadcast_to(force, shape))
+        velocity = None if inflow is None else np.ascontiguousarray(np.broadcast_to(inflow, shape))
+        change = np.empty(shape)
+        wrench = np.empty((*shape[:-2], 6))
+        slope = np.empty((*shape, 6) if with_slope else 0)
+        library().fl_jets(
             self.table.ctypes.data,
             force.ctypes.data,
             count,
-            None if met is None else met.ctypes.data,
+            None if velocity is None else velocity.ctypes.data,
+            change.ctypes.data,
+            wrench.ctypes.data,
+            slope.ctypes.data if with_slope else None,
         )
-        outs = (change.ctypes.data, wrench.ctypes.data, slope.ctypes.data if steep else None)
-        library().fl_jets(*ins, *outs)
         return change, wrench, slope
 
 
@@ -133,7 +166,7 @@ class InteractionModel(Checked, ABC):
     """An interaction as a layout describes it: the contract of a model."""
 
     @abstractmethod
-    def of(self, places: Places) -> AtPlaces:
+    def of(self, geometry: JetGeometry) -> PointInteraction:
         """Returns the interaction of a robot's actuators. Raises FinlabError: a file that it reads
         is bad."""
 
@@ -144,8 +177,8 @@ class InteractionModel(Checked, ABC):
 
     @property
     def stamp(self) -> tuple[int, int] | None:
-        """Time and size of that file, for what is kept until it changes; None where it reads
-        none."""
+        """Modification time [ns] and size [bytes] of that file, by which a cache of what it holds
+        is known to be old; None where it reads none."""
         if self.reads is None:
             return None
         from finlab.bundle_files import file_stamp
@@ -158,16 +191,24 @@ class InteractionModel(Checked, ABC):
 
 
 def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:
-    """Returns what a smooth function gives for vectors (..., n, k), an array (..., n, m) each row
-    of which depends on one of them, and its derivatives (..., n, k, m)."""
+    """Returns a smooth function and its derivatives, by imaginary steps.
+
+    Args:
+        function: from vectors (..., n, k) to an array (..., n, m), each row of which depends on one
+            of them; it takes complex numbers.
+        values: vectors (..., n, k).
+
+    Returns:
+        Values (..., n, m) and derivatives (..., n, k, m).
+    """
     k = values.shape[-1]
     steps = np.eye(k).reshape(k, *(1,) * (values.ndim - 1), k) * (1j * STEP)
     result = function(values + steps)
     return result[0].real, np.moveaxis(result.imag, 0, -2) / STEP
 
 
-def with_own(slope: Array, own: Array) -> Array:
-    """Returns derivatives (..., n, 3, n, 3) with those of each change by its own force (..., n, 3,
-    3) added."""
-    n = own.shape[-3]
-    return slope + own[..., :, :, None, :] * np.eye(n)[:, None, :, None]
+def with_diagonal(slope: Array, diagonal: Array) -> Array:
+    """Returns derivatives (..., n, 3, n, 3) of changes by forces, with those of each change by its
+    own force (..., n, 3, 3) added."""
+    n = diagonal.shape[-3]
+    return slope + diagonal[..., :, :, None, :] * np.eye(n)[:, None, :, None]

@@ -18,54 +18,64 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.arrays import Array
-from finlab.interaction.interaction import AtPlaces, InteractionModel, Places
+from finlab.interaction.interaction import InteractionModel, JetGeometry, PointInteraction
 
 Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
+"""A constant above 0 [1]."""
 Share = Annotated[float, Meta(ge=0.0, le=10.0)]
+"""A share, or a coefficient [1]."""
 BEHIND = 0.2
-"""Distance, in diameters, over which a jet begins."""
+"""Distance over which a jet begins, in diameters [1]."""
 GRAZING = 0.3
-"""Width of a jet's rim on the hull, as a share of its distance from the centre squared."""
+"""Width of a jet's rim on the hull, over its squared distance from the centre [1]."""
 MISSED = 0.1
-"""Share of an actuator's force that counts as taken where the formula says that nothing is."""
+"""Share of an actuator's force that may be lost where the formula has no loss [1]."""
 
 
 @dataclass(frozen=True)
 class Jets(InteractionModel):
-    """What the jets of a robot's actuators take, by a formula. Checked on construction."""
+    """What the jets of a robot's actuators take, by a formula. Checked on construction.
+
+    All arguments are ratios [1].
+
+    Args:
+        length: distance up to which the middle of a jet keeps its speed, in diameters [1].
+        width: distance at which a jet that only spread would be as wide as it begins, in diameters
+            [1].
+        spread: how narrow a jet is: its speed falls as exp(-spread r^2 / x^2) off its axis [1].
+        lag: speed of the inflow over that of the own jet, per share of thrust lost, where that is
+            small [1].
+        most: one over the largest share of thrust that can be lost [1].
+        side: share of the momentum of water taken in from the side that is a force [1].
+        housing: drag coefficient of what stands in a jet, by the area of its disc [1].
+        hull: share of the thrust with which a jet pushes the hull where it meets it [1].
+        uncertain: standard deviation of what the jets take, as a share of it [1].
+    """
 
     type: ClassVar[str] = "jets"
 
     length: Positive = 2.8
-    """Distance, in diameters, up to which the middle of a jet keeps its speed."""
     width: Positive = 3.1
-    """Distance, in diameters, at which a jet that only spread would be as wide as it begins."""
     spread: Positive = 37.0
-    """How narrow a jet is: its speed falls as exp(-spread r^2 / x^2) beside the middle."""
     lag: Positive = 0.62
-    """Speed of the inflow over that of the own jet, per share of thrust lost, where that is
-    small."""
     most: Positive = 0.78
-    """One over the largest share of thrust that can be lost."""
     side: Share = 0.3
-    """Share of the momentum of water taken in from the side that is a force."""
     housing: Share = 0.05
-    """Drag coefficient of what stands in a jet, by the area of its disc."""
     hull: Share = 0.6
-    """Share of the thrust with which a jet pushes the hull where it meets it."""
     uncertain: Share = 0.0
-    """Standard deviation of what the jets take, as a share of it."""
 
-    def of(self, places: Places) -> "JetInteraction":
+    def of(self, geometry: JetGeometry) -> "JetInteraction":
         """Returns the interaction of a robot's actuators."""
-        return JetInteraction(self, places)
+        return JetInteraction(self, geometry)
 
 
-class JetInteraction(AtPlaces):
-    """The formula for one robot."""
+class JetInteraction(PointInteraction):
+    """The formula of jets for one robot, which the core computes."""
 
-    def __init__(self, constants: Jets, places: Places) -> None:
-        super().__init__(places, (*astuple(constants)[:-1], BEHIND, GRAZING))
+    def __init__(self, constants: Jets, geometry: JetGeometry) -> None:
+        """Takes the constants of the formula, and points and jets of the n actuators."""
+        *of_formula, _uncertain = astuple(constants)
+        super().__init__(geometry, (*of_formula, BEHIND, GRAZING))
         self.constants = constants
 
     def at_rest(self, force: Array) -> Array:
@@ -78,7 +88,7 @@ class JetInteraction(AtPlaces):
         return self.by_core(force, inflow, True)[1:]
 
     def deviation(self, force: Array) -> Array:
-        each = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever) ** 2
-        # A jet that the formula has pass by may be met.
+        taken = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever) ** 2
+        # A jet may meet an actuator that it misses by the formula.
         missed = (MISSED**2 / 3.0) * np.einsum("...ib,icw->...iw", force**2, self.lever**2)
-        return np.asarray(self.constants.uncertain * np.sqrt((each + missed).sum(axis=-2)))
+        return np.asarray(self.constants.uncertain * np.sqrt((taken + missed).sum(axis=-2)))

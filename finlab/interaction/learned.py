@@ -17,20 +17,24 @@ from finlab.arrays import AnyArray, Array
 from finlab.bundle_files import file_stamp, named_content
 from finlab.errors import CheckpointError
 from finlab.interaction.interaction import (
-    AtPlaces,
     InteractionModel,
-    Places,
+    JetGeometry,
+    PointInteraction,
     complex_slope,
-    with_own,
+    with_diagonal,
 )
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
 
 MEMBERS = 3
-"""Networks that are trained apart."""
+"""Networks of an ensemble, each trained from another start."""
 LAYERS = 3
+"""Layers of a network."""
 NETWORK_SUFFIX = ".safetensors"
-MAX_BYTES, WHAT = 5_000_000, "a learned interaction (.safetensors)"
-"""Largest file of a network, and what it is."""
+"""End of the name of a network's file."""
+MAX_BYTES = 5_000_000
+"""Largest file of a network [bytes]."""
+WHAT = "a learned interaction (.safetensors)"
+"""What a sentence calls such a file."""
 
 Weights = Mapping[str, AnyArray]
 """Arrays by name, `pair.0.weight` (MEMBERS, in, out) and `pair.0.bias` (MEMBERS, 1, out) to layer
@@ -39,18 +43,21 @@ Weights = Mapping[str, AnyArray]
 
 @dataclass(frozen=True)
 class Learned(InteractionModel):
-    """What the jets of a robot's actuators take, by a network. Checked on construction."""
+    """What the jets of a robot's actuators take, by a network. Checked on construction.
+
+    Args:
+        path: file of the network, as `finlab train interaction` writes it; absolute once loaded
+            from a layout file.
+    """
 
     type: ClassVar[str] = "learned"
 
     path: Annotated[str, Meta(min_length=1, max_length=4096)]
-    """File of the network, as `finlab train interaction` writes it; absolute once loaded from a
-    layout file."""
 
-    def of(self, places: Places) -> "LearnedInteraction":
+    def of(self, geometry: JetGeometry) -> "LearnedInteraction":
         """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no
         such network."""
-        return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), places)
+        return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), geometry)
 
     @property
     def reads(self) -> str:
@@ -60,18 +67,24 @@ class Learned(InteractionModel):
         return Learned(path)
 
 
-class LearnedInteraction(AtPlaces):
+class LearnedInteraction(PointInteraction):
     """The networks for one robot."""
 
-    def __init__(self, weights: Weights, trust: float, places: Places) -> None:
-        """Takes the weights, and the ratio of the networks' own error to how much they differ."""
-        super().__init__(places)
+    def __init__(self, weights: Weights, trust: float, geometry: JetGeometry) -> None:
+        """Prepares one robot.
+
+        Args:
+            weights: of the `MEMBERS` networks.
+            trust: ratio of the networks' error to the standard deviation among them.
+            geometry: points and jets of the n actuators, and the hull.
+        """
+        super().__init__(geometry)
         self._weights = weights
         self._trust = trust
-        self._pairs = pairs = Pairs(places)
-        self._among = np.eye(len(places.position))[:, pairs.receiver]
+        self._pairs = pairs = Pairs(geometry)
+        self._among = np.eye(len(geometry.position))[:, pairs.receiver]
         """Which pairs (n, p) each actuator receives from."""
-        self._has_hull = bool(places.hull[1].all())
+        self._has_hull = bool(geometry.hull[1].all())
 
     def at_rest(self, force: Array) -> Array:
         return np.asarray(self._each(force).mean(axis=0))
@@ -96,20 +109,18 @@ class LearnedInteraction(AtPlaces):
     def _each(self, force: Array) -> Array:
         """Changes (MEMBERS, ..., n, 3) [N] by each network."""
         pairs = self._pairs
-        change = self._among @ self._messages(
-            "pair", pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :])
-        )
-        return (
-            change + self._messages("hull", hull_rows(self.places, force))
-            if self._has_hull
-            else change
-        )
+        rows = pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :])
+        change = self._among @ self._messages("pair", rows)
+        if not self._has_hull:
+            return change
+        return change + self._messages("hull", hull_rows(self.geometry, force))
 
     def _messages(self, name: str, rows: Array) -> Array:
+        """Messages (MEMBERS, ..., p, 3) [N] of packed rows (..., p, m): the networks' numbers times
+        the rows' vectors."""
         features, vectors = unpacked(name, rows)
-        return np.asarray(
-            (numbers(self._weights, name, features)[..., None] * vectors).sum(axis=-2)
-        )
+        factors = numbers(self._weights, name, features)
+        return np.asarray((factors[..., None] * vectors).sum(axis=-2))
 
     def _slope_at_rest(self, force: Array) -> tuple[Array, Array]:
         """Returns `at_rest`, and its derivatives (..., n, 3, n, 3) by the forces, these first."""
@@ -125,13 +136,15 @@ class LearnedInteraction(AtPlaces):
         change = self._among @ sent
         own = np.einsum("np,...pab->...nab", self._among, by_receiver)
         if self._has_hull:
-            more, by_own = self._slopes("hull", (lambda some: hull_rows(self.places, some), force))
+            more, by_own = self._slopes(
+                "hull", (lambda some: hull_rows(self.geometry, some), force)
+            )
             change = change + more
             own = own + by_own
         slope = np.zeros((*force.shape[:-2], n * n, 3, 3))
         slope[..., pairs.source * n + pairs.receiver, :, :] = by_source
         slope = slope.reshape(*force.shape[:-2], n, n, 3, 3).swapaxes(-3, -2)
-        return change, with_own(slope, own)
+        return change, with_diagonal(slope, own)
 
     def _slopes(self, name: str, *ways: tuple[Callable[[AnyArray], Any], Array]) -> list[Array]:
         """Messages (..., p, 3) [N], and their derivatives (..., p, 3, 3) by each of some forces

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import AnyArray
-from finlab.interaction.interaction import Places, jets_of
+from finlab.interaction.interaction import JetGeometry, jets_of
 
 LEAST = 1e-3
 """Diameter [m] and half axis [m] below which nothing is divided by them."""
@@ -30,17 +30,17 @@ FORMS = {"pair": Form(11, 4), "hull": Form(6, 2)}
 class Pairs:
     """Pairs of a source with a jet and a receiver."""
 
-    def __init__(self, places: Places) -> None:
-        size = np.maximum(places.diameter, LEAST)
+    def __init__(self, geometry: JetGeometry) -> None:
+        size = np.maximum(geometry.diameter, LEAST)
         self.source, self.receiver = np.nonzero(
-            ~np.eye(len(size), dtype=bool) & (places.diameter > 0.0)[:, None]
+            ~np.eye(len(size), dtype=bool) & (geometry.diameter > 0.0)[:, None]
         )
-        """Places (p,) of the two."""
+        """Indices (p,) of the two."""
         self._size = size[self.source]
         self._own = size[self.receiver]
-        self._way = (places.position[self.receiver] - places.position[self.source]) / self._size[
-            :, None
-        ]
+        self._way = (
+            geometry.position[self.receiver] - geometry.position[self.source]
+        ) / self._size[:, None]
 
     def rows(self, source: AnyArray, receiver: AnyArray) -> Any:
         """Returns rows (..., p, 11 + 4 * 3) of forces (..., p, 3) [N] of the sources and of the
@@ -75,12 +75,12 @@ class Pairs:
         return _packed(features, [ahead, facing, outward, _cross(ahead, outward)], strength)
 
 
-def hull_rows(places: Places, force: AnyArray) -> Any:
+def hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
     """Returns rows (..., n, 6 + 2 * 3) of actuators with forces (..., n, 3) [N] and the hull."""
-    center = places.hull[0]
-    half = np.maximum(places.hull[1], LEAST)
-    thrust, ahead, _ = jets_of(force, np.maximum(places.diameter, LEAST))
-    place = (places.position - center) / half
+    center = geometry.hull[0]
+    half = np.maximum(geometry.hull[1], LEAST)
+    thrust, ahead, _ = jets_of(force, np.maximum(geometry.diameter, LEAST))
+    place = (geometry.position - center) / half
     course = -ahead / half
     towards = -(place * course).sum(-1) / np.sqrt((course * course).sum(-1) + 1e-9)
     squared = (place * place).sum(-1)
@@ -92,7 +92,7 @@ def hull_rows(places: Places, force: AnyArray) -> Any:
         np.tanh(3.0 * towards),
         np.tanh(squared - 1.0),
         (normal * ahead).sum(-1),
-        np.tanh(2.0 * places.diameter / half.mean()),
+        np.tanh(2.0 * geometry.diameter / half.mean()),
     ]
     return _packed(features, [ahead, normal], thrust)
 

@@ -1,4 +1,4 @@
-"""Actuators that do not work as they should: five words, and what is left of the robot."""
+"""Damage of actuators (lost, weak, torn, stuck, running), and the layout that it leaves."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,17 +13,19 @@ from finlab.errors import AllocationError, LayoutError
 from finlab.files.schema import checked
 from finlab.layout.layout import Layout
 
-Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
-"""What may be true of an actuator."""
+FaultKind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
+"""State of an actuator."""
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
+"""A share of a force [1]."""
 Kept = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """A number of a command, such as an angle [rad] or a force [N]."""
-_VALUES: Mapping[str, Any] = {
+FAULT_VALUES: Mapping[str, Any] = {
     "weak": Share,
     "torn": Share,
     "stuck": Kept,
     "running": Annotated[tuple[Kept, ...], Meta(min_length=1, max_length=3)],
 }
+"""Damage of an actuator that still works -> type of its value."""
 
 
 def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
@@ -38,40 +40,44 @@ def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Damage:
-    """What is known of damaged actuators, by name; those that are not named are whole.
+    """Damage of actuators, by name; those that are not named are whole. Not to be changed.
 
-    All but `lost` is a layout with other limits, or with a smaller fin, so that every method
+    All but `lost` leaves a layout with other limits, or with a smaller fin, so that every method
     accounts for it and limits hold as always: what hangs at a command has that one alone, and the
-    others make up for it. Not to be changed. Raises AllocationError: a share out of range, an angle
-    that is no number, names that are no list. How many numbers a command has, and which forces
-    there are, is known with the layout: see `applied_to`.
+    others compensate for it. How many numbers a command has, and which forces are possible, is
+    known with the layout: see `applied_to`.
+
+    Args:
+        lost: names of those that give no force and leave the layout.
+        weak: share that is left of the largest amplitude and frequency, or of the force, above 0
+            and up to 1 [1].
+        torn: share of its law's thrust that one gives at every command, as a fin with a torn blade
+            does [1].
+        stuck: value that one keeps: the angle at which a fin, an azimuth or a tilt no longer turns,
+            though it still pushes [rad]; the force at which a thruster hangs [N].
+        running: command that one keeps whatever is asked: of a fin (amplitude [rad], frequency
+            [Hz], zero direction [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a
+            thruster (force [N],).
+
+    Raises:
+        AllocationError: a share is out of range, an angle is no number, names are no list, or one
+            is both stuck and running.
     """
 
     lost: Sequence[str] = ()
-    """Those that give no force and leave the layout."""
     weak: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency, or of the
-    force."""
     torn: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Share of its law's thrust that one gives at every command, as a fin with a torn blade
-    does."""
     stuck: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Where one stays: the angle [rad] at which a fin, an azimuth or a tilt no longer turns, though
-    it still pushes; the force [N] at which a thruster hangs."""
     running: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
-    """Command that one keeps whatever is asked: of a fin (amplitude [rad], frequency [Hz], zero
-    direction [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a thruster (force
-    [N],)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lost", lost_names(self.lost))
-        for kind, value in _VALUES.items():
-            known = checked(getattr(self, kind), dict[str, Any], AllocationError, f"damage: {kind}")
-            each = {
-                name: checked(own, value, AllocationError, f"damage: {kind} {name}")
-                for name, own in known.items()
-            }
-            object.__setattr__(self, kind, each)
+        for kind, value in FAULT_VALUES.items():
+            named = checked(getattr(self, kind), dict[str, Any], AllocationError, f"damage: {kind}")
+            by_name = {}
+            for name, own in named.items():
+                by_name[name] = checked(own, value, AllocationError, f"damage: {kind} {name}")
+            object.__setattr__(self, kind, by_name)
         if both := set(self.stuck) & set(self.running):
             raise AllocationError(
                 f"damage: an actuator is stuck or running, got both of {', '.join(both)}"
@@ -80,7 +86,7 @@ class Damage:
     @property
     def partly(self) -> dict[str, Mapping[str, Any]]:
         """What is known of those that work in part, by kind of fault."""
-        return {kind: getattr(self, kind) for kind in _VALUES if getattr(self, kind)}
+        return {kind: getattr(self, kind) for kind in FAULT_VALUES if getattr(self, kind)}
 
     def of(self, name: str) -> dict[str, Any]:
         """Returns the faults of one actuator that still works, by kind."""
@@ -92,15 +98,16 @@ class Damage:
         if kind == "lost":
             others = tuple(other for other in self.lost if other != name)
             return replace(self, lost=others if value is None else (*others, name))
-        out = (
-            ("stuck", "running") if kind in ("stuck", "running") and value is not None else (kind,)
-        )
-        kept: dict[str, Any] = {
-            own: {k: v for k, v in getattr(self, own).items() if k != name} for own in out
-        }
+        replaced: tuple[str, ...] = (kind,)
+        if kind in ("stuck", "running") and value is not None:
+            replaced = ("stuck", "running")
+        changed: dict[str, Any] = {}
+        for each in replaced:
+            changed[each] = dict(getattr(self, each))
+            changed[each].pop(name, None)
         if value is not None:
-            kept[kind][name] = value
-        return replace(self, **kept)
+            changed[kind][name] = value
+        return replace(self, **changed)
 
     def renamed(self, names: Mapping[str, str]) -> "Damage":
         """Returns it for actuators with new names, by their old ones; others are forgotten."""
@@ -125,12 +132,12 @@ class Damage:
         gives the force that it is allocated where it is asked for more; one that is stuck as well
         gives its share.
         """
-        may = {part.name: part.FAULTS for part in layout.actuators}
+        may = {part.name: part.KIND.faults for part in layout.actuators}
         known = {name: at for name, at in stuck.items() if "stuck" in may[name]}
         blades = {name: share for name, share in torn.items() if "torn" in may[name]}
         weak = {name: share for name, share in torn.items() if name not in blades}
         for name in set(weak) & set(known):
-            if not layout.part(name).TURNS:
+            if not layout.part(name).KIND.sticks_at_angle:
                 known[name] *= weak.pop(name)
         return cls((*lost, *(name for name in stuck if name not in known)), weak, blades, known)
 
@@ -158,16 +165,17 @@ class Damage:
         }
         held: dict[str, float] = {}
         for name, (value,) in _named("stuck", stuck, 1).items():
-            held[name] = math.radians(value) if layout.part(name).TURNS else value
+            held[name] = math.radians(value) if layout.part(name).KIND.sticks_at_angle else value
         kept: dict[str, tuple[float, ...]] = {}
         for name, values in _named("running", running, None).items():
             part = layout.part(name)
-            turns = part.HELD if part.TURNS else None
+            turns = part.KIND.stuck_number if part.KIND.sticks_at_angle else None
             # Of a kind that cannot run on, that is said where the damage is applied.
-            if "running" in part.FAULTS and len(values) != len(part.NUMBERS):
-                units = ["deg" if k == turns else unit for k, (_, unit) in enumerate(part.NUMBERS)]
-                numbers = zip(part.NUMBERS, units, strict=True)
-                wanted = ",".join(f"{number} [{unit}]" for (number, _), unit in numbers)
+            if "running" in part.KIND.faults and len(values) != len(part.KIND.numbers):
+                labels = [number.label for number in part.KIND.numbers]
+                if turns is not None:
+                    labels[turns] = f"{part.KIND.numbers[turns].name} [deg]"
+                wanted = ",".join(labels)
                 got = ",".join(f"{value:g}" for value in values)
                 raise AllocationError(
                     f"running: expected NAME={wanted} of the {part.type} {name!r}, got "
@@ -192,8 +200,8 @@ WHOLE = Damage()
 def _applied(damage: Damage, layout: Layout) -> Layout:
     for kind, known in damage.partly.items():
         for part in [layout.part(name, f"damage: {kind}") for name in known]:
-            if kind not in part.FAULTS:
-                may = ", ".join((*part.FAULTS, "lost"))
+            if kind not in part.KIND.faults:
+                may = ", ".join((*part.KIND.faults, "lost"))
                 raise AllocationError(
                     f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}"
                 )
@@ -211,13 +219,13 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
 def _check_count(part: Actuator, command: Sequence[float]) -> None:
     """Refuses a command that an actuator is said to keep, if it has another number of values than
     its kind's. Raises AllocationError."""
-    if len(command) != len(part.NUMBERS):
-        wanted = ", ".join(f"{name} [{unit}]" for name, unit in part.NUMBERS)
+    if len(command) != len(part.KIND.numbers):
+        wanted = ", ".join(number.label for number in part.KIND.numbers)
         got = ", ".join(f"{value:g}" for value in command)
         raise AllocationError(
             f"damage of {part.name!r}: running: expected the command that {part.type}s have "
             f"({wanted}), "
-            f"{len(part.NUMBERS)} in all, got {len(command)} ({got})"
+            f"{len(part.KIND.numbers)} in all, got {len(command)} ({got})"
         )
 
 

@@ -65,7 +65,7 @@ def layout_effectiveness(layout: Layout) -> Array:
         lift ahead.
     """
     pairs = zip(own_effectiveness(layout), layout.actuators, strict=True)
-    return np.concatenate([own[list(actuator.PUSHES)] for own, actuator in pairs]).T
+    return np.concatenate([own[list(actuator.KIND.push_rows)] for own, actuator in pairs]).T
 
 
 def body_force(own_force: Values, frames: Values) -> Values:

@@ -104,7 +104,7 @@ class Layout(Checked):
     @cached_property
     def by_flow(self) -> tuple[str, ...]:
         """Names of the actuators that give nothing at rest: their force is that of the flow."""
-        return tuple(part.name for part in self.actuators if part.BY_FLOW)
+        return tuple(part.name for part in self.actuators if part.KIND.driven_by_flow)
 
     @cached_property
     def fins_alone(self) -> "Layout":

@@ -33,20 +33,23 @@ errors."""
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known of one actuator's force."""
+class ForceError:
+    """Model of the error of one actuator's force.
+
+    Args:
+        share: standard deviation along each own axis over the force [1].
+        floor: part of it that is there at any force [N].
+        common: source of the error, the same for those that err together; None for an actuator
+            whose error is independent.
+        correlation: share of the variance that these have together [1].
+        table: standard deviations at each command, in place of `share` and `floor`.
+    """
 
     share: float
-    """Standard deviation along each own direction, as a share of the force."""
     floor: float = 0.0
-    """The part of it that is there at any force [N]."""
     common: Hashable = None
-    """Source of the error, the same for those that err together; None for one that errs by
-    itself."""
     correlation: float = 1.0
-    """Share of the variance that these have together."""
     table: GridUncertainty | None = None
-    """Tells the deviation at each command, in place of `share` and `floor`."""
 
     def deviation(self, command: Array, size: Array) -> Array:
         """Returns the standard deviation (N, 2) [N] along each own direction of the force, and
@@ -57,32 +60,34 @@ class Known:
         return np.stack([own, np.zeros_like(own)], axis=-1)
 
 
-def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
+def uncertainties(layout: Layout) -> tuple[ForceError | None, ...]:
     """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad
     table."""
     return _known(layout, layout.stamps)
 
 
 @lru_cache(maxsize=256)
-def _known(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[Known | None, ...]:
+def _known(
+    layout: Layout, stamps: tuple[tuple[int, int] | None, ...]
+) -> tuple[ForceError | None, ...]:
     result = tuple(map(_of, layout.actuators))
     return tuple(own if own and (own.table or own.share or own.floor) else None for own in result)
 
 
-def _of(part: Actuator) -> Known | None:
+def _of(part: Actuator) -> ForceError | None:
     said = part.uncertainty
     if said is not None:
-        return Known(said.share, said.floor, said.common, said.correlation)
+        return ForceError(said.share, said.floor, said.common, said.correlation)
     if isinstance(part, Fin):
         law = make_law(part.model)
         if not isinstance(law, TableLaw):
             return None
         known = grid_uncertainty(law)
-        return Known(known.uncertain_share, 0.0, part.model, OF_ONE_TABLE, known)
+        return ForceError(known.uncertain_share, 0.0, part.model, OF_ONE_TABLE, known)
     model = getattr(part, "model", None)
     if not isinstance(model, PowerTable):
         return None
-    return Known(*thrust_table_error(model), model, OF_ONE_TABLE)
+    return ForceError(*thrust_table_error(model), model, OF_ONE_TABLE)
 
 
 class Source(NamedTuple):
@@ -136,16 +141,16 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
     return sources
 
 
-def _errors(layout: Layout, place: int, known: Known, command: Array, force: Array) -> Array:
+def _errors(layout: Layout, place: int, known: ForceError, command: Array, force: Array) -> Array:
     """One standard deviation of the errors (N, 3, 3) [N] of an actuator, each a force in its own
     frame: along its force (N, 3), across it and along the shaft."""
     lost = np.isnan(command[:, 0])
     deviation = known.deviation(np.nan_to_num(command), np.linalg.norm(force, axis=-1))
     deviation = np.where(lost[:, None], 0.0, deviation)
     part = layout.actuators[place]
-    acting = force if len(part.PUSHES) == 1 else force * [0.0, 1.0, 1.0]
+    acting = force if len(part.KIND.push_rows) == 1 else force * [0.0, 1.0, 1.0]
     size = np.linalg.norm(acting, axis=-1, keepdims=True)
-    rest = np.eye(3)[part.PUSHES[0]]  # where it gives no force
+    rest = np.eye(3)[part.KIND.push_rows[0]]  # where it gives no force
     along = np.where(size > 0.0, acting / np.maximum(size, 1e-300), rest)
     errors = np.zeros((len(command), 3, 3))
     errors[:, 0] = deviation[:, :1] * along

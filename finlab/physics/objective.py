@@ -14,9 +14,16 @@ from finlab.arrays import AnyArray, Array, Values
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant, plant_of
 
-AMPLITUDE, FREQUENCY, ZERO_DIRECTION, PRODUCT = 1.0, 1.0, 0.1, 1.0
-"""Weights of the squares of normalized amplitude, frequency and zero direction, and of amplitude
-times frequency; the paper prints none."""
+AMPLITUDE = 1.0
+"""Weight of the squared normalized amplitude; the paper prints no weights."""
+FREQUENCY = 1.0
+"""Weight of the squared normalized frequency."""
+ZERO_DIRECTION = 0.1
+"""Weight of the squared normalized zero direction."""
+PRODUCT = 1.0
+"""Weight of normalized amplitude times normalized frequency."""
+LEAST_SCALE = 1e-3
+"""Least scale of a command [rad, Hz, rad]."""
 
 
 def effort_scale(upper: Values) -> Values:
@@ -25,7 +32,7 @@ def effort_scale(upper: Values) -> Values:
     One of zero or below, such as that of an arc below zero, would blow up or change the sign: its
     size counts, and no less than a floor.
     """
-    return abs(upper).clip(1e-3)
+    return abs(upper).clip(LEAST_SCALE)
 
 
 def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Values) -> Values:

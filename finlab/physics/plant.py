@@ -1,6 +1,7 @@
-"""The plant: what a robot's actuators really do, in numpy and float64.
+"""The plant: wrench and power of a robot's commands, by the laws of its actuators, in numpy and
+double precision.
 
-It judges every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is
+It scores every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is
 the velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
 """
 
@@ -23,7 +24,7 @@ from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of
 from finlab.layout.layout import Layout
 
 if TYPE_CHECKING:
-    from finlab.interaction.interaction import AtPlaces
+    from finlab.interaction.interaction import PointInteraction
 
 
 class Plant:
@@ -52,12 +53,12 @@ class Plant:
             [(slice(None), laws[0][1])] if len(laws) == 1 else laws
         )
         own = layout.interaction
-        self.interaction: AtPlaces | None = None
+        self.interaction: PointInteraction | None = None
         """What the actuators do to each other; None where that does not count."""
         if own is not None:
-            from finlab.layout.places import places_of
+            from finlab.layout.jet_geometry import jet_geometry_of
 
-            self.interaction = own.of(places_of(layout))
+            self.interaction = own.of(jet_geometry_of(layout))
         self.counts: NDArray[np.bool_] = np.ones(6, bool)
         """Axes (6,) of the wrench that count, the others being 0."""
         self.feels_flow = own is not None or any(law.feels_flow for _, law in self._laws)
@@ -87,7 +88,7 @@ class Plant:
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
-        """Returns the velocity (..., n, 3) of each actuator's place through the water in its own
+        """Returns the velocity (..., n, 3) of each actuator's point through the water in its own
         frame [m/s]; None at rest, or where no force depends on it."""
         if flow is None:
             return self._inflow
@@ -97,7 +98,7 @@ class Plant:
         return met
 
     def _moved(self, flow: Array) -> Array:
-        """Velocity (..., n, 3) of each actuator's place through the water, body frame [m/s]."""
+        """Velocity (..., n, 3) of each actuator's point through the water, body frame [m/s]."""
         water = np.asarray(flow, np.float64)[..., None, :]
         return np.asarray(water[..., :3] + np.cross(water[..., 3:], self.layout.position))
 
@@ -121,25 +122,26 @@ class Plant:
         return wrench if self.interaction is None else wrench + self.offset(force, flow=flow)
 
     def offset(self, force: Array, *, flow: Array | None = None) -> Array:
-        """Returns the part of it (..., 6) that comes of what the actuators do to each other."""
-        known = self.interaction
-        if known is None:
+        """Returns the wrench offset (..., 6) [N, N m] by the interaction, at forces (..., n, 3) [N]
+        in own frames."""
+        if self.interaction is None:
             return np.zeros((*force.shape[:-2], 6))
-        return (
-            known.offset(body_force(force, self.layout.frames), self.met_by_all(flow)) * self.counts
-        )
+        in_body = body_force(force, self.layout.frames)
+        return self.interaction.offset(in_body, self.met_by_all(flow)) * self.counts
 
     def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes, all counted,
-        near forces."""
-        known = self.interaction
+        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes [1, m], that of
+        the interaction at forces (..., n, 3) [N] included."""
         frames = self.layout.frames
-        if known is None:
+        if self.interaction is None:
             return self.offset(force), self.effectiveness
-        offset, slope = known.effect(body_force(force, frames), self.met_by_all(flow))
+        in_body = body_force(force, frames)
+        offset, slope = self.interaction.effect(in_body, self.met_by_all(flow))
         return offset * self.counts, self.effectiveness + (frames @ slope) * self.counts
 
     def met_by_all(self, flow: Array | None) -> Array | None:
+        """Returns the velocity (..., n, 3) of each actuator's point through the water, body frame
+        [m/s]; of the plant's own flow when `flow` is None, and None at rest."""
         flow = self.flow if flow is None else flow
         return None if flow is None else self._moved(flow)
 
@@ -159,8 +161,9 @@ class Plant:
             return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
-        for places, law in self._laws:
-            force[..., places, :] = law.force(command[..., places, :], *_met(law, inflow, places))
+        for indices, law in self._laws:
+            own_inflow = _inflow_of(law, inflow, indices)
+            force[..., indices, :] = law.force(command[..., indices, :], own_inflow)
         return force
 
     def force_and_jacobian(
@@ -171,9 +174,11 @@ class Plant:
         shape = _broadcast(command, inflow)
         force = np.empty(shape)
         jacobian = np.empty((*shape, 3))
-        for places, law in self._laws:
-            answer = law.force_and_jacobian(command[..., places, :], *_met(law, inflow, places))
-            force[..., places, :], jacobian[..., places, :, :] = answer
+        for indices, law in self._laws:
+            own_inflow = _inflow_of(law, inflow, indices)
+            own_force, own_jacobian = law.force_and_jacobian(command[..., indices, :], own_inflow)
+            force[..., indices, :] = own_force
+            jacobian[..., indices, :, :] = own_jacobian
         return force, jacobian
 
     def body_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
@@ -197,18 +202,19 @@ class Plant:
             return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
-        for places, law in self._laws:
-            power[..., places] = law.power(command[..., places, :], *_met(law, inflow, places))
+        for indices, law in self._laws:
+            own_inflow = _inflow_of(law, inflow, indices)
+            power[..., indices] = law.power(command[..., indices, :], own_inflow)
         return power
 
     def power_gradient(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
         inflow = self.inflow(flow)
-        jacobian = np.empty(_broadcast(command, inflow))
-        for places, law in self._laws:
-            met = _met(law, inflow, places)
-            jacobian[..., places, :] = law.power_gradient(command[..., places, :], *met)
-        return jacobian
+        gradient = np.empty(_broadcast(command, inflow))
+        for indices, law in self._laws:
+            own_inflow = _inflow_of(law, inflow, indices)
+            gradient[..., indices, :] = law.power_gradient(command[..., indices, :], own_inflow)
+        return gradient
 
     @cached_property
     def is_uncertain(self) -> bool:
@@ -240,9 +246,8 @@ class Plant:
         """Dead bands (n, 3) [N] of the commands that are forces; None where there is none."""
         bands = np.zeros((self.n, 3))
         for i, part in enumerate(self.layout.actuators):
-            limits: tuple[str, ...] = getattr(part, "LIMITS", ())
-            if "force" in limits:
-                bands[i, limits.index("force")] = getattr(part, "dead_band", 0.0)
+            if part.KIND.force_number is not None:
+                bands[i, part.KIND.force_number] = getattr(part, "dead_band", 0.0)
         return bands if bands.any() else None
 
     def rested(self, command: Array) -> Array:
@@ -250,9 +255,9 @@ class Plant:
         rest."""
         if self._dead_band is None:
             return command
-        from finlab.actuators.propeller import held
+        from finlab.actuators.propeller import outside_dead_band
 
-        return held(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
+        return outside_dead_band(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
 
     def grid(self, counts: Sequence[int]) -> Array:
         """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each
@@ -297,10 +302,13 @@ def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
     return command.shape if inflow is None else np.broadcast_shapes(command.shape, inflow.shape)
 
 
-def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
-    """What a law is told beside the commands: the velocities of its actuators' places, where they
-    count."""
-    return () if inflow is None or not law.feels_flow else (inflow[..., places, :],)
+def _inflow_of(law: ActuatorLaw, inflow: Array | None, indices: Any) -> Array | None:
+    """Velocities (..., m, 3) of a law's actuators through the water; None at rest, or of a law that
+    does not feel the flow."""
+    if inflow is None or not law.feels_flow:
+        return None
+    own: Array = inflow[..., indices, :]
+    return own
 
 
 def plant_of(layout: Layout) -> Plant:

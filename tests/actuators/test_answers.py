@@ -136,7 +136,7 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
     law = RudderLaw(RUDDERS)
     low, high = (np.array([getattr(part, end) for part in RUDDERS]) for end in ("lower", "upper"))
     robot = prepared(group, wrench, low, high)
-    met = law.met(inflow)
+    met = law.flow_at(inflow, inflow.shape)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
     for share in (0.0, 0.3, 1.0):
         force = np.zeros((1, 2, 2))
@@ -166,7 +166,7 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     )  # multipliers at which lift has a price, and drag none
     found = [answer(robot, rows @ [own, 0.0])[1] for own in price]
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
-    course = law.met(inflow).course[0]
+    course = law.flow_at(inflow, inflow.shape).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
     worth = price * lift[:, None] - law.power(delta, inflow)
     np.testing.assert_allclose(found, worth.max(axis=0), rtol=0.02, atol=0.02)

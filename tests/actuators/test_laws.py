@@ -12,7 +12,7 @@ from finlab.actuators.fin.fin import Fin
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.rudder import Rudder, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
-from finlab.actuators.thrust_power import ByPower, Sides
+from finlab.actuators.thrust_power import PowerLaws, TableCurves
 from finlab.actuators.thruster import Thruster, ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
@@ -99,10 +99,10 @@ def test_commands_within_the_dead_band_give_no_force_and_take_no_power() -> None
 def test_the_makers_tables_are_met_and_convex(volts: int) -> None:
     table = PowerTable(t200_rows(volts), "us")
     _, force, power = table.columns
-    watts, _ = Sides(table).at(force)
+    watts, _ = TableCurves(table).power_and_marginal_cost(force)
     np.testing.assert_allclose(watts, power, atol=0.35)
     fine = np.linspace(force[0], force[-1], 20001)
-    watts, marginal = Sides(table).at(fine)
+    watts, marginal = TableCurves(table).power_and_marginal_cost(fine)
     assert (np.diff(marginal) > 0.0).all()
     np.testing.assert_allclose(
         np.gradient(watts, fine)[1:-1], marginal[1:-1], atol=0.05 * marginal.max()
@@ -122,20 +122,24 @@ def test_power_laws_of_the_t200_meet_its_tables(
 ) -> None:
     """Published fits of F^1.5, and the root of the mean square of what they miss [W]."""
     _, force, power = PowerTable(t200_rows(volts)).columns
-    missed = ByPower([PowerLaw(forward, reverse)]).at(force[:, None])[0][:, 0] - power
+    power_by_law, _ = PowerLaws([PowerLaw(forward, reverse)]).power_and_marginal_cost(
+        force[:, None]
+    )
+    missed = power_by_law[:, 0] - power
     for side, most in zip((force > 0.0, force < 0.0), rms, strict=True):
         assert math.sqrt((missed[side] ** 2).mean()) <= most
 
 
 def test_a_table_answers_a_price_with_the_force_whose_marginal_cost_it_is() -> None:
-    curve = Sides(TABLE).curves[0][0]
-    assert curve is not None
+    curve = TableCurves(TABLE).sides[0].curve
     price = np.linspace(0.0, 13.0, 300)
-    size = curve.answer(price)
-    np.testing.assert_allclose(curve.at(size)[1], price, atol=1e-9)
+    size = curve.response(price)
+    power, marginal_cost = curve.power_and_marginal_cost(size)
+    np.testing.assert_allclose(marginal_cost, price, atol=1e-9)
     grid = np.linspace(0.0, 51.44, 4001)
-    worth = price * size - curve.at(size)[0]
-    assert (worth >= (price[:, None] * grid - curve.at(grid)[0]).max(axis=1) - 1e-9).all()
+    power_on_grid, _ = curve.power_and_marginal_cost(grid)
+    conjugate = (price[:, None] * grid - power_on_grid).max(axis=1)
+    assert (price * size - power >= conjugate - 1e-9).all()
 
 
 def test_a_rudder_at_zero_inflow_angle_is_the_fin_of_a_torpedo() -> None:

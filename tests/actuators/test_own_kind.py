@@ -21,6 +21,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Damage, Layout, load_layout, save_layout
 from finlab.physics import plant_of
 from tests.webapp.test_faults import Tab
+from webapp.panels.inspectors import inspector_of
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
@@ -129,6 +130,10 @@ def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[
     part = session.state.layout.part(name)
     assert part.value("force") == (0.0, 10.0) and part.direction == pytest.approx((0.0, 1.0, 0.0))
     assert session.state.able.part(name).upper[1] == pytest.approx(5.0)
+    # Its inspector is made of its fields, since it has none of its own.
+    boxes = {box.label: box for box in inspector_of(type(part)).limits}
+    assert {*boxes} == {"Arc [°]", "Force [N]"} and boxes["Arc [°]"].degrees
+    assert inspector_of(type(part)).other_axis == "Zero"
     shown = " ".join(tab.figures())
     assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
     assert "water_jet" in shown and "Exact" in shown and "cannot be shown" not in shown
@@ -153,8 +158,14 @@ def test_all_kinds_keep_the_contract() -> None:
         ),
         ("return price / 4", "return price / (4", "SyntaxError"),
         ('    type = "water_jet"\n', '    type = "water_jet"\n    1 / 0\n', "ZeroDivisionError"),
-        ("    LAW = AzimuthLaw\n    GROUP = AzimuthGroup\n", "", "WaterJet lacks LAW, GROUP"),
-        ("COMMAND = JetCommand", "COMMAND = ()", "expected a subclass of Command"),
+        (
+            "        law=AzimuthLaw,\n        group=AzimuthGroup,\n",
+            "",
+            "missing 2 required keyword-only arguments: 'law' and 'group'",
+        ),
+        ("    KIND = Kind(", "    OTHER = Kind(", "WaterJet lacks KIND"),
+        ("    KIND = Kind(", "    KIND = dict(", "KIND of WaterJet: expected a Kind, got {"),
+        ("command=JetCommand", "command=()", "command of WaterJet: expected a subclass of Command"),
         (
             "    def damaged(self, faults):",
             "    def hurt(self, faults):",
@@ -162,10 +173,15 @@ def test_all_kinds_keep_the_contract() -> None:
         ),
         ("    def sample(cls):", "    def other(cls):", "WaterJet lacks sample()"),
         ("    position: Place\n", "", "WaterJet lacks position"),
-        ('LIMITS = ("arc", "force")', 'LIMITS = ("arc", "push")', "the field 'push' of its LIMITS"),
-        ('"pod"\n', '"boat"\n', "expected one of fin, thruster, pod, foil, got 'boat'"),
+        ('limits="force"', 'limits="push"', "the field 'push' of its KIND (limits of 'force')"),
+        (', limits="force"', "", "WaterJet lacks limits of its number 'force'"),
+        ('limits="force"', 'limits="force", rate="ramp"', "the field 'ramp' of its KIND"),
+        ('axes=("shaft", "zero")', 'axes=("shaft", "bow")', "the field 'bow' of its KIND (axes)"),
+        ('pointed="shaft"', 'pointed="bow"', "pointed of WaterJet: expected one of shaft, zero"),
+        ('("zero", ACROSS)', '("bow", ACROSS)', "pushes_along of WaterJet: expected one of shaft"),
+        ('"pod"', '"boat"', "expected one of fin, thruster, pod, foil, got 'boat'"),
         ('("weak",)', '("tired",)', "got 'tired'"),
-        ("GROUP = AzimuthGroup", "GROUP = Pump", "a subclass of Group, got"),
+        ("group=AzimuthGroup", "group=Pump", "a subclass of Group, got"),
         ("@dataclass(frozen=True)\nclass WaterJet", "class WaterJet", "WaterJet is no dataclass"),
         ("KINDS[WaterJet.type] = WaterJet", "KINDS['jet'] = WaterJet", "has the type 'water_jet'"),
         (

@@ -74,12 +74,12 @@ def damaged(layout: Layout, word: str) -> Damage | None:
     if word == "lost":
         return Damage(lost=[layout.names[1]])
     for part in layout.actuators:
-        if word not in part.FAULTS:
+        if word not in part.KIND.faults:
             continue
         middle = 0.5 * (np.array(part.lower) + np.array(part.upper))
-        angle = middle[part.HELD] if part.HELD is not None else middle[0]
+        angle = middle[part.KIND.stuck_number] if part.KIND.stuck_number is not None else middle[0]
         value = {"weak": 0.4, "torn": 0.4, "stuck": float(angle)}
-        kept = tuple(float(number) for number in middle[: len(part.NUMBERS)])
+        kept = tuple(float(number) for number in middle[: len(part.KIND.numbers)])
         return Damage(**{word: {part.name: kept if word == "running" else value[word]}})
     return None
 

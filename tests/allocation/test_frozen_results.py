@@ -74,7 +74,7 @@ def test_a_batch_has_the_commands_of_each_answer_by_name(robot: str) -> None:
     assert batch.commands is batch.commands
     for part, rows in zip(layout.actuators[1:], np.moveaxis(batch.command, 1, 0)[1:], strict=True):
         found = batch.commands[part.name]
-        assert type(found) is part.COMMAND
+        assert type(found) is part.KIND.command
         singles = [part.command(row) for row in rows]
         for name in found.__struct_fields__:
             each = [getattr(one, name) for one in singles]

@@ -95,7 +95,7 @@ def reached_targets(rng: np.random.Generator, layout: Layout, index: int, comman
     plant = plant_of(layout)
     commands = plant.sample(rng, (4,))
     for i, part in enumerate(layout.actuators):
-        commands[:, i, part.THRUST or 0] *= 0.4
+        commands[:, i, part.KIND.force_number or 0] *= 0.4
     commands[:, index] = command
     return plant.wrench(commands)
 

@@ -4,15 +4,15 @@ core."""
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.interaction.interaction import DENSITY, STILL, Places
+from finlab.interaction.interaction import DENSITY, STILL, JetGeometry
 from finlab.interaction.jets import Jets
 
 
-def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
-    """The wrench (6,) beside forces (n, 3) of places that move at `inflow` (n, 3)."""
+def offset(known: Jets, geometry: JetGeometry, force: Array, inflow: Array) -> Array:
+    """The wrench (6,) beside forces (n, 3) of geometry that move at `inflow` (n, 3)."""
     n = len(force)
     wrench = np.zeros(6)
-    area = 0.25 * np.pi * places.diameter**2
+    area = 0.25 * np.pi * geometry.diameter**2
     least = 0.5 * DENSITY * area * STILL**2
     thrust = np.sqrt((force**2).sum(axis=1) + least**2)
     ahead = force / thrust[:, None]
@@ -20,7 +20,7 @@ def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
     for i in range(n):
         water = np.zeros(3)
         for j in set(range(n)) - {i}:
-            way = (places.position[i] - places.position[j]) / places.diameter[j]
+            way = (geometry.position[i] - geometry.position[j]) / geometry.diameter[j]
             along = -way @ ahead[j]
             beside = way @ way - along**2
             slow = (1.0 + (along / known.length) ** 4) ** -0.25 * 0.5 * (1.0 + np.tanh(along / 0.2))
@@ -28,10 +28,10 @@ def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
             water -= speed[j] * slow * narrow * ahead[j]
         share = -(water @ ahead[i]) / speed[i]
         lost = share / (known.lag + known.most * np.sqrt(share**2 + 1e-4))
-        lost += places.advance[i] * (inflow[i] @ ahead[i]) / speed[i]
-        center, half = places.hull
+        lost += geometry.advance[i] * (inflow[i] @ ahead[i]) / speed[i]
+        center, half = geometry.hull
         if half.all():
-            place = (places.position[i] - center) / half
+            place = (geometry.position[i] - center) / half
             course = -ahead[i] / half
             facing = -(place @ course) / np.linalg.norm(course)
             rim = np.tanh((1.0 - place @ place + facing**2) / 0.3)
@@ -39,5 +39,5 @@ def offset(known: Jets, places: Places, force: Array, inflow: Array) -> Array:
         across = water - (water @ ahead[i]) * ahead[i]
         drag = 0.5 * DENSITY * known.housing * area[i] * np.sqrt(water @ water + 1e-12)
         change = known.side * DENSITY * area[i] * speed[i] * across + drag * water - lost * force[i]
-        wrench += np.concatenate([change, np.cross(places.position[i], change)])
+        wrench += np.concatenate([change, np.cross(geometry.position[i], change)])
     return wrench

@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from finlab.interaction.interaction import Interaction
 from finlab.interaction.jets import Jets
 from finlab.layout import FinModelSpec, Hull
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_jet_robot
 from tests.interaction import oracle
@@ -54,12 +54,12 @@ def test_far_aside_nothing_is_lost() -> None:
 def test_the_core_says_what_the_formula_says(seed: int) -> None:
     rng = np.random.default_rng(seed)
     known = Jets(2.5, 2.9, 30.0, 0.7, 0.8, 0.25, 0.1, 0.55)
-    places = places_of(random_jet_robot(rng, "r", (2, 9)))
-    n = len(places.position)
+    geometry = jet_geometry_of(random_jet_robot(rng, "r", (2, 9)))
+    n = len(geometry.position)
     force = rng.normal(size=(5, n, 3)) * 10.0 ** rng.uniform(-4, 2, (5, n, 1))
     inflow = rng.normal(size=(n, 3))
-    expected = [oracle.offset(known, places, own, inflow) for own in force]
-    assert_allclose(known.of(places).offset(force, inflow), expected, rtol=1e-9, atol=1e-9)
+    expected = [oracle.offset(known, geometry, own, inflow) for own in force]
+    assert_allclose(known.of(geometry).offset(force, inflow), expected, rtol=1e-9, atol=1e-9)
 
 
 def differs(known: Interaction, force: Array, inflow: Array | None = None) -> float:
@@ -75,8 +75,8 @@ def differs(known: Interaction, force: Array, inflow: Array | None = None) -> fl
 @pytest.mark.parametrize("seed", range(4))
 def test_derivatives(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    known = Jets().of(places_of(random_jet_robot(rng, "robot", (2, 6))))
-    n = len(known.places.position)
+    known = Jets().of(jet_geometry_of(random_jet_robot(rng, "robot", (2, 6))))
+    n = len(known.geometry.position)
     assert differs(known, 8.0 * rng.normal(size=(n, 3)), rng.normal(size=(n, 3))) < 1e-6
 
 

@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.errors import CheckpointError, FinlabError
 from finlab.interaction.learned import Learned, read_network
 from finlab.layout import Layout, layout_to_dict, parse_layout
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 from finlab.research.random_layouts import random_jet_robot
@@ -66,8 +66,8 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
 
 def test_derivatives(network: Learned) -> None:
     rng = np.random.default_rng(3)
-    known = network.of(places_of(random_jet_robot(rng, "robot", (3, 5))))
-    assert differs(known, 8.0 * rng.normal(size=(len(known.places.position), 3))) < 1e-5
+    known = network.of(jet_geometry_of(random_jet_robot(rng, "robot", (3, 5))))
+    assert differs(known, 8.0 * rng.normal(size=(len(known.geometry.position), 3))) < 1e-5
 
 
 def test_a_layout_names_its_network(network: Learned) -> None:

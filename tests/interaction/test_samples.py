@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 import finlab
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.fit.columns import command_columns
 from finlab.fit.interaction.constants import fit_constants
 from finlab.fit.interaction.samples import Samples, read_samples, read_table, write_samples
 from finlab.interaction.jets import Jets
@@ -31,14 +32,14 @@ def other(layout: Layout, command: Array) -> Array:
 
 def write_table(samples: Samples, path: Path) -> None:
     layout = samples.layout
-    names = [f"{part.name}.{name}" for part in layout.actuators for name, _ in part.NUMBERS]
+    names = sum(command_columns(layout), [])
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*names, "Fx", "Fy", "Fz", "Tx", "Ty", "Tz"])
         for command, wrench in zip(samples.command, samples.wrench, strict=True):
             parts = zip(layout.actuators, command, strict=True)
             writer.writerow(
-                [*(v for part, row in parts for v in row[: len(part.NUMBERS)]), *wrench]
+                [*(v for part, row in parts for v in row[: len(part.KIND.numbers)]), *wrench]
             )
 
 

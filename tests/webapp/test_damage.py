@@ -77,7 +77,7 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
     session = Session(load_layout(robot))
     for part in session.state.layout.actuators:
         for kind, value in {**VALUES, "running": NO_FIN.get(part.type, VALUES["running"])}.items():
-            if kind in part.FAULTS:
+            if kind in part.KIND.faults:
                 session.damage(part.name, kind, value)
                 assert session.state.damage.of(part.name)[kind] == value
             else:

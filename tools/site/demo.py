@@ -61,7 +61,7 @@ def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
                 "name": name,
                 "position": at.tolist(),
                 "directions": own.tolist(),
-                "numbers": part.NUMBERS,
+                "numbers": [(number.name, number.unit) for number in part.KIND.numbers],
             }
             for name, at, own, part in zip(
                 layout.names,

@@ -149,14 +149,31 @@ def _meanings(part: str) -> Any:
 
 @cache
 def classes(module: Any) -> dict[str, dict[str, str]]:
-    """What the classes of a module, and of those within it, say of their attributes."""
+    """What the classes of a module, and of those within it, say of their attributes: in the
+    docstrings below them, or under Args in the docstring of the class."""
     found = {}
     for each in module.members.values():
-        if not each.is_alias and each.is_class:
+        if each.is_alias:
+            continue
+        if each.is_class:
             found[each.name] = {name: first_line(own) for name, own in each.attributes.items()}
-        elif not each.is_alias and each.is_module:
+            found[each.name] |= _arguments(each)
+        elif each.is_module:
             found |= classes(each)
     return found
+
+
+def _arguments(made: Any) -> dict[str, str]:
+    """Arguments of a class with what its docstring says of each, as a sentence."""
+    if made.docstring is None:
+        return {}
+    arguments = {}
+    for section in made.docstring.parse("google"):
+        if section.kind is griffe.DocstringSectionKind.parameters:
+            for argument in section.value:
+                meaning = " ".join(argument.description.split()).replace("|", r"\|")
+                arguments[argument.name] = meaning[:1].upper() + meaning[1:]
+    return arguments
 
 
 def _value(of: dict[str, Any]) -> str:

@@ -123,7 +123,11 @@ def fin_table(
         first = html(
             "{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name
         )
-        remark = damage_words(damage, fin.name, fin.TURNS) if is_damaged and not failed else ""
+        remark = (
+            damage_words(damage, fin.name, fin.KIND.sticks_at_angle)
+            if is_damaged and not failed
+            else ""
+        )
         if remark:
             first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
@@ -146,8 +150,12 @@ def _cells(
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
     meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
     if not isinstance(part, Fin):
-        along = force if part.TURNS else command[0]
-        remark = f"{part.type}, {_degrees(command[part.HELD])}°" if part.TURNS else part.type
+        along = force if part.KIND.sticks_at_angle else command[0]
+        remark = (
+            f"{part.type}, {_degrees(command[part.KIND.stuck_number])}°"
+            if part.KIND.sticks_at_angle
+            else part.type
+        )
         words = html("<td colspan='3' class='words'>{}</td>", remark)
         cell = html(
             "<td class='{}'>{}</td>",

@@ -1,5 +1,5 @@
-"""What a layout says of the selected actuators: place, direction, limits, model. An edit counts for
-all."""
+"""Widgets about the selected actuators: name, position, directions, limits and model. An edit
+counts for all of them. `webapp.panels.inspectors` says which boxes a kind has."""
 
 import math
 from collections.abc import Sequence
@@ -9,17 +9,19 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from finlab.actuators.actuator import Actuator, Box
-from finlab.actuators.kinds import KINDS
-from finlab.axes import Vector
+from finlab.actuators.actuator import Actuator
+from finlab.axes import Vector3
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.words import html
 from webapp.page import Page
 from webapp.panels.actuator_model import add_fit, add_model, of_part
+from webapp.panels.inspectors import Box, NumberBox, RangeBox, all_inspectors, inspector_of
 from webapp.session.state import number
 
-SNAPS: dict[str, Vector] = {
+LARGEST = 1e6
+"""Largest size of a number that a box takes, in its unit; its field has narrower bounds."""
+SNAPS: dict[str, Vector3] = {
     "+x": (1.0, 0.0, 0.0),
     "−x": (-1.0, 0.0, 0.0),
     "+y": (0.0, 1.0, 0.0),
@@ -27,6 +29,7 @@ SNAPS: dict[str, Vector] = {
     "+z": (0.0, 0.0, 1.0),
     "−z": (0.0, 0.0, -1.0),
 }
+"""Label of a button -> the direction to which it points the actuator, body frame."""
 
 
 def add_actuator(page: Page) -> None:
@@ -38,16 +41,17 @@ def add_actuator(page: Page) -> None:
         if session.selected is not None:
             session.rename(session.selected, name)
 
+    inspectors = all_inspectors()
     page.add_html(_headline)
     with gui.add_folder(None) as full:
         page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
         with gui.add_folder("Place"):
             _add_place(page)
         with gui.add_folder("Limits"):
-            _add_boxes(page, [kind.BOXES for kind in KINDS.values()])
+            _add_boxes(page, [inspector.limits for inspector in inspectors])
         with gui.add_folder("Model"):
             add_model(page)
-            _add_boxes(page, [kind.LAW_BOXES for kind in KINDS.values()])
+            _add_boxes(page, [inspector.law for inspector in inspectors])
             add_fit(page)
     page.board.show(full, visible=lambda selected: selected is not None)
 
@@ -81,7 +85,7 @@ def _add_place(page: Page) -> None:
     )
     way = gui.add_vector3("Axis", (1.0, 0.0, 0.0), step=0.05, hint=about)
     page.bind_number(way, session.point_selected, of_part(lambda part: part.direction))
-    board.show(way, label=of_part(lambda part: part.AXES[part.POINTED].capitalize()))
+    board.show(way, label=of_part(lambda part: part.KIND.pointed.capitalize()))
     about = "The same: azimuth, 90 is to the left, and how far it rises."
     page.bind_number(
         gui.add_vector2("Angles [°]", (0.0, 0.0), step=5.0, hint=about), aim, of_part(_angles), 2
@@ -91,12 +95,14 @@ def _add_place(page: Page) -> None:
     about = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
     other = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=about)
     page.bind_number(
-        other, session.turn_about, of_part(lambda part: part.frame[0 if part.POINTED else 1])
+        other,
+        session.turn_about,
+        of_part(lambda part: part.frame[0 if part.KIND.pointed_row else 1]),
     )
     board.show(
         other,
-        label=of_part(lambda part: part.OTHER),
-        visible=of_part(lambda part: len(part.AXES) > 1 and _mounting(part) is None),
+        label=of_part(lambda part: inspector_of(type(part)).other_axis),
+        visible=of_part(lambda part: len(part.KIND.axes) > 1 and _mounting(part) is None),
     )
 
 
@@ -111,41 +117,66 @@ def _angles(part: Actuator) -> tuple[float, float]:
 
 
 def _has(part: Actuator, box: Box) -> bool:
-    return box in (*part.BOXES, *part.LAW_BOXES) and box.law in ("", part.model_type)
+    """Whether the inspector of an actuator, with the model that it has, shows a box."""
+    inspector = inspector_of(type(part))
+    if box not in inspector.limits and box not in inspector.law:
+        return False
+    return isinstance(box, RangeBox) or box.model in ("", part.model_type)
 
 
 def _value(part: Actuator, box: Box) -> Any:
-    """What an actuator has in a box, in its unit; what is usual where nothing is said of it."""
+    """Value of an actuator that a box shows, in its unit; the box's default where it has none."""
     value = part.value(box.key) if _has(part, box) else None
-    if value is None:
-        return (0.0, 0.0) if box.pair else math.nan if box.free else box.usual
-    return np.degrees(value).tolist() if box.degrees else value
+    if value is not None:
+        return np.degrees(value).tolist() if box.degrees else value
+    if isinstance(box, RangeBox):
+        return 0.0, 0.0
+    return math.nan if box.may_be_empty else box.default
 
 
-def _add_boxes(page: Page, of_kinds: Sequence[Sequence[Box]]) -> None:
-    """The boxes of all kinds, one that several have once."""
-    for box in dict.fromkeys(box for boxes in of_kinds for box in boxes):
-        _add_box(page, box)
+def _add_boxes(page: Page, boxes_by_kind: Sequence[Sequence[Box]]) -> None:
+    """The boxes of all kinds; one that several kinds have stands once."""
+    boxes: dict[Box, None] = {}
+    for of_kind in boxes_by_kind:
+        boxes |= dict.fromkeys(of_kind)
+    for box in boxes:
+        if isinstance(box, RangeBox):
+            _add_range_box(page, box)
+        else:
+            _add_number_box(page, box)
 
 
-def _add_box(page: Page, box: Box) -> None:
-    """A box that may be empty is so where nothing is said, and 0 brings that back."""
-    pair = box.pair
+def _add_range_box(page: Page, box: RangeBox) -> None:
+    def set_range(shown: tuple[Any, Any]) -> None:
+        page.session.set_value(box.key, tuple(_in_field(box, end) for end in shown))
 
-    def put(value: Any) -> None:
-        checked = [number(end, box.label, -1e6, 1e6) for end in (value if pair else (value,))]
-        meant = tuple(math.radians(v) if box.degrees else v for v in checked)
-        page.session.set_value(
-            box.key, meant if pair else None if box.free and not meant[0] else meant[0]
-        )
-
-    add: Any = page.gui.add_vector2 if pair else page.gui.add_number
-    handle = add(
-        box.label, (0.0, 0.0) if pair else box.usual, step=box.step, hint=box.hint, visible=False
+    handle = page.gui.add_vector2(
+        box.label, (0.0, 0.0), step=box.step, hint=box.hint, visible=False
     )
-    digits = 2 if box.degrees else 4 if pair else 5
-    page.bind_number(handle, put, of_part(lambda part: _value(part, box)), digits)
+    digits = 2 if box.degrees else 4
+    page.bind_number(handle, set_range, of_part(lambda part: _value(part, box)), digits)
     page.board.show(handle, visible=of_part(lambda part: _has(part, box)))
+
+
+def _add_number_box(page: Page, box: NumberBox) -> None:
+    """A box that may be empty is so where the field is None, and a 0 empties it again."""
+
+    def set_number(shown: Any) -> None:
+        value = _in_field(box, shown)
+        page.session.set_value(box.key, None if box.may_be_empty and not value else value)
+
+    handle = page.gui.add_number(
+        box.label, box.default, step=box.step, hint=box.hint, visible=False
+    )
+    digits = 2 if box.degrees else 5
+    page.bind_number(handle, set_number, of_part(lambda part: _value(part, box)), digits)
+    page.board.show(handle, visible=of_part(lambda part: _has(part, box)))
+
+
+def _in_field(box: Box, shown: Any) -> float:
+    """A number of a box in the unit of its field. Raises FinlabError: it is none."""
+    value = number(shown, box.label, -LARGEST, LARGEST)
+    return math.radians(value) if box.degrees else value
 
 
 def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) -> str:

@@ -56,7 +56,7 @@ def add_model(page: Page) -> None:
     """The choice of a formula, and what is said of it."""
 
     def options(part: Actuator) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*part.MODELS, part.model_type)))
+        return tuple(dict.fromkeys((*part.KIND.models, part.model_type)))
 
     def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
         part = part_shown(selected, layout)
@@ -65,7 +65,7 @@ def add_model(page: Page) -> None:
 
     about = "The formula that gives force and power; a table comes from a file, below."
     kinds = page.board.show(
-        page.gui.add_dropdown("Model", NOMINAL.MODELS, hint=about), options=of_part(options)
+        page.gui.add_dropdown("Model", NOMINAL.KIND.models, hint=about), options=of_part(options)
     )
     page.board.show(kinds, visible=of_part(lambda part: len(options(part)) > 1))
     page.bind(kinds, page.session.choose_model, of_part(lambda part: part.model_type))
@@ -235,7 +235,7 @@ def curves(part: Actuator) -> Sequence[Curves]:
             Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True)))
             for up, y in kinds
         ]
-    if part.BY_FLOW:
+    if part.KIND.driven_by_flow:
         across = np.linspace(part.lower[0], part.upper[0], POINTS)
         command = np.zeros((POINTS, 1, 3))
         command[:, 0, 0] = across
@@ -251,9 +251,11 @@ def curves(part: Actuator) -> Sequence[Curves]:
         word = f"command [{model.unit}]" if model.unit else "command"
         pairs = (("force [N]", force), ("power [W]", power))
         return [Curves(word, across, up, (("", y),)) for up, y in pairs]
-    if part.THRUST is None:
+    if part.KIND.force_number is None:
         return []
-    across = np.linspace(part.lower[part.THRUST], part.upper[part.THRUST], POINTS)
+    across = np.linspace(
+        part.lower[part.KIND.force_number], part.upper[part.KIND.force_number], POINTS
+    )
     command = np.zeros((POINTS, 1, 3))
-    command[:, 0, part.THRUST] = across
+    command[:, 0, part.KIND.force_number] = across
     return [Curves("force [N]", across, "power [W]", (("", plant.power(command)[:, 0]),))]

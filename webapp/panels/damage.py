@@ -90,13 +90,15 @@ def add_damage(page: Page) -> None:
     def held_now() -> list[float]:
         """The command of that actuator, its angle within a turn."""
         own = part()
-        command = [float(value) for value in at_now()[: len(own.NUMBERS)]]
-        if own.TURNS:
-            command[own.HELD] = math.remainder(command[own.HELD], math.tau)
+        command = [float(value) for value in at_now()[: len(own.KIND.numbers)]]
+        if own.KIND.sticks_at_angle:
+            command[own.KIND.stuck_number] = math.remainder(
+                command[own.KIND.stuck_number], math.tau
+            )
         return command
 
     def jam(stuck: bool) -> None:
-        damage("stuck", held_now()[part().HELD] if stuck else None)
+        damage("stuck", held_now()[part().KIND.stuck_number] if stuck else None)
 
     def run_on(running: bool) -> None:
         damage("running", tuple(held_now()) if running else None)
@@ -132,12 +134,12 @@ def add_damage(page: Page) -> None:
     page.bind_number(
         angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1
     )
-    board.show(angle, visible=_is("stuck", lambda own: own.TURNS))
+    board.show(angle, visible=_is("stuck", lambda own: own.KIND.sticks_at_angle))
     force = gui.add_number(
         "Hangs at [N]", 0.0, step=1.0, hint="The force that it keeps.", visible=False
     )
     page.bind_number(force, lambda at: damage("stuck", at), _of("stuck", 0.0, 1.0), digits=2)
-    board.show(force, visible=_is("stuck", lambda own: not own.TURNS))
+    board.show(force, visible=_is("stuck", lambda own: not own.KIND.sticks_at_angle))
     kept = gui.add_vector3(
         "A [°], f [Hz], φ [°]",
         (0.0, 0.0, 0.0),

@@ -87,13 +87,13 @@ def command_line(state: State) -> str:
         for name, share in shares.items():
             words += [f"--{kind}", f"{name}={share:g}"]
     for name, held in damage.stuck.items():
-        turns = layout.part(name).TURNS
+        turns = layout.part(name).KIND.sticks_at_angle
         words += ["--stuck", f"{name}={math.degrees(held) if turns else held:g}"]
     for name, command in damage.running.items():
         part = layout.part(name)
         numbers = list(command)
-        if part.TURNS:
-            numbers[part.HELD] = math.degrees(numbers[part.HELD])
+        if part.KIND.sticks_at_angle:
+            numbers[part.KIND.stuck_number] = math.degrees(numbers[part.KIND.stuck_number])
         words += ["--running", f"{name}=" + ",".join(f"{number:g}" for number in numbers)]
     if state.flow is not None:
         words += ["--flow", *(f"{value:g}" for value in state.flow)]

@@ -46,18 +46,20 @@ class Motion(NamedTuple):
 
 def motion(part: Actuator, command: Array | None) -> Motion:
     """How an actuator moves with a command (3,), and how it hangs where that is None."""
-    along = int(part.LOOKS == "pod")
+    along = int(part.KIND.drawn_as == "pod")
     if command is None:
         _, across, third = part.frame
-        limp = math.atan2(third[2], across[2]) if part.LOOKS == "fin" else 0.0
+        limp = math.atan2(third[2], across[2]) if part.KIND.drawn_as == "fin" else 0.0
         return Motion(angle=limp, along=along)  # the blade hangs as far down as it can
-    if part.LOOKS == "fin":
+    if part.KIND.drawn_as == "fin":
         return Motion(*command.tolist())
-    angle = float(command[part.HELD]) if part.TURNS else 0.0
-    if part.THRUST is None:
+    angle = float(command[part.KIND.stuck_number]) if part.KIND.sticks_at_angle else 0.0
+    if part.KIND.force_number is None:
         return Motion(angle=angle)
-    force = float(command[part.THRUST])
-    most = part.upper[part.THRUST] if force >= 0.0 else -part.lower[part.THRUST]
+    force = float(command[part.KIND.force_number])
+    most = (
+        part.upper[part.KIND.force_number] if force >= 0.0 else -part.lower[part.KIND.force_number]
+    )
     # Thrust grows with the square of the speed.
     turns = (
         math.copysign(TURNS_PER_S * math.sqrt(min(abs(force) / most, 1.0)), force) if force else 0.0
@@ -88,7 +90,9 @@ def _propeller(along: int) -> Mesh:
 def shape_of(part: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
     ratio, area = (
-        (part.value("aspect_ratio"), part.value("area")) if part.LOOKS == "foil" else (None, None)
+        (part.value("aspect_ratio"), part.value("area"))
+        if part.KIND.drawn_as == "foil"
+        else (None, None)
     )
     if ratio is None or area is None:
         return 1.0, size
@@ -163,12 +167,14 @@ class ActuatorNode:
         place = np.array(part.position)
         size, arrows = sizes
         slenderness, scale = shape_of(part, size)
-        is_fin = part.LOOKS == "fin"
-        is_pod = part.LOOKS == "pod"
+        is_fin = part.KIND.drawn_as == "fin"
+        is_pod = part.KIND.drawn_as == "pod"
         inward = hull.anchor(place) - place
-        self._moving.show(_moving, part.LOOKS, slenderness)
-        self._mount.show(_mount, part.LOOKS, bool(inward @ frame[0] >= 0.0))
-        self._spinning.show(_propeller, int(is_pod) if is_pod or part.LOOKS == "thruster" else -1)
+        self._moving.show(_moving, part.KIND.drawn_as, slenderness)
+        self._mount.show(_mount, part.KIND.drawn_as, bool(inward @ frame[0] >= 0.0))
+        self._spinning.show(
+            _propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1
+        )
         for shape in (self._moving, self._spinning, self._mount):
             put(shape.node, scale=scale)
         self._pin.show(shapes.pin, size)
@@ -204,7 +210,7 @@ def moved_parts(parts: tuple[Actuator, ...], size: float) -> Mesh:
     meshes = []
     for part in parts:
         slenderness, scale = shape_of(part, size)
-        for mesh in (_moving(part.LOOKS, slenderness), _mount(part.LOOKS, True)):
+        for mesh in (_moving(part.KIND.drawn_as, slenderness), _mount(part.KIND.drawn_as, True)):
             meshes.append(
                 Mesh(
                     scale * mesh.vertices @ np.array(part.frame) + np.array(part.position),

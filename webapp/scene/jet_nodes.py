@@ -41,7 +41,7 @@ class JetNodes:
         if layout is None or known is None:
             self._hide(0)
             return
-        diameter = known.places.diameter
+        diameter = known.geometry.diameter
         jets = jets_of(force, diameter)
         taken = known.at_rest(force)
         speed = np.where(diameter > 0.0, jets.speed, 0.0)

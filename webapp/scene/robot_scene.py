@@ -166,7 +166,9 @@ class RobotScene:
         stuck = () if swims else damage.stuck
         for i, part in enumerate(drawn.actuators):
             remark = (
-                "" if swims or part.name in failed else damage_words(damage, part.name, part.TURNS)
+                ""
+                if swims or part.name in failed
+                else damage_words(damage, part.name, part.KIND.sticks_at_angle)
             )
             named = part.name if swims else _named(part)  # one that swims is elsewhere
             words = (str(i + 1), named if part.name in selection else "", remark)

@@ -190,7 +190,7 @@ class Core:
     def mend(self, name: str) -> None:
         """An actuator is whole again."""
         state = self.state
-        for kind in state.layout.part(name).FAULTS:
+        for kind in state.layout.part(name).KIND.faults:
             state = state.with_fault(name, kind, None)
         self._commit(
             f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state

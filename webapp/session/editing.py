@@ -6,8 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from finlab.actuators.actuator import key_words
-from finlab.axes import Vector
+from finlab.axes import Vector3
 from finlab.errors import FinlabError
 from finlab.interaction.jets import Jets
 from finlab.layout import Actuator, Layout
@@ -16,6 +15,7 @@ from finlab.layout.damage import Damage
 from finlab.swim.hull import estimated
 from webapp.session import layout_edits
 from webapp.session.core import Core
+from webapp.session.key_words import key_words
 from webapp.session.layout_edits import followed, partner, unlinked
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
@@ -67,7 +67,7 @@ class Session(Core):
         """Another description of the robot."""
         self._edit("Describe the robot", replace(self.state.layout, description=text.strip()))
 
-    def set_hull(self, shape: str, size: Vector) -> None:
+    def set_hull(self, shape: str, size: Vector3) -> None:
         """A parametric hull of a size [m]."""
         self._edit(
             f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}"
@@ -77,7 +77,7 @@ class Session(Core):
         """A hull from a mesh file; `name` is that of the step."""
         self._edit(name, layout_edits.with_hull(self.state.layout, hull))
 
-    def set_center_of_gravity(self, center: Vector) -> None:
+    def set_center_of_gravity(self, center: Vector3) -> None:
         """The centre of gravity at another place in the hull [m]."""
         self._edit(
             "Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center"
@@ -115,18 +115,18 @@ class Session(Core):
 
     # One actuator.
 
-    def drag(self, name: str, position: Vector) -> None:
+    def drag(self, name: str, position: Vector3) -> None:
         """An actuator on its way in the user's hand: one step of undo for the drag from end to
         end."""
         layout = layout_edits.moved(self.state.layout, name, position)
         self._follow(f"Move {name}", name, layout, f"drag {name}", timed=False)
 
-    def end_drag(self, name: str, position: Vector) -> None:
+    def end_drag(self, name: str, position: Vector3) -> None:
         """A drag is over: the next change is a step of its own."""
         self.drag(name, position)
         self.history.end_merge()
 
-    def point(self, name: str, direction: Vector, held: bool = False) -> None:
+    def point(self, name: str, direction: Vector3, held: bool = False) -> None:
         """Another direction of an actuator: a thruster's axis, zero of an azimuth, the shaft of a
         fin or rudder. `direction` may have any length; while it is `held` in the user's hand all is
         one step, until `history.end_merge`."""
@@ -189,7 +189,7 @@ class Session(Core):
         names = self._chosen() and self.selection
         self._edit(f"Delete {_words(names)}", layout_edits.deleted(self.state.layout, names))
 
-    def place_selected(self, position: Vector) -> None:
+    def place_selected(self, position: Vector3) -> None:
         """The selected actuator at another place [m]; others that are selected take what has
         changed."""
         names = self._chosen()
@@ -216,13 +216,13 @@ class Session(Core):
         )
         self._for_each("Turn", names, partial(layout_edits.turned, angle=angle), f"turn {names}")
 
-    def point_selected(self, direction: Vector) -> None:
+    def point_selected(self, direction: Vector3) -> None:
         """All selected actuators along one direction of any length, see `point`."""
         names = self._chosen()
         pointed = partial(layout_edits.pointed, direction=direction)
         self._for_each("Point", names, pointed, f"point {names}")
 
-    def turn_about(self, direction: Vector) -> None:
+    def turn_about(self, direction: Vector3) -> None:
         """Another second axis of all selected actuators that have one, see
         `Actuator.turned_about`."""
         self._change("Turn", lambda part: part.turned_about(direction))

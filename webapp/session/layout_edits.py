@@ -11,7 +11,7 @@ import numpy as np
 from finlab.actuators.kinds import KINDS
 from finlab.analysis.moves import is_mirrored
 from finlab.arrays import Array
-from finlab.axes import Vector, rotation, wrapped
+from finlab.axes import Vector3, rotation, wrapped
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Body, Fin, Layout
 from finlab.layout.body import HULL_SHAPES, Hull
@@ -36,7 +36,7 @@ STAND_OFF = 0.02
 DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 
 
-def moved(layout: Layout, name: str, position: Vector) -> Layout:
+def moved(layout: Layout, name: str, position: Vector3) -> Layout:
     """An actuator at another place [m]."""
     place = numbers(position, f"of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
     return layout.replace_actuator(name, position=place)
@@ -52,7 +52,7 @@ def turned(layout: Layout, name: str, angle: float) -> Layout:
     return layout if same else layout.replace_actuator(name, mounting_angle=float(wrapped(checked)))
 
 
-def pointed(layout: Layout, name: str, direction: Vector) -> Layout:
+def pointed(layout: Layout, name: str, direction: Vector3) -> Layout:
     """An actuator along a direction of any length, see `Actuator.facing`."""
     x, y, z = (number(v, f"direction of {name}", -1e6, 1e6) for v in direction)
     return layout.with_part(layout.part(name).facing((x, y, z)))
@@ -146,7 +146,7 @@ def blank(kind: str) -> Layout:
     )
 
 
-def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
+def _is_free(layout: Layout, position: Vector3, clear: float) -> bool:
     """Whether all actuators are at least so far [m] from a place."""
     return all(math.dist(part.position, position) >= clear - 1e-9 for part in layout.actuators)
 
@@ -180,7 +180,7 @@ def _mirror_name(name: str) -> str:
     return f"{name}_mirror"
 
 
-def shaped(layout: Layout, shape: str, size: Vector) -> Layout:
+def shaped(layout: Layout, shape: str, size: Vector3) -> Layout:
     """The layout with a parametric hull of a size [m]; its centre stays where it is."""
     chosen(shape, "hull", HULL_SHAPES)
     checked = numbers(size, "of the hull [m]", 0.02, 5.0, ("length", "width", "height"))
@@ -198,19 +198,19 @@ def _drawn_hull(layout: Layout) -> Hull:
     return Hull(shape=drawn.shape, size_m=tuple(2 * v for v in drawn.half), center_m=drawn.center)
 
 
-def center_of_gravity(layout: Layout) -> Vector:
+def center_of_gravity(layout: Layout) -> Vector3:
     """Where the centre of gravity lies as seen from the hull's middle [m]."""
     x, y, z = hull_of(layout).center
     return -x + 0.0, -y + 0.0, -z + 0.0
 
 
-def balanced(layout: Layout, center: Vector) -> Layout:
+def balanced(layout: Layout, center: Vector3) -> Layout:
     """The layout with the centre of gravity at a place in the hull [m]. The body frame has its
     origin there, so hull, actuators and the centre of buoyancy move the other way."""
     checked = numbers(center, "of the centre of gravity [m]", -2.0, 2.0)
     x, y, z = np.subtract(center_of_gravity(layout), checked).tolist()
 
-    def moved(point: tuple[float, ...]) -> Vector:
+    def moved(point: tuple[float, ...]) -> Vector3:
         return point[0] + x, point[1] + y, point[2] + z
 
     body = layout.body or Body()
@@ -233,14 +233,14 @@ def with_dynamics(layout: Layout, **values: Any) -> Layout:
 def modelled(part: Actuator, kind: str) -> Actuator:
     """The actuator with another kind of model, see `Actuator.with_model`; as it is where its kind
     has no such one. FinlabError: there is no such model, or it needs a file."""
-    if not part.MODELS or kind == part.model_type:
+    if not part.KIND.models or kind == part.model_type:
         return part
     if kind == "table":
         raise FinlabError(
             f"a table for {part.name} comes from a file; drop its CSV, or fit measurements"
         )
-    chosen(kind, "model", [model for own in KINDS.values() for model in own.MODELS])
-    return part.with_model(kind) if kind in part.MODELS else part
+    chosen(kind, "model", [model for own in KINDS.values() for model in own.KIND.models])
+    return part.with_model(kind) if kind in part.KIND.models else part
 
 
 def partner(links: Links, name: str) -> str | None:
@@ -261,7 +261,7 @@ def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
         return layout
     wanted = layout.part(name).image()
     old = layout.part(twin)
-    count = len(old.AXES)
+    count = len(old.KIND.axes)
     past = np.sum(np.array(before.part(name).image().frame) * before.part(twin).frame, axis=1)
     frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
     return layout.with_part(old.turned(frame[:count], wanted.position))

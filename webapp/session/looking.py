@@ -8,7 +8,7 @@ from typing import Any
 from finlab.analysis import Bounds
 from finlab.analysis.moves import azimuth, is_mirrored
 from finlab.errors import FinlabError
-from finlab.forces.attainable import Kind
+from finlab.forces.attainable import WrenchHalf
 from finlab.layout import Layout
 from webapp.session.state import chosen, number
 
@@ -22,7 +22,7 @@ DRAWERS: dict[str, tuple[str, ...]] = {
 }
 WAYS = DRAWERS["Allocate"][:2]
 """What shows several ways to do the same; the first is of robots of fins alone."""
-DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
+DRAWN: dict[str, WrenchHalf | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
 

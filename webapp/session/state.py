@@ -103,10 +103,10 @@ class State:
         return replace(self, damage=replace(self.damage, lost=tuple(names)))
 
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
-        """An actuator with a fault of its type, see `Actuator.FAULTS`; None, and a share of 1, mend
+        """An actuator with a fault of its type, see `Kind.faults`; None, and a share of 1, mend
         that."""
         part = self.layout.part(name)
-        chosen(kind, f"fault of {name}, a {part.type}", part.FAULTS)
+        chosen(kind, f"fault of {name}, a {part.type}", part.KIND.faults)
         checked = None if value is None else _checked_fault(part, kind, value)
         return self._with_damage(self.damage.with_fault(name, kind, checked))
 
@@ -146,7 +146,7 @@ def _checked_fault(part: Actuator, kind: str, value: Any) -> Any:
     if kind in ("weak", "torn"):
         share = number(value, f"share left of {name}", *STRENGTH_RANGE)
         return None if share == 1.0 else share
-    if kind == "stuck" and not part.TURNS:
+    if kind == "stuck" and not part.KIND.sticks_at_angle:
         return number(value, f"force of {name}, stuck [N]", -math.inf, math.inf)
     if kind == "stuck":
         return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)

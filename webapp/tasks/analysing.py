@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
-from finlab.forces.attainable import Kind
+from finlab.forces.attainable import WrenchHalf
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.looking import DRAWN
@@ -71,7 +71,7 @@ class Attained:
     """Which set of a layout is asked for."""
 
     layout: Layout
-    kind: Kind
+    kind: WrenchHalf
     flow: Flow | None
 
 

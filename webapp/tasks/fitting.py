@@ -73,7 +73,7 @@ class Fitting(Slot[Upload, Fitted]):
                 "series, write cycle means, or use `finlab fit fin`"
             )
         part = self._session.state.layout.part(actuator)
-        if not part.MODELS:
+        if not part.KIND.models:
             raise FinlabError(
                 f"{actuator} is a {part.type}, without a table; type its coefficients"
             )
@@ -171,7 +171,10 @@ def _bench(path: Path, done: Upload) -> Fitted:
     def within(table: PowerTable) -> dict[str, Any]:
         least = table.rows[0][1]
         most = table.rows[-1][1]
-        return {"model": table, "force": (max(least, 0.0) if done.part.TURNS else least, most)}
+        return {
+            "model": table,
+            "force": (max(least, 0.0) if done.part.KIND.sticks_at_angle else least, most),
+        }
 
     with suppress(LayoutError):
         return Fitted(done, within(in_worker(PowerTable.read, path)))

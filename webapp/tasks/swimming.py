@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from finlab.errors import FinlabError
-from finlab.layout.damage import Kind
+from finlab.layout.damage import FaultKind
 from finlab.swim.simulation import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
@@ -113,7 +113,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
         broken = name in lost
         if not broken and len(lost) + 1 >= len(self.swimmer.fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
-        kind: Kind = "whole" if broken else "lost"
+        kind: FaultKind = "whole" if broken else "lost"
         self._acts.append(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
         if not self.running:
             self._submit(0)

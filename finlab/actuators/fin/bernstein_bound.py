@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.fin.table_law import TableLaw
-from finlab.actuators.hermite_grid import ROUNDING, closed_axes, shapes, with_neighbours
+from finlab.actuators.hermite_grid import ROUNDING, cells_of, closed_axes, with_neighbours
 from finlab.arrays import CLOSE, NOTHING, ROUNDS, Array
 from finlab.axes import TURN
 
@@ -175,8 +175,9 @@ def _axis(
     within = ends.clip(knots[0], knots[-1])
     cell = np.searchsorted(knots, within.mean(axis=1), side="right") - 1
     cell = cell.clip(0, len(knots) - 2)
-    powers, places = shapes(knots, periodic)
-    a, b = ((within - places[cell, :1]) * places[cell, 1:]).T
+    cells = cells_of(knots, periodic)
+    starts = cells.starts[cell]
+    a, b = ((within - starts[:, :1]) * starts[:, 1:]).T
     one = np.ones_like(a)
     # The symmetric form of each power of the place in a cell, at three ends: its Bernstein
     # coefficients.
@@ -189,5 +190,5 @@ def _axis(
         ]
     )
     still = within[:, :1] == within[:, 1:]
-    weight = np.moveaxis(blossom, -1, 0) @ powers[cell]
+    weight = np.moveaxis(blossom, -1, 0) @ cells.polynomials[cell]
     return cell[:, None] + np.arange(4), weight, np.where(still, ends[:, :1], within)

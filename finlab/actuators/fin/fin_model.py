@@ -1,4 +1,7 @@
-"""Limits of a fin's commands, and the models that it may follow, by name and numbers."""
+"""Limits of a fin's commands, and the models of its force, by name and parameters.
+
+`fin_laws` makes a law of a model; layout files, the app and the fits read what is here.
+"""
 
 import math
 from collections.abc import Collection, Mapping
@@ -21,18 +24,31 @@ DOUBT = "not to be trusted"
 """How a table's note begins that every answer repeats."""
 
 Amplitude = Annotated[float, Meta(ge=0.0, le=MAX_AMPLITUDE)]
+"""A half amplitude [rad]."""
 Frequency = Annotated[float, Meta(ge=0.0, le=MAX_FREQUENCY)]
+"""A frequency of the beat [Hz]."""
 Direction = Annotated[float, Meta(ge=-TURN, le=TURN)]
+"""A zero direction [rad]."""
 LEAST = {"amplitude": 1e-4, "frequency": 1e-3}
-"""Least amplitude [rad] and frequency [Hz] that is not 0."""
+"""Least amplitude [rad] and frequency [Hz] other than 0."""
 LEAST_WIDTH = 1e-6
-"""Least width of a range [rad, Hz] that is not 0."""
+"""Least width of a range [rad, Hz, rad] other than 0."""
 
 
 @dataclass(frozen=True)
 class Limits(Checked):
-    """What one fin may be commanded. The defaults are the nominal limits. Checked on
-    construction."""
+    """Limits of one fin's command; the defaults are the nominal ones. Checked on construction.
+
+    Args:
+        amplitude: least and greatest half amplitude [rad].
+        frequency: least and greatest frequency [Hz].
+        zero_direction: least and greatest zero direction, at most one turn apart; a full turn means
+            any direction [rad].
+
+    Raises:
+        LayoutError: a value is out of its bounds, or the two of a range do not fit together; the
+            message names the argument.
+    """
 
     KEYS: ClassVar[Mapping[str, str]] = {
         "amplitude": "amplitude_rad",
@@ -42,12 +58,8 @@ class Limits(Checked):
     WRITTEN: ClassVar[Collection[str]] = ("amplitude", "frequency", "zero_direction")
 
     amplitude: tuple[Amplitude, Amplitude] = (0.05, 0.6)
-    """Half amplitude [rad], (minimum, maximum)."""
     frequency: tuple[Frequency, Frequency] = (0.1, 2.1)
-    """Frequency [Hz], (minimum, maximum)."""
     zero_direction: tuple[Direction, Direction] = (-math.pi, math.pi)
-    """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any
-    direction."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -58,8 +70,7 @@ class Limits(Checked):
             if name != "zero_direction" and (high < LEAST[name] or 0.0 < low < LEAST[name]):
                 raise LayoutError(
                     f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got "
-                    f"{low:g} "
-                    f"and {high:g}; leave the fin out if it never moves",
+                    f"{low:g} and {high:g}; leave the fin out if it never moves",
                     name,
                 )
             if 0.0 < high - low < LEAST_WIDTH:
@@ -87,18 +98,21 @@ class Limits(Checked):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a fin model: default, meaning, unit and range."""
+    """One number of a fin's model.
+
+    Args:
+        default: its value where a layout file leaves it out.
+        meaning: what it is, in a few words.
+        unit: its unit; empty where it has none.
+        low: least value that a robot's fin may have.
+        high: greatest value.
+    """
 
     default: float
-    """Its value where a layout file leaves it out."""
     meaning: str
-    """What it is, in a few words."""
     unit: str = ""
-    """Its unit; empty where it has none."""
     low: float = 0.001
-    """Least value that a robot's fin may have."""
     high: float = 10.0
-    """Greatest value."""
 
 
 _DENSITY = Parameter(1000.0, "density of the water", "kg/m^3", 500.0, 2000.0)
@@ -139,12 +153,19 @@ SCALES_THRUST: Mapping[str, tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class FinModelSpec(Part):
-    """Name and parameters of a fin model, as a layout file gives them. Checked on construction."""
+    """Name and parameters of a fin model, as a layout file gives them. Checked on construction.
+
+    Args:
+        type: one of `FIN_MODELS`.
+        parameters: parameters that differ from the model's defaults, as (name, value), sorted by
+            name; units as in `FIN_MODELS`.
+
+    Raises:
+        LayoutError: unknown model, unknown parameter, or a value out of its bounds.
+    """
 
     type: str = "drag"
-    """One of `FIN_MODELS`."""
     parameters: tuple[tuple[str, float | str], ...] = ()
-    """Parameters that differ from the model's defaults, as (name, value), sorted by name."""
 
     def __post_init__(self) -> None:
         model: Any = checked({**dict(self.parameters), "type": self.type}, Model)
@@ -160,13 +181,14 @@ class FinModelSpec(Part):
 
     @classmethod
     def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
-        """The spec of a mapping with the model's name under `type` and its parameters beside it.
-        Raises LayoutError: unknown model, unknown parameter, or a value that is none."""
-        return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
+        """Returns the spec of a mapping with the model's name under `type` and its parameters by
+        name. Raises LayoutError: as on construction."""
+        parameters = {key: value for key, value in values.items() if key != "type"}
+        return cls(str(values["type"]), tuple(parameters.items()))
 
     def scaled(self, share: float) -> "FinModelSpec":
-        """The model of a fin that gives a share of the thrust at every command. Raises LayoutError:
-        the fin is a table, whose file would have to be another one."""
+        """Returns the model of a fin whose thrust is `share` of this one's at every command. Raises
+        LayoutError: it is a table, which cannot be scaled."""
         if self.type not in SCALES_THRUST:
             raise LayoutError(
                 "the thrust of a table cannot be scaled; name another CSV file", "type"
@@ -177,13 +199,13 @@ class FinModelSpec(Part):
         return FinModelSpec(self.type, tuple({**dict(self.parameters), name: value}.items()))
 
     def values(self) -> dict[str, float | str]:
-        """Returns all parameters of the model, those given and those left at their defaults."""
+        """Returns all parameters of the model by name, with defaults for those left out."""
         defaults = {name: rule.default for name, rule in FIN_MODELS[self.type].items()}
         return {**defaults, **dict(self.parameters)}
 
 
 def _form(name: str, parameters: Mapping[str, Parameter]) -> type[Struct]:
-    """The part of a file that gives the parameters of a model."""
+    """The part of a layout file that holds the parameters of a model."""
     path = Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of forces")]
     keys: list[Any] = [("path", path)] if name == "table" else []
     for key, rule in parameters.items():

@@ -15,7 +15,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.jets import Jets
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 
 FITTED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
 PRIOR = float(np.log(2.0))
@@ -42,7 +42,7 @@ def fit_constants(samples: Samples) -> Fitted:
     if len(samples.wrench) < LEAST_SAMPLES:
         raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
     force, missed, scale = left_by_laws(samples)
-    places = places_of(samples.layout)
+    geometry = jet_geometry_of(samples.layout)
     start = np.log([getattr(Jets(), name) for name in FITTED])
 
     def jets_at(logarithms: Array) -> Jets:
@@ -50,7 +50,7 @@ def fit_constants(samples: Samples) -> Fitted:
         return Jets(**dict(zip(FITTED, values.tolist(), strict=True)))
 
     def left(logarithms: Array) -> Array:
-        known = jets_at(logarithms).of(places)
+        known = jets_at(logarithms).of(geometry)
         return np.asarray(missed - known.offset(force) / scale)
 
     def with_prior(logarithms: Array) -> Array:
@@ -61,7 +61,7 @@ def fit_constants(samples: Samples) -> Fitted:
         fit: Any = least_squares(with_prior, start)
         rest = left(fit.x)
         noise = max(NOISE, float(np.sqrt((rest**2).mean())))
-    each = replace(jets_at(fit.x), uncertain=1.0).of(places).deviation(force) / scale
+    each = replace(jets_at(fit.x), uncertain=1.0).of(geometry).deviation(force) / scale
     size = np.sqrt(((samples.wrench / scale) ** 2).mean(axis=0))
     share, floor = parts_of_error(rest, each, size)
     by_constants = noise * fit.jac[: rest.size]

@@ -13,7 +13,7 @@ from torch import nn
 from finlab.arrays import Array
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.layout import Layout
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics.objective import yardstick
 
 
@@ -35,7 +35,7 @@ def trained_surrogate(
         x = np.zeros((len(force), n, 9))
         x[:, : layout.n, :3] = layout.position / 0.3
         x[:, : layout.n, 3:6] = force / scale[0]
-        x[:, : layout.n, 6] = places_of(layout).diameter / 0.1
+        x[:, : layout.n, 6] = jet_geometry_of(layout).diameter / 0.1
         x[:, : layout.n, 7] = 1.0
         x[..., 8] = scale[0] / scale[3]
         return torch.tensor(x, dtype=torch.float32)

@@ -17,10 +17,10 @@ from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.fit.interaction.constants import parts_of_error
 from finlab.fit.interaction.samples import Samples, left_by_laws
-from finlab.interaction.interaction import Places
+from finlab.interaction.interaction import JetGeometry
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
 from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.research.networks.trained import State
 from finlab.research.training.device import workplace
 from finlab.research.training.loop import LoopSettings, Training, seeded_generator
@@ -88,8 +88,8 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
         left.append(missed)
         size.append(np.broadcast_to(np.sqrt((one.wrench**2).mean(axis=0)) / scale, missed.shape))
         robot.append(np.full(len(missed), k))
-        places = places_of(one.layout)
-        for name, made in messages_of(places, force, scale).items():
+        geometry = jet_geometry_of(one.layout)
+        for name, made in messages_of(geometry, force, scale).items():
             parts[name].append(made)
     if len(samples) < 10 or not sum(len(part[0]) for part in parts["pair"]):
         raise DataError(
@@ -105,16 +105,16 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
 
 
 def messages_of(
-    places: Places, force: Array, scale: Array
+    geometry: JetGeometry, force: Array, scale: Array
 ) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
     """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R,
     k, 6), and how many rows each of forces (K, n, 3) [N] has (K,)."""
-    pairs = Pairs(places)
-    lever = LearnedInteraction({}, 1.0, places).lever / scale
+    pairs = Pairs(geometry)
+    lever = LearnedInteraction({}, 1.0, geometry).lever / scale
     source = force[:, pairs.source]
     receiver = force[:, pairs.receiver]
     rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
-    rows["hull"] = hull_rows(places, force), lever * float(places.hull[1].all())
+    rows["hull"] = hull_rows(geometry, force), lever * float(geometry.hull[1].all())
     result = {}
     for name, (packed, arms) in rows.items():
         features, vectors = unpacked(name, packed)

@@ -94,7 +94,7 @@ class EffortFins:
     def of(cls, layout: Layout) -> Self:
         """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no
         thrust within the limits."""
-        compiled = [fin_table(fin) for fin in layout.fins]
+        compiled = [fin_table(fin).directions for fin in layout.fins]
         costs = [_costs(fin, fin.stamp) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)
         gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]

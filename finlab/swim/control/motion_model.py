@@ -78,7 +78,7 @@ class MotionModel:
         self._swing = np.array([0.0, 0.0, 0.0, *(cosine.real - 1.0), 0.0])
         self._force = np.zeros((2, layout.n, 6))
         self._thrust = np.zeros((layout.n, 3))
-        self._turned_off = np.array(["stuck" in part.FAULTS for part in layout.actuators])
+        self._turned_off = np.array(["stuck" in part.KIND.faults for part in layout.actuators])
         self._unsure_s = np.zeros(layout.n)
         self._any_unsure = False
         self.unsure = np.zeros(layout.n, dtype=bool)

@@ -268,5 +268,5 @@ def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
     effectiveness = plant_of(layout).effectiveness
     reach = np.zeros(6)
     for part, own in zip(layout.actuators, effectiveness, strict=True):
-        reach += part.largest(speed) * np.linalg.norm(own[list(part.PUSHES)], axis=0)
+        reach += part.largest(speed) * np.linalg.norm(own[list(part.KIND.push_rows)], axis=0)
     return reach

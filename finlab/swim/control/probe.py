@@ -76,13 +76,13 @@ class Probe:
         if self._of_fins[index]:
             return self._command(index, 0.0, math.copysign(FORCE_N, math.sin(direction)))
         row = [0.0, 0.0, 0.0]
-        if part.THRUST is not None:
-            low = part.lower[part.THRUST]
-            high = part.upper[part.THRUST]
+        if part.KIND.force_number is not None:
+            low = part.lower[part.KIND.force_number]
+            high = part.upper[part.KIND.force_number]
             force = max(SHARE * max(high, -low), 2.0 * getattr(part, "dead_band", 0.0))
-            if part.TURNS:
-                row[part.HELD] = direction
-            row[part.THRUST] = min(force, high) if high > 0.0 else max(-force, low)
+            if part.KIND.sticks_at_angle:
+                row[part.KIND.stuck_number] = direction
+            row[part.KIND.force_number] = min(force, high) if high > 0.0 else max(-force, low)
         return row[0], row[1], row[2]
 
     def _pushing(self, command: Array) -> Array:

@@ -42,7 +42,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     doubts = fit.doubts()
     unknown = fit.untold()
     seconds = 0.1 * len(fit.model.motion)
-    thrusters = any(part.THRUST is not None for part in fit.model.layout.actuators)
+    thrusters = any(part.KIND.force_number is not None for part in fit.model.layout.actuators)
     turned = "pushes the other way than the layout says; in the layout that is written it is turned"
     lines = {
         f"{DOUBT}: {'; '.join(doubts)}": bool(doubts),
@@ -237,6 +237,6 @@ class OnlineFit:
         turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)
         self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {words}{turned}")
         for i, part in enumerate(self.layout.actuators):
-            if part.THRUST is not None:
-                self.factor[i, part.THRUST] = 1.0 / strength[i]
+            if part.KIND.force_number is not None:
+                self.factor[i, part.KIND.force_number] = 1.0 / strength[i]
         return replace(self.layout, actuators=learned(fit, fit.found("lean")))

@@ -60,7 +60,7 @@ class RobotModel:
         self.alone = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own
         frame."""
-        self.steers = np.array([part.BY_FLOW for part in layout.actuators])
+        self.steers = np.array([part.KIND.driven_by_flow for part in layout.actuators])
         """Which actuators (n,) the flow drives: one that leans meets the water at another angle."""
         self._by_lean = np.zeros_like(self.alone)
         self.late = [0] * len(SENSORS)
@@ -153,7 +153,7 @@ def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
     angles (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft
     about z, and then by those of their lean about the first, a shaft; of thrusters, which push
     along it, about the second."""
-    thrusts = np.array([len(part.AXES) == 1 for part in layout.actuators])
+    thrusts = np.array([len(part.KIND.axes) == 1 for part in layout.actuators])
     angles = np.stack(
         [mounting, np.where(thrusts, 0.0, lean), np.where(thrusts, lean, 0.0)], axis=-1
     )
@@ -171,7 +171,7 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
     parts = list(layout.actuators)
     for k in layout.indices(names):
         part = parts[k]
-        first = len(part.PUSHES) == 1
+        first = len(part.KIND.push_rows) == 1
         parts[k] = part.turned(
             np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]])
         )

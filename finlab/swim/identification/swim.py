@@ -213,8 +213,8 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
             "was lost"
         )
     for i, one in enumerate(layout.actuators):
-        for part, name in enumerate(dict(one.NUMBERS)):
-            if name not in UNIT_OF:
+        for part, number in enumerate(one.KIND.numbers):
+            if number.name not in UNIT_OF:
                 continue
             low = one.lower[part]
             high = one.upper[part]
@@ -225,9 +225,9 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
             if wrong.any():
                 k = int(np.argmax(wrong))
                 raise DataError(
-                    f"{places[k]}, column {one.name}.{name}, holds {command[k, i, part]:g}, "
+                    f"{places[k]}, column {one.name}.{number.name}, holds {command[k, i, part]:g}, "
                     "expected "
-                    f"{UNIT_OF[name]} from {low:.4g} to {high:.4g}"
+                    f"{UNIT_OF[number.name]} from {low:.4g} to {high:.4g}"
                 )
 
 

@@ -14,7 +14,7 @@ from finlab.allocation.policy import Policy, PolicyName, as_policy
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import Damage, Kind
+from finlab.layout.damage import Damage, FaultKind
 from finlab.physics import plant_of
 from finlab.swim.control import (
     Completion,
@@ -204,7 +204,12 @@ class ClosedLoop:
         return damage_of(self.layout, self._told, self._held)
 
     def fail(
-        self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
+        self,
+        name: str,
+        kind: FaultKind = "lost",
+        share: float = 0.5,
+        *,
+        announced: bool | None = None,
     ) -> None:
         """Something becomes of an actuator, now. Raises LayoutError: there is no actuator of that
         name, or it is the last that works; FinlabError: the kind or the share is none.
@@ -335,7 +340,7 @@ class ClosedLoop:
         result = command.copy()
         for name, share in self.damage.weak.items():
             index = self.layout.index(name)
-            result[index, self.layout.actuators[index].THRUST or 0] /= share
+            result[index, self.layout.actuators[index].KIND.force_number or 0] /= share
         return result
 
     def _moved(self, command: Array) -> Array:

@@ -228,7 +228,7 @@ class Exciting(Method):
 
 def _owners(layout: Layout) -> NDArray[np.intp]:
     """Which actuator each column of `layout_effectiveness` is of (m,)."""
-    return np.repeat(np.arange(layout.n), [len(part.PUSHES) for part in layout.actuators])
+    return np.repeat(np.arange(layout.n), [len(part.KIND.push_rows) for part in layout.actuators])
 
 
 def largest_forces(layout: Layout) -> Array:

@@ -19,7 +19,7 @@ from finlab.axes import rotation
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Layout
-from finlab.layout.damage import Damage, Kind
+from finlab.layout.damage import Damage, FaultKind
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
 
@@ -94,7 +94,7 @@ def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] 
     return None if values is None else tuple(factor * value for value in values)
 
 
-KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
+KINDS: tuple[FaultKind, ...] = ("lost", "torn", "stuck", "whole")
 """What can become of an actuator in a swim: it hangs still; it gives a share of its thrust; it
 beats but no longer turns; it works again as it should."""
 
@@ -105,13 +105,13 @@ class Fault(NamedTuple):
     name: str
     time_s: float
     """When [s]."""
-    kind: Kind = "lost"
+    kind: FaultKind = "lost"
     share: float = 0.5
     """Share of the thrust that is left of a torn one, above 0 and below 1; of no meaning for the
     others."""
 
     @classmethod
-    def parse(cls, kind: Kind, text: str) -> "Fault":
+    def parse(cls, kind: FaultKind, text: str) -> "Fault":
         """The event that an option of the command line says.
 
         Args:

@@ -29,8 +29,10 @@ class FirstOrder:
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
-            self._time_constant[i, each.LAGS] = getattr(each, "time_constant", AT_ONCE)
-            if not each.TURNS:
+            self._time_constant[i, each.KIND.lagging_number] = getattr(
+                each, "time_constant", AT_ONCE
+            )
+            if not each.KIND.sticks_at_angle:
                 continue
             low = each.lower[0]
             high = each.upper[0]
@@ -64,11 +66,13 @@ class ActuatorMotion:
         """Places of the fins and of the others."""
         self.fins = FinLag(layout) if fins is None else fins
         self.others = FirstOrder([layout.actuators[i] for i in self.of_others])
-        self._held = np.array([part.HELD for part in layout.actuators])
+        self._held = np.array([part.KIND.stuck_number for part in layout.actuators])
         self._places = np.arange(layout.n)
         self._working = np.ones(layout.n, bool)
         widths = (layout.upper - layout.lower)[self._places, self._held]
-        self.angles: NDArray[np.bool_] = np.array([part.TURNS for part in layout.actuators])
+        self.angles: NDArray[np.bool_] = np.array(
+            [part.KIND.sticks_at_angle for part in layout.actuators]
+        )
         """Which actuators (n,) have an angle that stays where they stick."""
         self.turns_fully: NDArray[np.bool_] = self.angles & is_full_turn(widths)
         """Which actuators (n,) may come to any direction."""

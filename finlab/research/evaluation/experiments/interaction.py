@@ -20,7 +20,7 @@ from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
 from finlab.layout import Layout
 from finlab.layout.effectiveness import body_force
-from finlab.layout.places import places_of
+from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
 from finlab.research.evaluation.document import Column, Row
@@ -106,14 +106,14 @@ def _models(
     models: dict[str, Model] = {
         "laws alone": lambda _: None,
         f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
-            places_of(own.layout)
+            jet_geometry_of(own.layout)
         ),
-        "network, no own samples": lambda own: Learned(file).of(places_of(own.layout)),
+        "network, no own samples": lambda own: Learned(file).of(jet_geometry_of(own.layout)),
         "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
     }
     for count in own:
         models[f"ridge, {count} own samples"] = partial(Ridge, count)
-    return models | {"oracle": lambda own: Learned(file).of(places_of(own.layout))}
+    return models | {"oracle": lambda own: Learned(file).of(jet_geometry_of(own.layout))}
 
 
 def _some(samples: Samples, count: int) -> Samples:
