@@ -27,7 +27,7 @@ from finlab.research.evaluation.method_specs import (
     load_method_specs,
 )
 from finlab.research.evaluation.scoring import ratio_interval, sigma_of
-from finlab.research.evaluation.splits import SPLITS, Case, make_split
+from finlab.research.evaluation.splits import SPLITS, SplitCase, make_split
 
 EXACT, TRACKED = 1e-5, 1e-3
 """Normalized errors up to which the reference and a method count as delivering a target."""
@@ -87,7 +87,7 @@ def run(
 
 def _rows(
     split: str,
-    cases: Sequence[Case],
+    cases: Sequence[SplitCase],
     methods: tuple[str, ...],
     objective: Name,
     starts: int,
@@ -130,7 +130,7 @@ def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
 
 
 def _answers(
-    method: MethodSpec, case: Case, objective: Name, sigma: Array, seed: int = 0
+    method: MethodSpec, case: SplitCase, objective: Name, sigma: Array, seed: int = 0
 ) -> tuple[Array, Array]:
     """Costs and normalized errors, each (N,)."""
     answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)

@@ -16,7 +16,7 @@ from finlab.actuators.fin.force_table_file import table_text
 from finlab.actuators.thrust_model import COLUMNS, PowerTable
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
-from finlab.fit.thruster_bench import Bench
+from finlab.fit.thruster_bench import BenchData
 
 NO_FORCE = 0.002
 """Share of the largest force up to which a command counts as at rest, or ..."""
@@ -55,7 +55,7 @@ class ThrusterFit:
         return self.table.rows[0][1], self.table.rows[-1][1]
 
 
-def fit_thruster(bench: Bench) -> ThrusterFit:
+def fit_thruster(bench: BenchData) -> ThrusterFit:
     """Returns the thruster that explains the rows. Raises DataError: the force falls with the
     command, is nowhere near 0, or takes a power that is not convex."""
     try:
@@ -64,7 +64,7 @@ def fit_thruster(bench: Bench) -> ThrusterFit:
         raise DataError(f"{bench.source}: {error}") from None
 
 
-def _fitted(bench: Bench) -> ThrusterFit:
+def _fitted(bench: BenchData) -> ThrusterFit:
     places = bench.command
     if len(np.unique(places)) > MOST:
         edges = np.linspace(places[0], places[-1], MOST)

@@ -10,7 +10,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES
 
 
-class Answers(NamedTuple):
+class DemandAnswers(NamedTuple):
     """Answers to N demands."""
 
     command: Array
@@ -25,7 +25,7 @@ class Answers(NamedTuple):
 
 def answers_to(
     allocator: Allocator, wrench: Array, lost: Sequence[str] = (), **options: Any
-) -> Answers:
+) -> DemandAnswers:
     """Returns answers to demands, those that ask for the same axes together.
 
     Args:
@@ -38,7 +38,7 @@ def answers_to(
         CommandError: a demand asks for no axis.
     """
     count = len(wrench)
-    answers = Answers(
+    answers = DemandAnswers(
         np.empty((count, allocator.layout.n, 3)),
         np.empty((count, 6)),
         np.empty(count),

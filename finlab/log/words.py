@@ -8,9 +8,9 @@ import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.axes import AXES, UNITS
-from finlab.display.pictures import COLORS, panels
+from finlab.display.figures import COLORS, panels
 from finlab.log.judgement import Judgement
-from finlab.research.evaluation.document import Block, Column, Row, Table, to_text
+from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row, to_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +33,7 @@ def judgement_text(judged: Judgement) -> str:
     rows: list[Row] = [
         dict(zip([column.key for column in columns], row, strict=True)) for row in each
     ]
-    blocks: list[Block] = [judged.sentence, Table(tuple(columns), rows)]
+    blocks: list[ReportBlock] = [judged.sentence, ReportTable(tuple(columns), rows)]
     worst = sorted(judged.spells, key=lambda spell: spell.start - spell.end)[:MOST_SPELLS]
     for spell in sorted(worst, key=lambda spell: spell.start):
         places = [k for k, axis in enumerate(AXES) if axis in spell.axes]
@@ -51,7 +51,7 @@ def judgement_text(judged: Judgement) -> str:
     return to_text(*blocks, *judged.asks, *judged.notes)
 
 
-def _replays(judged: Judgement) -> Table:
+def _replays(judged: Judgement) -> ReportTable:
     """Replays on the robot and the improved one, and, with each actuator lost, the best and the
     log's own."""
     own = {"px4", "ardusub", "" if judged.held_by is None else judged.held_by.name}
@@ -71,10 +71,10 @@ def _replays(judged: Judgement) -> Table:
         Column("watts", "power", "three", unit="W"),
         Column("saturated_s", "short", "three", unit="s"),
     ]
-    return Table(tuple(columns), rows)
+    return ReportTable(tuple(columns), rows)
 
 
-def picture(judged: Judgement) -> Figure:
+def timeline_picture(judged: Judgement) -> Figure:
     """Demand and what the outputs gave over time, of each axis asked for, and actuators at
     limits."""
     line = judged.timeline

@@ -27,7 +27,7 @@ NOISE = 0.01
 """Error of a sample, on the yardstick, that least counts as noise."""
 
 
-class Fitted(NamedTuple):
+class FittedJets(NamedTuple):
     """What samples say."""
 
     jets: Jets
@@ -37,7 +37,7 @@ class Fitted(NamedTuple):
     """The same of what the fitted jets miss."""
 
 
-def fit_constants(samples: Samples) -> Fitted:
+def fit_constants(samples: Samples) -> FittedJets:
     """Returns the constants that fit samples best. Raises DataError: there are fewer than five."""
     if len(samples.wrench) < LEAST_SAMPLES:
         raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
@@ -73,7 +73,7 @@ def fit_constants(samples: Samples) -> Fitted:
     uncertain = np.sqrt(share**2 + spread / max((each**2).sum(), 1e-12))
     jets = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
     made = Jets(**{**jets, "uncertain": float(f"{min(uncertain, 10.0):.3g}")})
-    return Fitted(made, _size(missed), _size(rest))
+    return FittedJets(made, _size(missed), _size(rest))
 
 
 def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]:
