@@ -9,17 +9,17 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
 from finlab.allocation.methods import (
-    LEARNED,
     Checkpoint,
     MethodChoice,
     checked_settings,
     choose_method,
+    method_class,
 )
 from finlab.allocation.settings import Settings
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
-from finlab.research.networks.trained import Normalization
+from finlab.research.networks.trained import WrenchNormalization
 
 
 class AnyRobot:
@@ -29,7 +29,9 @@ class AnyRobot:
         self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
     ) -> None:
         self.choice = (
-            choose_method(method, checkpoint if method in LEARNED else None, **settings)
+            choose_method(
+                method, checkpoint if method_class(method).needs_networks else None, **settings
+            )
             if isinstance(method, str)
             else MethodChoice(method, checked_settings(method, settings))
         )
@@ -37,7 +39,7 @@ class AnyRobot:
         self._made: dict[Layout, Allocator] = {}
 
     @property
-    def normalization(self) -> Normalization:
+    def normalization(self) -> WrenchNormalization:
         """What the networks were trained with; the paper's where there are none."""
         if self.choice.weights is not None:
             return self.choice.weights.normalization
@@ -70,7 +72,7 @@ class AnyRobot:
         return self.on(layout).allocate_batch(wrenches, **question)
 
 
-def normalized_error(normalization: Normalization, wrench: Any, target: Any) -> Any:
+def normalized_error(normalization: WrenchNormalization, wrench: Any, target: Any) -> Any:
     """`||(wrench - target) / std||`, over the last axis."""
     return np.linalg.norm((np.asarray(wrench) - np.asarray(target)) / normalization.std, axis=-1)
 

@@ -23,7 +23,7 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import numpy as np
 
     from finlab.research.networks.checkpoint import write_checkpoint
-    from finlab.research.networks.trained import Normalization, TrainedWeights, sizes_for_file
+    from finlab.research.networks.trained import TrainedWeights, WrenchNormalization, sizes_for_file
     from finlab.research.paper.network import NetworkConfig
     from finlab.research.paper.surrogate import SurrogateConfig
     from finlab.research.training.loop import first_weights
@@ -38,7 +38,7 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name=folder.name,
         surrogate_sizes={"kind": "mlp", "hidden": [16, 16]},
         surrogate=arrays_of(first_weights(surrogate.shapes(), 0)),
-        normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
+        normalization=WrenchNormalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
         fin_model={"type": "drag"},
         network_sizes=sizes_for_file(network),
         network=arrays_of(first_weights(network.shapes(), 0)),

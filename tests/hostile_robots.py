@@ -1,4 +1,8 @@
-"""Robots that are valid but hostile: degenerate limits, geometry and fin models."""
+"""Robots that are valid but hostile: degenerate limits, geometry and fin models.
+
+The library's makers (`finlab/research/random_layouts.py`) draw robots that somebody could build;
+these lie on the borders of what a layout file may hold.
+"""
 
 import math
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
-"""Fins that nobody has seen before: random laws as in the contract's splits, and noisy tables of
-them."""
+"""Robots of fins with laws of the split `fins`, drawn by the library's maker, and tables of laws.
+
+A table is a file, which the library's makers of random robots never write.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,34 +12,12 @@ from numpy.typing import NDArray
 
 from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, make_law
-from finlab.research.random_layouts import random_layout
+from finlab.research.random_layouts import random_fin_model, random_layout
 
 Array = NDArray[np.float64]
 
 KINDS = ("drag", "lighthill", "soft", "table")
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def random_model(rng: np.random.Generator, kind: str) -> FinModelSpec:
-    """A fin of one law with a formula, its numbers spread as in the split `fins`."""
-    if kind == "drag":
-        numbers = {"area": log_uniform(rng, 0.005, 0.04), "lever": log_uniform(rng, 0.05, 0.15)}
-    elif kind == "lighthill":
-        numbers = {"length": log_uniform(rng, 0.1, 0.3), "width": log_uniform(rng, 0.05, 0.15)}
-    else:
-        spread = {
-            "p": (1.0, 2.0),
-            "x0": (0.6, 1.5),
-            "q": (3.0, 6.0),
-            "e": (0.0, 0.2),
-            "phi_e": (-3.0, 3.0),
-        }
-        numbers = {name: float(rng.uniform(*ends)) for name, ends in spread.items()}
-        numbers |= {"k": log_uniform(rng, 1.0, 8.0), "d": float(rng.uniform(-0.15, 0.15))}
-    return FinModelSpec(kind, tuple(sorted(numbers.items())))
+"""Kinds of fin."""
 
 
 def write_fin_table(
@@ -73,7 +53,7 @@ def write_fin_table(
     return FinModelSpec("table", (("path", str(path)),))
 
 
-def random_robot(
+def random_robot_of_fins(
     rng: np.random.Generator,
     kinds: tuple[str, ...],
     folder: Path | None = None,
@@ -87,7 +67,7 @@ def random_robot(
     fins = []
     for fin in layout.fins:
         kind = str(rng.choice(kinds))
-        model = random_model(rng, kind if kind != "table" else str(rng.choice(KINDS[:3])))
+        model = random_fin_model(rng, None if kind == "table" else kind)
         if kind == "table":
             assert folder is not None
             path = folder / f"{rng.integers(2**62)}.csv"

@@ -26,7 +26,7 @@ from finlab.research.evaluation.method_specs import (
     load_method_specs,
 )
 from finlab.research.evaluation.scoring import ratio_interval, sigma_of
-from finlab.research.evaluation.splits import SPLITS, Case, make_split
+from finlab.research.evaluation.splits import SPLITS, SplitCase, make_split
 
 EXACT_ERROR = 1e-5
 """Largest normalized error of the reference."""
@@ -97,7 +97,7 @@ def run(
 
 def _rows(
     split: str,
-    cases: Sequence[Case],
+    cases: Sequence[SplitCase],
     methods: tuple[str, ...],
     objective: Name,
     starts: int,
@@ -147,7 +147,7 @@ def reference_method(layout: Layout, objective: Name, starts: int) -> MethodSpec
 
 
 def _answers(
-    method: MethodSpec, case: Case, objective: Name, sigma: Array, seed: int = 0
+    method: MethodSpec, case: SplitCase, objective: Name, sigma: Array, seed: int = 0
 ) -> tuple[Array, Array]:
     """Costs and normalized errors, each (N,)."""
     answer = method.on(case.layout).allocate_batch(case.targets, lost=case.lost, seed=seed)

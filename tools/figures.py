@@ -17,7 +17,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from finlab.research.evaluation.document import Table, to_markdown
+from finlab.research.evaluation.document import ReportTable, to_markdown
 from finlab.research.evaluation.experiment import begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -56,7 +56,7 @@ def table_of(name: str, keys: list[str]) -> str:
     keys = [key for key in keys if "=" not in key]
     table = experiment.table(experiment.rows(**chosen))
     columns = {column.key: replace(column, interval=None) for column in table.columns}
-    shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
+    shown = ReportTable(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
     markdown = to_markdown(shown)
     return f"\n`{experiment.command(chosen)}`:\n\n{markdown.rstrip()}\n\n"

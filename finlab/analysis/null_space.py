@@ -54,7 +54,7 @@ class NullSpace:
         moves: NDArray[np.bool_] = np.repeat(
             np.ptp(robot.ends, axis=1, keepdims=True) > 0.0, 2, axis=1
         )
-        moves[robot.lines, 1] = False
+        moves[robot.is_line, 1] = False
         columns = (robot.effectiveness / answer.scale)[moves]
         moves[moves] = np.abs(columns).max(axis=1) > 0.0
         basis = _sparse(
@@ -151,7 +151,7 @@ class NullSpace:
         command = self._start_commands(shift)
         force_of_command = self._compiled.forces_along(self._plant.force(command))
         counts = np.where(
-            self._compiled.robot.lines[:, None], [1.0, 0.0], 1.0
+            self._compiled.robot.is_line[:, None], [1.0, 0.0], 1.0
         )  # drag comes with the lift
         error = np.linalg.norm((force_of_command - force) * counts, axis=-1)
         return np.asarray((error <= FORCE_TOLERANCE * self._force_max).all(axis=1))

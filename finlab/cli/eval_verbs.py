@@ -37,9 +37,9 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """Returns a function whose signature tells the parser the options of an experiment."""
+    from finlab.display.figures import check_figure_file, write_figure
     from finlab.research.evaluation.document import to_text
     from finlab.research.evaluation.experiment import begin
-    from finlab.research.evaluation.plots import check_picture, write_picture
     from finlab.research.executor import on_cluster
 
     options = experiment.options()
@@ -47,7 +47,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     def verb(json: Path | None, cluster: str | None, **typed: Any) -> None:
         plot = typed.pop("plot", None)
         check_json_file(json)
-        check_picture(plot)
+        check_figure_file(plot)
         begin(experiment.name)
         chosen = {name: _parsed_option(name, options[name], value) for name, value in typed.items()}
         if plot is not None:
@@ -59,8 +59,9 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
                 if json != STDOUT:  # so that they are there if it is stopped
                     put_json({"rows": rows}, json)
         put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
-        if plot is not None and experiment.picture is not None:
-            write_picture(experiment.picture, rows, plot)
+        picture = experiment.picture
+        if plot is not None and picture is not None:
+            write_figure(lambda: picture(rows), plot)
 
     parameters = {name: _parser_option(option) for name, option in options.items()}
     rows_file = Annotated[

@@ -43,15 +43,15 @@ def log(
         output: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
     """
+    from finlab.display.figures import check_figure_file, write_figure
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
     from finlab.log import judge, read_log
-    from finlab.log.judgement_text import judgement_text, picture
-    from finlab.research.evaluation.plots import check_picture, write_picture
+    from finlab.log.judgement_text import judgement_text, timeline_picture
 
     shared_options.check_json_file(json)
     shared_options.check_json_file(output, "output")
-    check_picture(plot)
+    check_figure_file(plot)
     layout = None if robot is None else shared_options.open_robot(robot)[0]
     read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
     groups = cast(
@@ -59,7 +59,7 @@ def log(
     )  # `judge` checks them
     judgement = judge(in_worker(read, file, layout), priority=groups, improve=improve)
     if plot is not None:
-        write_picture(lambda _: picture(judgement), [], plot)
+        write_figure(lambda: timeline_picture(judgement), plot)
     if output is not None and judgement.improved is not None:
         save_layout(judgement.improved, output)
     shared_options.put_json(judgement.to_dict() if json else None, json, judgement_text(judgement))

@@ -18,7 +18,7 @@ from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
-    from finlab.swim.identification.fitted_robot import OnlineFit
+    from finlab.swim.identification.online_fit import OnlineFit
     from finlab.swim.simulation import ClosedLoop, Fault, RunLog
 
 
@@ -89,10 +89,10 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
     with tqdm(
         desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr
     ) as bar:
-        from finlab.research.evaluation.plots import check_picture, write_picture
+        from finlab.display.figures import check_figure_file
         from finlab.swim.vehicle.righting import righting_words
 
-        check_picture(options.plot)
+        check_figure_file(options.plot)
         loop = _excitation(options) if options.excite else _swim(options)
         is_righted = options.excite or "Ty" in loop.controller.axes
         if not is_righted and (words := righting_words(loop.layout)) is not None:
@@ -112,9 +112,10 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
         loop.log.save(options.output / "log.npz")
         lines.append(f"\n{options.output}: written log.npz.")
     if options.plot is not None:
-        from finlab.research.evaluation.plots import swim_picture
+        from finlab.display.figures import write_figure
+        from finlab.swim.simulation.swim_pictures import swim_picture
 
-        write_picture(lambda _: swim_picture(loop.log), (), options.plot)
+        write_figure(lambda: swim_picture(loop.log), options.plot)
         lines.append(f"\n{options.plot}: written.")
     print("\n".join(lines))
 
@@ -234,11 +235,12 @@ def _learner(allocator: Allocator) -> OnlineFit:
     lean."""
     import numpy as np
 
-    from finlab.swim.identification.fitted_robot import OnlineFit, leaned
+    from finlab.swim.identification.fitted_robot import with_lean
+    from finlab.swim.identification.online_fit import OnlineFit
 
     learner = OnlineFit(allocator.layout)
     layout = allocator.layout
-    allocator.on(leaned(layout, np.full(layout.n, 0.01)))
+    allocator.on(with_lean(layout, np.full(layout.n, 0.01)))
     return learner
 
 

@@ -21,7 +21,7 @@ _Count = Annotated[int | None, arg(metavar="N")]
 
 
 @dataclass(frozen=True)
-class Paper:
+class PaperOptions:
     """Options of both of the paper's trainings."""
 
     output: _Output
@@ -69,20 +69,20 @@ def mdn(
     )
 
 
-def surrogate(options: OmitArgPrefixes[Paper]) -> None:
+def surrogate(options: OmitArgPrefixes[PaperOptions]) -> None:
     """Train the paper's physics surrogate and write a checkpoint folder with it alone.
 
     With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate
     ...
     """
-    from finlab.research.paper.training.train import Options, train_surrogate
+    from finlab.research.paper.training.train import TrainingOptions, train_surrogate
 
     check_positive(steps=options.steps)
-    _report(options.output, train_surrogate(Options(**vars(options))))
+    _report(options.output, train_surrogate(TrainingOptions(**vars(options))))
 
 
 def allocator(
-    options: OmitArgPrefixes[Paper], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
+    options: OmitArgPrefixes[PaperOptions], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
 ) -> None:
     """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
 
@@ -92,10 +92,10 @@ def allocator(
     Args:
         surrogate: checkpoint whose surrogate guides the training.
     """
-    from finlab.research.paper.training.train import Options, train_allocator
+    from finlab.research.paper.training.train import TrainingOptions, train_allocator
 
     check_positive(steps=options.steps)
-    _report(options.output, train_allocator(Options(**vars(options)), surrogate))
+    _report(options.output, train_allocator(TrainingOptions(**vars(options)), surrogate))
 
 
 def interaction(
@@ -207,9 +207,9 @@ def interaction_data(
     """
     from finlab.fit.interaction.samples import write_samples
     from finlab.research.evaluation.method_specs import own_function
-    from finlab.research.interaction.drawn_samples import drawn, with_jets
+    from finlab.research.interaction.random_samples import random_samples, with_jets
 
     check_positive(layouts=layouts, commands=commands, actuators=actuators[0])
-    judge = with_jets if plant is None else own_function(plant)
-    write_samples(output, drawn(judge, layouts, commands, seed, noise, actuators))
+    oracle = with_jets if plant is None else own_function(plant)
+    write_samples(output, random_samples(oracle, layouts, commands, seed, noise, actuators))
     print(f"{output}: {layouts} robots with {commands} commands each, seed {seed}")

@@ -95,10 +95,10 @@ def _row(tag: str, cells: Sequence[str], sides: Sequence[str]) -> str:
 
 
 def _image(picture: Callable[[], Figure]) -> str:
-    from finlab.display.pictures import render
+    from finlab.display.figures import figure_bytes
 
     try:
-        content = b64encode(render(picture, "png")).decode()
+        content = b64encode(figure_bytes(picture, "png")).decode()
     except ImportError:
         return _html(f"A picture needs matplotlib; run: {install('plot')}")
     return f"<img alt='picture' src='data:image/png;base64,{content}'>"

@@ -1,47 +1,26 @@
-"""Draws robots, attainable sets, paths and ranges by matplotlib, which is imported on first use."""
+"""Pictures of robots, forces, attainable sets, ranges and paths, as notebooks show them.
+
+Drawn by `figures.py`, the plotter; the pictures of experiments, swims, logs and trainings stand
+with what they show.
+"""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.display.figures import COLORS, panels, space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Colours of Okabe and Ito, which people with impaired colour vision can tell apart, too."""
-MIN_SIDE = 0.15
-"""Least side of the axes' box, as a share of its longest side."""
-ARROW_LENGTH = 0.35
-"""Length of the longest arrow, as a share of the robot's size."""
-SUPERELLIPSOID_EXPONENT = {"box": 0.2}
+ARROW_SHARE = 0.35
+"""Longest arrow, as a share of the robot."""
+HULL_EXPONENT = {"box": 0.2}
 """Exponent of the superellipsoid that stands for a hull; 1 is an ellipsoid."""
-
-
-def render(picture: Callable[[], Figure], form: str, dpi: int = 80) -> bytes:
-    """Returns a figure as the content of a file.
-
-    Text in it is no formula: it may be a stranger's.
-
-    Args:
-        picture: draws the figure.
-        form: png, svg or pdf.
-        dpi: pixels per inch.
-
-    Raises:
-        ImportError: matplotlib is not installed.
-    """
-    import matplotlib
-
-    content = io.BytesIO()
-    with matplotlib.rc_context({"text.parse_math": False}):
-        picture().savefig(content, format=form, dpi=dpi, bbox_inches="tight")
-    return content.getvalue()
 
 
 def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
@@ -69,14 +48,14 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
         ball = np.stack(
             [np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1
         )
-        skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** SUPERELLIPSOID_EXPONENT.get(
+        skin = center + sides / 2 * np.sign(ball) * np.abs(ball) ** HULL_EXPONENT.get(
             hull.shape, 1.0
         )
         points.append(skin.reshape(-1, 3))
     size = max(float(np.ptp(np.concatenate(points), axis=0).max()), 1e-2)
-    arrow = arrow * ARROW_LENGTH * size / max(longest, 1e-12)
+    arrow = arrow * ARROW_SHARE * size / max(longest, 1e-12)
     words = layout.name if forces is None else f"{layout.name}\nlongest arrow {longest:.3g} N"
-    figure, axes = _space(words, np.concatenate([*points, position + arrow]), "m")
+    figure, axes = space(words, np.concatenate([*points, position + arrow]), "m")
     if len(points) > 1:
         axes.plot_surface(*np.moveaxis(skin, -1, 0), color=COLORS[0], alpha=0.12)
     for k, (name, point, vector) in enumerate(zip(layout.names, position, arrow, strict=True)):
@@ -87,7 +66,7 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
 
 def body_picture(title: str, unit: str, body: Any) -> Figure:
     """Returns an attainable set (a `finlab.analysis.AttainableSet`) about the origin."""
-    figure, axes = _space(title, np.concatenate([body.vertices, np.zeros((1, 3))]), unit)
+    figure, axes = space(title, np.concatenate([body.vertices, np.zeros((1, 3))]), unit)
     corners = body.vertices.T
     faces = body.faces
     if len(faces):
@@ -108,7 +87,7 @@ def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, 
         path: points (N, 3) [m].
         marks: points (3,) [m] that are marked, by their labels.
     """
-    figure, axes = _space(title, np.concatenate([reference, path]), "m")
+    figure, axes = space(title, np.concatenate([reference, path]), "m")
     axes.plot(*reference.T, color="0.6", linewidth=3.0, label="reference")
     axes.plot(*path.T, color=COLORS[0], label="robot")
     for words, point in marks.items():
@@ -137,43 +116,3 @@ def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) ->
         side.invert_yaxis()
     figure.suptitle(title)
     return figure
-
-
-def panels(
-    size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any
-) -> tuple[Figure, Any]:
-    """Returns a figure and its axes (rows, columns), with grids.
-
-    Args:
-        size: width and height [inches].
-        rows: rows of axes.
-        columns: columns of axes.
-        **options: further arguments of matplotlib's `subplots`.
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    axes: Any = figure.subplots(rows, columns, squeeze=False, **options)
-    for panel in axes.flat:
-        panel.grid(alpha=0.3)
-        panel.set_axisbelow(True)
-    return figure, axes
-
-
-def _space(title: str, points: Array, unit: str) -> tuple[Figure, Any]:
-    """A figure with three axes of one scale around points (N, 3)."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6, 4.8), layout="constrained")
-    axes: Any = figure.add_subplot(projection="3d")
-    low = points.min(axis=0)
-    high = points.max(axis=0)
-    middle = (low + high) / 2
-    span = np.maximum(high - low, max(MIN_SIDE * float((high - low).max()), 1e-9))
-    limits = zip(middle - 0.55 * span, middle + 0.55 * span, strict=True)
-    axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)))
-    axes.set_box_aspect(span)
-    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
-    axes.set_title(title)
-    axes.locator_params(nbins=4)
-    return figure, axes

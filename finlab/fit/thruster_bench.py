@@ -172,7 +172,7 @@ def _interpolate(low: Rows, high: Rows, share: float) -> Rows:
 
 
 @dataclass(frozen=True)
-class Bench:
+class BenchData:
     """Rows of one thruster in the order of the command."""
 
     command: Array
@@ -190,7 +190,7 @@ class Bench:
     """What was filled in or left aside, a sentence each."""
 
 
-def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> Bench:
+def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> BenchData:
     """Returns the rows of all files together.
 
     Args:
@@ -311,7 +311,7 @@ def _with_signs(rows: Rows, unit: str, notes: list[str]) -> Rows:
     return {**rows, "force": np.where(command < neutral, -size, size)}
 
 
-def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Bench:
+def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> BenchData:
     """The bench of rows; an error where no thruster can be fitted to them."""
     command = values["command"]
     force = values["force"]
@@ -326,4 +326,4 @@ def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Be
     order = np.argsort(command, kind="stable")
     torque = values["torque"][order] if "torque" in values else None
     power = np.maximum(power[order], 0.0)
-    return Bench(command[order], force[order], power, torque, COMMANDS[kind], source, notes)
+    return BenchData(command[order], force[order], power, torque, COMMANDS[kind], source, notes)

@@ -15,7 +15,7 @@ from finlab.actuators.fin.force_table_file import table_text
 from finlab.actuators.thrust_model import COLUMNS, PowerTable
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
-from finlab.fit.thruster_bench import Bench
+from finlab.fit.thruster_bench import BenchData
 
 NO_FORCE = 0.002
 """Share of the largest force up to which a command gives no force, unless the noise is larger."""
@@ -57,7 +57,7 @@ class ThrusterFit:
         return self.table.rows[0][1], self.table.rows[-1][1]
 
 
-def fit_thruster(bench: Bench) -> ThrusterFit:
+def fit_thruster(bench: BenchData) -> ThrusterFit:
     """Returns the thruster that explains the rows of a bench.
 
     Raises:
@@ -70,7 +70,7 @@ def fit_thruster(bench: Bench) -> ThrusterFit:
         raise DataError(f"{bench.source}: {error}") from None
 
 
-def _fit(bench: Bench) -> ThrusterFit:
+def _fit(bench: BenchData) -> ThrusterFit:
     """As `fit_thruster`; the errors do not name the bench."""
     cells = bench.command
     if len(np.unique(cells)) > MAX_COMMANDS:

@@ -8,9 +8,9 @@ import numpy as np
 
 from finlab.analysis.authority import AXES as MOTIONS
 from finlab.axes import AXES, UNITS
-from finlab.display.pictures import COLORS, panels
+from finlab.display.figures import COLORS, panels
 from finlab.log.judgement import Judgement, Spell
-from finlab.research.evaluation.document import Block, Column, Row, Table, to_text
+from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row, to_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ def judgement_text(judgement: Judgement) -> str:
                 "lost": judgement.lost_s[k],
             }
         )
-    blocks: list[Block] = [judgement.sentence, Table(columns, rows)]
+    blocks: list[ReportBlock] = [judgement.sentence, ReportTable(columns, rows)]
     longest = sorted(judgement.spells, key=lambda spell: spell.start - spell.end)[:MAX_SPELLS]
     for spell in sorted(longest, key=lambda spell: spell.start):
         blocks.append(_spell_line(spell))
@@ -66,7 +66,7 @@ def _spell_line(spell: Spell) -> str:
     return f"{spell.start:.1f} to {spell.end:.1f} s: {', '.join(shares)}; {limits}"
 
 
-def _replay_table(judgement: Judgement) -> Table:
+def _replay_table(judgement: Judgement) -> ReportTable:
     """Replays on the robot and the improved one; of those with an actuator lost only the
     autopilots' and the best method."""
     best = judgement.held_by
@@ -87,10 +87,10 @@ def _replay_table(judgement: Judgement) -> Table:
         columns.append(Column(axis, axis, "three", unit=unit))
     columns.append(Column("watts", "power", "three", unit="W"))
     columns.append(Column("saturated_s", "short", "three", unit="s"))
-    return Table(tuple(columns), rows)
+    return ReportTable(tuple(columns), rows)
 
 
-def picture(judgement: Judgement) -> Figure:
+def timeline_picture(judgement: Judgement) -> Figure:
     """Returns a figure of the demanded and the delivered wrench over time, along each axis that was
     demanded, and of the actuators at limits."""
     timeline = judgement.timeline

@@ -1,7 +1,8 @@
-"""Random layouts: of fins, as in training, and of actuators of each kind, for held-out splits.
+"""The maker of random robots: of fins, as in training, and of actuators of each kind.
 
-The numbers that define the training distribution (box, fin counts, spread of limits) are here and
-nowhere else.
+For training data, the splits of experiments, and tests. The numbers that define the training
+distribution (box, fin counts, spread of limits) are here and nowhere else. A robot is a function of
+the generator that is handed in: whoever changes the order of draws changes every split.
 """
 
 import math
@@ -70,31 +71,35 @@ def random_layout(
         if outside is None or (np.abs(position[:count]) > np.array(outside)).any():
             break
     angle = rng.uniform(-math.pi, math.pi, most)
-    own = _varied_limits(rng, most) if limits == "varied" else [Limits()] * most
-    fins = [
-        Fin(f"fin_{i + 1}", tuple(position[i].tolist()), float(angle[i]), own[i])
-        for i in range(count)
-    ]
+    fin_limits = _varied_limits(rng, most) if limits == "varied" else [Limits()] * most
+    fins = []
+    for i in range(count):
+        fins.append(Fin(f"fin_{i + 1}", _vector(position[i]), float(angle[i]), fin_limits[i]))
     return Layout(name=name, actuators=tuple(fins))
 
 
 def _varied_limits(rng: np.random.Generator, count: int) -> list[Limits]:
+    """Limits of so many fins as in split `limits`, each its own."""
     amplitude = rng.uniform(*AMPLITUDE_MAX_RANGE, count)
     frequency = rng.uniform(*FREQUENCY_MAX_RANGE, count)
     width = rng.uniform(*ARC_RANGE, count)
     center = rng.uniform(-1.0, 1.0, count) * (math.pi - width / 2)
     arc = rng.uniform(size=count) < ARC_SHARE
     nominal = Limits()
-    return [
-        Limits(
-            (nominal.amplitude[0], float(amplitude[i])),
-            (nominal.frequency[0], float(frequency[i])),
-            (float(center[i] - width[i] / 2), float(center[i] + width[i] / 2))
-            if arc[i]
-            else nominal.zero_direction,
+    result = []
+    for i in range(count):
+        zero_direction = nominal.zero_direction
+        if arc[i]:
+            half = width[i] / 2
+            zero_direction = float(center[i] - half), float(center[i] + half)
+        result.append(
+            Limits(
+                amplitude=(nominal.amplitude[0], float(amplitude[i])),
+                frequency=(nominal.frequency[0], float(frequency[i])),
+                zero_direction=zero_direction,
+            )
         )
-        for i in range(count)
-    ]
+    return result
 
 
 EXTENT = (0.3, 0.3, 0.15)
@@ -102,8 +107,11 @@ EXTENT = (0.3, 0.3, 0.15)
 STRENGTH = (4.0, 30.0)
 """Largest force of a thruster [N], times the robot's size from `SIZE`."""
 SIZE = (0.3, 3.0)
-ONE_WAY, SYMMETRIC = 0.1, 0.1
-"""Shares of thrusters that push one way only, and as much in reverse as ahead."""
+"""From where the logarithm of a robot's size is drawn; a factor of all its forces."""
+ONE_WAY_SHARE = 0.1
+"""Share of thrusters that push one way only."""
+SYMMETRIC_SHARE = 0.1
+"""Share of thrusters that push as much in reverse as ahead."""
 REACTION = 0.03
 """Largest reaction torque of a propeller per newton [m]; half of them have one."""
 ARC = (math.radians(20.0), math.radians(300.0))
@@ -150,13 +158,15 @@ WIDE: dict[str, Numbers] = {
 }
 """Families of fins to learn from: wider than any fin that is evaluated."""
 
-HULL, DIAMETER = (0.3, 0.2, 0.15), (0.05, 0.12)
-"""Half axes of the hull of a robot with jets, and its propellers [m]."""
+HULL = (0.3, 0.2, 0.15)
+"""Half axes of the hull of a robot with jets [m], times a factor of its own."""
+DIAMETER = (0.05, 0.12)
+"""Diameters of its propellers [m]."""
 
 FinKind = tuple[FinModelSpec, Limits]
 """A fin, wherever it is mounted."""
 
-Draw = Callable[[np.random.Generator, str, float], Actuator]
+ActuatorMaker = Callable[[np.random.Generator, str, float], Actuator]
 """From a generator, a name and the robot's size to an actuator."""
 
 
@@ -164,7 +174,7 @@ def random_robot(
     rng: np.random.Generator,
     name: str,
     count: tuple[int, int],
-    kinds: Sequence[Draw],
+    kinds: Sequence[ActuatorMaker],
     each: bool = False,
 ) -> Layout:
     """Returns a robot of random actuators `a1`, `a2`, ...
@@ -185,29 +195,40 @@ def random_robot(
 
 
 def random_jet_robot(
-    rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw] | None = None
+    rng: np.random.Generator,
+    name: str,
+    count: tuple[int, int],
+    kinds: Sequence[ActuatorMaker] | None = None,
 ) -> Layout:
-    """Returns a robot whose jets meet each other and its hull, an ellipsoid: least to most
-    actuators on or near it, of one of several kinds or of all of them (`kinds` when given)."""
-    mixed: list[Draw] = [random_thruster, random_azimuth, random_shaft_fin]
-    chosen = kinds or ([mixed[k]] if (k := int(rng.integers(4))) < 3 else mixed)
-    robot = random_robot(rng, name, count, chosen)
+    """Returns a robot whose jets meet each other and its hull, an ellipsoid.
+
+    Args:
+        rng: source of randomness.
+        name: of the layout.
+        count: least and most actuators, on or near the hull.
+        kinds: what they are drawn of; by default one of several kinds, or all of them.
+    """
+    if not kinds:
+        every: list[ActuatorMaker] = [random_thruster, random_azimuth, random_shaft_fin]
+        k = int(rng.integers(4))
+        kinds = [every[k]] if k < 3 else every
+    robot = random_robot(rng, name, count, kinds)
     half = np.array(HULL) * rng.uniform(0.7, 1.4)
     parts = []
     for part in robot.actuators:
-        place = _vector(rng.uniform(1.0, 1.8) * half * _unit(rng))
+        position = _vector(rng.uniform(1.0, 1.8) * half * _unit(rng))
         jet = {} if isinstance(part, Fin) else {"diameter": log_uniform(rng, *DIAMETER)}
-        parts.append(replace(part, position=place, **jet))
-    return replace(
-        robot, actuators=tuple(parts), body=Body(hull=Hull("ellipsoid", _vector(2.0 * half)))
-    )
+        parts.append(replace(part, position=position, **jet))
+    hull = Hull("ellipsoid", _vector(2.0 * half))
+    return replace(robot, actuators=tuple(parts), body=Body(hull=hull))
 
 
 def random_thruster(rng: np.random.Generator, name: str, size: float) -> Thruster:
     """Returns a thruster in any direction, with forces and a power law of its own."""
     most = size * rng.uniform(*STRENGTH)
     reverse = rng.choice(
-        [0.0, 1.0, rng.uniform(0.2, 1.2)], p=[ONE_WAY, SYMMETRIC, 1.0 - ONE_WAY - SYMMETRIC]
+        [0.0, 1.0, rng.uniform(0.2, 1.2)],
+        p=[ONE_WAY_SHARE, SYMMETRIC_SHARE, 1.0 - ONE_WAY_SHARE - SYMMETRIC_SHARE],
     )
     reaction = rng.uniform(-REACTION, REACTION) * rng.integers(2)
     return Thruster(
@@ -253,28 +274,37 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def random_fin_model(
     rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
 ) -> FinModelSpec:
-    """Returns a fin model with random numbers, of one kind (a key of `families`) or of each equally
-    often; numbers that its family does not name stay as they are by default."""
+    """Returns a fin model with random numbers.
+
+    Args:
+        rng: source of randomness.
+        kind: a key of `families`; None for each equally often.
+        families: kind to the ranges of its numbers; what it does not name stays as by default.
+    """
     kind = kind or str(rng.choice(list(families)))
-    drawn = {
-        name: log_uniform(rng, *ends) if name in LOGARITHMIC else float(rng.uniform(*ends))
-        for name, ends in families[kind].items()
-    }
-    return FinModelSpec(kind, tuple(drawn.items()))
+    numbers: list[tuple[str, float]] = []
+    for name, ends in families[kind].items():
+        is_logarithmic = name in LOGARITHMIC
+        value = log_uniform(rng, *ends) if is_logarithmic else float(rng.uniform(*ends))
+        numbers.append((name, value))
+    return FinModelSpec(kind, tuple(numbers))
 
 
 def _position(rng: np.random.Generator) -> tuple[float, float, float]:
+    """A position within `EXTENT` [m]."""
     return _vector(rng.uniform(-1.0, 1.0, 3) * EXTENT)
 
 
 def _vector(values: Array) -> tuple[float, float, float]:
+    """An array (3,) as the tuple that a layout holds."""
     x, y, z = values.tolist()
     return x, y, z
 
 
 def _unit(rng: np.random.Generator) -> Array:
-    drawn = rng.normal(size=3)
-    return np.asarray(drawn / np.linalg.norm(drawn))
+    """A unit vector (3,) in any direction."""
+    normal = rng.normal(size=3)
+    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _across(
@@ -287,6 +317,7 @@ def _across(
 
 
 def _arc(rng: np.random.Generator, least: float, most: float) -> tuple[float, float]:
+    """An arc within [-pi, pi] that is least to most wide [rad]."""
     width = rng.uniform(least, most)
     start = rng.uniform(-math.pi, math.pi - width)
     return start, start + width
@@ -299,7 +330,7 @@ def _law(rng: np.random.Generator) -> PowerLaw:
     return PowerLaw(forward, forward * rng.uniform(0.8, 3.0), exponent)
 
 
-def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], list[FinKind]]:
+def random_fin_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], list[FinKind]]:
     """Returns `count` fins with nominal limits, and as many with limits drawn as in split `limits`;
     half of the soft ones push alike in all directions. Few, since compiling one takes as long as
     many answers."""
@@ -315,27 +346,32 @@ def random_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind], l
 def random_fin_robot(
     rng: np.random.Generator, kinds: tuple[list[FinKind], list[FinKind]], n: int
 ) -> Layout:
-    """Returns a robot of n fins to learn from, of `random_kinds`; none is one that is evaluated.
+    """Returns a robot of n fins to learn from; none is one that is evaluated.
 
     Fins are of one kind or each of its own, half of the robots have limits of their own, and a
     third are symmetric, where fins are equals and only chance can tell them apart.
+
+    Args:
+        rng: source of randomness.
+        kinds: fins with nominal and with varied limits, as `random_fin_kinds` gives them.
+        n: number of fins.
     """
     symmetric = rng.random() < 1 / 3
-    position, angle = _symmetric_places(rng, n) if symmetric else _places(rng, n)
+    position, angle = _symmetric_mountings(rng, n) if symmetric else _mountings(rng, n)
     source = kinds[not symmetric and rng.random() < 0.5]
     one_kind = symmetric or rng.random() < 0.5
-    chosen = (
-        np.full(n, rng.integers(len(source))) if one_kind else rng.integers(len(source), size=n)
-    )
+    if one_kind:
+        chosen = np.full(n, rng.integers(len(source)))
+    else:
+        chosen = rng.integers(len(source), size=n)
     fins = []
-    for i, (place, turn, (model, limits)) in enumerate(
-        zip(position, angle, (source[k] for k in chosen), strict=True)
-    ):
-        fins.append(Fin(f"fin_{i + 1}", tuple(place.tolist()), float(turn), limits, model=model))
+    for i in range(n):
+        model, limits = source[chosen[i]]
+        fins.append(Fin(f"fin_{i + 1}", _vector(position[i]), float(angle[i]), limits, model=model))
     return Layout("random", tuple(fins))
 
 
-def _places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+def _mountings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Positions (n, 3) [m] and angles (n,) [rad] of a robot without symmetry, some of them flat."""
     box = np.array(TRAINING_BOX if rng.random() < 0.6 else WIDE_BOX)
     if rng.random() < 0.3:
@@ -343,7 +379,7 @@ def _places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     return rng.uniform(-1.0, 1.0, (n, 3)) * box, rng.uniform(-math.pi, math.pi, n)
 
 
-def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+def _symmetric_mountings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """The same with mirrored pairs, stacked pairs, or fins evenly around the hull."""
     kind = rng.integers(3)
     if kind == 0:  # evenly around
@@ -352,19 +388,18 @@ def _symmetric_places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
         position = np.stack(
             [radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros(n)], axis=-1
         )
-        return position, np.asarray(
-            wrapped(azimuth + rng.choice([0.0, rng.uniform(-math.pi, math.pi)]))
-        )
+        turn = rng.choice([0.0, rng.uniform(-math.pi, math.pi)])
+        return position, np.asarray(wrapped(azimuth + turn))
     half = n // 2
-    one, turn = _places(rng, n - half)
+    position, angle = _mountings(rng, n - half)
     if kind == 1:  # port and starboard: the mirror image of a shaft's azimuth is its negative
-        other = one[:half] * np.array([1.0, -1.0, 1.0])
-        turned = -turn[:half]
+        mirrored = position[:half] * np.array([1.0, -1.0, 1.0])
+        mirrored_angle = -angle[:half]
     else:  # one above the other
-        one[:half, 2] = rng.uniform(0.0, 0.1)
-        other = one[:half] * np.array([1.0, 1.0, -1.0])
-        turned = turn[:half]
+        position[:half, 2] = rng.uniform(0.0, 0.1)
+        mirrored = position[:half] * np.array([1.0, 1.0, -1.0])
+        mirrored_angle = angle[:half]
     order = rng.permutation(n)
-    return np.concatenate([one, other])[order], np.asarray(wrapped(np.concatenate([turn, turned])))[
-        order
-    ]
+    positions = np.concatenate([position, mirrored])
+    angles = np.concatenate([angle, mirrored_angle])
+    return positions[order], np.asarray(wrapped(angles))[order]

@@ -67,8 +67,10 @@ class Opened(NamedTuple):
     """Every file that it names is kept in that folder, under a name made from its content."""
     missing: tuple[str, ...] = ()
     """Files that it named and that did not come with it, though the layout makes sense without."""
-    lost: tuple[str, ...] = ()  # actuators that a bundle says are lost
-    notes: tuple[str, ...] = ()  # what was taken where a robot description is silent
+    lost: tuple[str, ...] = ()
+    """Actuators that a bundle says are lost."""
+    notes: tuple[str, ...] = ()
+    """What was taken where a robot description is silent."""
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:

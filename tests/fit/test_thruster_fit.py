@@ -13,7 +13,7 @@ import yaml
 from finlab.arrays import Array
 from finlab.cli import main
 from finlab.errors import DataError
-from finlab.fit.thruster_bench import Bench, read_bench
+from finlab.fit.thruster_bench import BenchData, read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster, layout_lines
 from finlab.physics.table_error import thrust_table_error
 from tests.fit.cell import write
@@ -28,7 +28,7 @@ def true_force(command: Array) -> Array:
     return np.asarray(np.where(command > 0.0, 50.0, -35.0) * beyond**1.8)
 
 
-def bench(n: int, noise: float, seed: int = 0, repeats: int = 1) -> Bench:
+def bench(n: int, noise: float, seed: int = 0, repeats: int = 1) -> BenchData:
     """Rows of that thruster at random commands, forces and powers with noise that is a share of
     each."""
     rng = np.random.default_rng(seed)
@@ -38,7 +38,7 @@ def bench(n: int, noise: float, seed: int = 0, repeats: int = 1) -> Bench:
     force = true_force(command)
     power = np.where(force > 0.0, 1.0, 1.4) * np.abs(force) ** 1.55
     seen = [values * (1.0 + noise * rng.standard_normal(len(command))) for values in (force, power)]
-    return Bench(command, seen[0], np.abs(seen[1]), None, "", "bench", ())
+    return BenchData(command, seen[0], np.abs(seen[1]), None, "", "bench", ())
 
 
 def test_the_t200_is_as_published() -> None:

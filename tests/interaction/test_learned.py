@@ -24,11 +24,11 @@ from tests.interaction.test_jets import differs
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
     from finlab.fit.interaction.samples import read_samples, write_samples
-    from finlab.research.interaction.drawn_samples import drawn
+    from finlab.research.interaction.random_samples import random_samples
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
     folder = tmp_path_factory.mktemp("interaction")
-    write_samples(folder / "data.npz", drawn(wrenches, 60, 20, 0, 0.02, (4, 8)))
+    write_samples(folder / "data.npz", random_samples(wrenches, 60, 20, 0, 0.02, (4, 8)))
     train(read_samples(folder / "data.npz"), folder, recipe(steps=120, batch=256), seed=0)
     return Learned(str(folder / WEIGHTS_FILE))
 

@@ -21,7 +21,7 @@ from finlab.layout import Layout, save_layout
 from finlab.layout.effectiveness import body_force
 from finlab.physics import Plant
 from finlab.physics.objective import yardstick
-from finlab.research.interaction.drawn_samples import drawn
+from finlab.research.interaction.random_samples import random_samples
 
 OTHER = Jets(2.1, 2.4, 28.0, 0.8, 1.0, 0.2, 0.15, 0.45)
 
@@ -45,7 +45,7 @@ def write_table(samples: Samples, path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def samples() -> list[Samples]:
-    return drawn(other, 3, 60, 7, 0.02, (4, 8))
+    return random_samples(other, 3, 60, 7, 0.02, (4, 8))
 
 
 def test_files_give_back_what_was_written(samples: list[Samples], tmp_path: Path) -> None:

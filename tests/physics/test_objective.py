@@ -7,12 +7,12 @@ import pytest
 
 from finlab.physics import Plant
 from finlab.physics.objective import EffortMeter, Name, command_effort, cost_meter, fin_effort
-from tests.random_fins import KINDS, random_robot
+from tests.random_fins import KINDS, random_robot_of_fins
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
 def test_a_meters_slopes_are_differences(objective: Name, tmp_path: Path) -> None:
-    plant = Plant(random_robot(np.random.default_rng(3), KINDS, tmp_path, n_fins=6))
+    plant = Plant(random_robot_of_fins(np.random.default_rng(3), KINDS, tmp_path, n_fins=6))
     meter = cost_meter(objective, plant)
     command = plant.sample(np.random.default_rng(0), (7,))
     gradient = meter.gradient(command)
@@ -26,7 +26,7 @@ def test_a_meters_slopes_are_differences(objective: Name, tmp_path: Path) -> Non
 
 
 def test_what_each_objective_counts() -> None:
-    layout = random_robot(np.random.default_rng(4), ("drag",), n_fins=3)
+    layout = random_robot_of_fins(np.random.default_rng(4), ("drag",), n_fins=3)
     plant = Plant(layout)
     command = plant.sample(np.random.default_rng(0), (4,))
     np.testing.assert_allclose(cost_meter("power", plant)(command), plant.power(command).sum(-1))

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
@@ -19,6 +18,7 @@ from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import HOLD, Answering, Refining
+from webapp.tasks.modes import find_modes
 from webapp.tasks.solver import MAX_SHOWN, NO_MODES, Modes, NamedMode, Solver, named_modes
 
 PUSH = (0.3, 1.1, 0.0)

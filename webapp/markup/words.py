@@ -205,7 +205,7 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
     """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if
     little."""
     vehicle = Vehicle(complete_body(layout))
-    over = vehicle.lift - vehicle.weight
+    over = vehicle.buoyancy - vehicle.weight
     if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
         return None
     goes, way = ("rises", "down") if over > 0.0 else ("sinks", "up")

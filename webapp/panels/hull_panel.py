@@ -13,7 +13,7 @@ from finlab.files.worker import in_worker
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from finlab.swim.hull import contradicts, displaced, hull_of, lift_of
-from finlab.swim.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
+from finlab.swim.hull.mesh_file import LENGTH_MAX, MAX_BYTES, MAX_FACES, turned
 from finlab.swim.hull.surface import UNITS
 from finlab.swim.vehicle.fossen import GRAVITY
 from webapp.markup.words import html, three_digits
@@ -42,7 +42,9 @@ def add_hull(page: Page) -> None:
         it."""
         side = 2.0 * max(hull_of(with_hull(session.state.layout, hull)).half) / hull.scale
         lengths = {
-            word: side * scale for word, scale in UNITS.items() if LEAST <= side * scale <= LARGEST
+            word: side * scale
+            for word, scale in UNITS.items()
+            if LEAST <= side * scale <= LENGTH_MAX
         }
         if list(lengths) in (["m"], []):
             put_in(hull)

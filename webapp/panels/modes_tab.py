@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.physics.objective import REACHED
-from finlab.research.mdn.method import WHOLE
+from finlab.research.mdn.method import TRACE_STEPS
 from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.verdict import Verdict, verdict_of
@@ -74,7 +74,7 @@ def add_candidates(page: Page) -> None:
     page.presses.on("loop", lambda _key, _held: session.set_loop(not session.loops))
     page.add_html(_player)
     hint = "How many steps of refinement the samples have had, in the plot and on the robot."
-    slider = gui.add_slider("Step", 0, WHOLE.steps, 1, WHOLE.steps, hint=hint)
+    slider = gui.add_slider("Step", 0, TRACE_STEPS.steps, 1, TRACE_STEPS.steps, hint=hint)
     page.bind(slider, jobs.refining.hold, lambda step, modes: modes.steps if step is None else step)
     board.show(slider, visible=lambda modes: modes.steps > 0)
     add_html(gui, marker("fl-column"))
@@ -150,7 +150,7 @@ def step_words(modes: Modes, step: int | None) -> str:
     """What is done in a step of the refinement, and the error that is left then, half of the
     samples having less."""
     at = modes.steps if step is None else step
-    words = "descent in forces" if at <= WHOLE.descent else "made exact"
+    words = "descent in forces" if at <= TRACE_STEPS.descent else "made exact"
     words = "samples of the network" if at == 0 else words
     left = float(np.median(modes.ways[at].err_norm))
     return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))

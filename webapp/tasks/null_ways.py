@@ -4,11 +4,11 @@ both."""
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.modes import Mode, mode_signature
 from finlab.analysis.null_space import NullSpace
 from finlab.arrays import Array
 from webapp.markup.verdict import is_proved
 from webapp.session.targets import full_thrust
+from webapp.tasks.modes import Mode, mode_signature
 from webapp.tasks.solver import Modes, NamedMode, NullWays
 
 MOST = 6

@@ -12,7 +12,6 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
-from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from finlab.allocation.policy import KINDS, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
@@ -23,6 +22,7 @@ from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
 from webapp.markup.words import OWN, fins_words
 from webapp.session.state import DRAWING, State, chosen
+from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
@@ -233,7 +233,7 @@ class Solver:
         blind = self.solve(replace(state, layout=replace(state.layout, interaction=None)))
         judge = replace(blind.layout, interaction=known)
         flow = None if state.flow is None else np.array(state.flow)
-        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, later=None)
+        blind = replace(blind, layout=judge, flow=flow, wrench_expected=None, answered=None)
         both = BothWays(state, self.solve(state), blind)
         _ = [
             (answer.err_norm, answer.power) for answer in both[1:]
@@ -265,7 +265,7 @@ class Solver:
             own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
             badge = "optimum" if is_proved(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
-        return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
+        return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""

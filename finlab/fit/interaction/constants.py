@@ -33,7 +33,7 @@ MAX_UNCERTAINTY = 10.0
 """Largest `uncertain` of the fitted jets."""
 
 
-class JetFit(NamedTuple):
+class FittedJets(NamedTuple):
     """The result of a fit."""
 
     jets: Jets
@@ -44,7 +44,7 @@ class JetFit(NamedTuple):
     """The same with the fitted jets."""
 
 
-def fit_constants(samples: Samples) -> JetFit:
+def fit_constants(samples: Samples) -> FittedJets:
     """Returns the constants that fit samples best.
 
     Raises:
@@ -87,7 +87,7 @@ def fit_constants(samples: Samples) -> JetFit:
     uncertain = np.sqrt(share**2 + jet_variance / max((deviation**2).sum(), 1e-12))
     constants = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
     constants["uncertain"] = float(f"{min(uncertain, MAX_UNCERTAINTY):.3g}")
-    return JetFit(Jets(**constants), _root_mean_square(missed), _root_mean_square(residual))
+    return FittedJets(Jets(**constants), _root_mean_square(missed), _root_mean_square(residual))
 
 
 def parts_of_error(error: Array, deviation: Array, size: Array) -> tuple[float, float]:

@@ -14,7 +14,8 @@ from typing import Any
 from finlab.display import aligned
 
 Row = dict[str, Any]
-WIDTH = 110  # of plain text
+WIDTH = 110
+"""Of plain text."""
 
 
 def error(value: float) -> str:
@@ -62,8 +63,10 @@ class Column:
     key: str
     title: str
     format: str = "text"
-    interval: str | None = None  # key of an interval [low, high] that stands behind the number
-    unit: str = ""  # of the numbers; none where they are shares, ratios or counts
+    interval: str | None = None
+    """Key of an interval [low, high] that stands behind the number."""
+    unit: str = ""
+    """Of the numbers; none where they are shares, ratios or counts."""
 
     @property
     def heading(self) -> str:
@@ -77,7 +80,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table; a row with `_kind` `ours` stands out."""
 
     columns: tuple[Column, ...]
@@ -98,10 +101,11 @@ class Table:
         )
 
 
-Block = str | Table  # a string is Markdown
+ReportBlock = str | ReportTable
+"""A string is Markdown."""
 
 
-def to_markdown(*blocks: Block) -> str:
+def to_markdown(*blocks: ReportBlock) -> str:
     """Blocks as the Markdown of a page, tables with pipes; rows that are ours in bold."""
     return (
         "\n\n".join(block if isinstance(block, str) else _text_table(block) for block in blocks)
@@ -109,7 +113,7 @@ def to_markdown(*blocks: Block) -> str:
     )
 
 
-def _text_table(table: Table) -> str:
+def _text_table(table: ReportTable) -> str:
     keys = [column.key for column in table.columns]
     named = keys.index("method") if "method" in keys else 0
     lines = [[column.heading for column in table.columns]]
@@ -122,12 +126,12 @@ def _text_table(table: Table) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def to_text(*blocks: Block) -> str:
+def to_text(*blocks: ReportBlock) -> str:
     """Headings without their marks, paragraphs in lines, tables with aligned columns."""
     return "\n\n".join(map(_plain, blocks))
 
 
-def _plain(block: Block) -> str:
+def _plain(block: ReportBlock) -> str:
     if isinstance(block, str):
         lines = (line.strip("#* ").replace("`", "") for line in block.splitlines())
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)

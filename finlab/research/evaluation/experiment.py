@@ -20,7 +20,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.research.evaluation.document import Block, Column, Row, Table
+from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row
 
 EXPERIMENTS = (
     *("wrench", "thrusters", "latency", "ablation", "temperature"),
@@ -38,8 +38,10 @@ Item = TypeVar("Item")
 class Experiment:
     """A question, what is run to answer it, and the columns of its rows."""
 
-    name: str  # of the verb and of the report's section
-    question: str  # one sentence, in Markdown, which is the help of the verb, too
+    name: str
+    """Of the verb and of the report's section."""
+    question: str
+    """One sentence, in Markdown, which is the help of the verb, too."""
     columns: tuple[Column, ...]
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are
     under `<key>_interval`."""
@@ -49,7 +51,8 @@ class Experiment:
     their defaults and their words under `Args` in its docstring. An int whose default is 0 may be
     0, any other is at least 1. A parameter `layout` is given by position. Times depend on the
     machine; all other values on the options alone."""
-    note: str = ""  # how the columns are to be read, in Markdown
+    note: str = ""
+    """How the columns are to be read, in Markdown."""
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)
@@ -116,19 +119,19 @@ class Experiment:
         """All rows of `each_row`."""
         return list(self.each_row(**chosen))
 
-    def table(self, rows: Sequence[Row]) -> Table:
+    def table(self, rows: Sequence[Row]) -> ReportTable:
         """The rows of the default method stand out; below them are those that the paper prints."""
         ours = [
             {**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows
         ]
         printed = [] if self.printed is None else self.printed(rows)
-        return Table(self.columns, [*ours, *printed])
+        return ReportTable(self.columns, [*ours, *printed])
 
-    def words(self) -> list[Block]:
+    def words(self) -> list[ReportBlock]:
         """Blocks of heading and question, which stand before the results."""
         return [f"## {self.name.capitalize()}", self.question]
 
-    def results(self, rows: Sequence[Row]) -> list[Block]:
+    def results(self, rows: Sequence[Row]) -> list[ReportBlock]:
         """Blocks of the table of rows and of the note on how to read it."""
         return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
 

@@ -32,11 +32,13 @@ from finlab.physics.objective import Name
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a
 subsample."""
-NEEDS = {"ipopt": "casadi"}  # packages without which a method cannot run
+NEEDS = {"ipopt": "casadi"}
+"""Packages without which a method cannot run."""
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end
 every method long before."""
-KNOWN = ("targets", "layout", "sigma", "previous")  # parameters that a function may have
+KNOWN = ("targets", "layout", "sigma", "previous")
+"""Parameters that a function may have."""
 TOLERANCE = 1e-6
 """By how much a command may leave its limits, as a share of what they span and of one of its
 unit."""
@@ -102,9 +104,9 @@ def load_method_spec(
     if ":" in name:
         kind = own_method(name)
         return MethodSpec(kind.name, methods.MethodChoice(kind, kind.settings_class()))
-    spec = MethodSpec(
-        name, methods.choose_method(name, checkpoint if name in methods.LEARNED else None)
-    )
+    if not methods.method_class(name).needs_networks:
+        checkpoint = None
+    spec = MethodSpec(name, methods.choose_method(name, checkpoint))
     return spec if objective is None else spec.with_settings(objective=objective)
 
 

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 import finlab
 from finlab.errors import DataError
-from finlab.research.evaluation.document import Block, Row, to_markdown
+from finlab.research.evaluation.document import ReportBlock, Row, to_markdown
 from finlab.research.evaluation.experiment import (
     EXPERIMENTS,
     check_names,
@@ -53,7 +53,7 @@ def make_report(
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
     start = time.process_time()
     rows = dict[str, list[Row]]()
-    blocks = list[Block]()
+    blocks = list[ReportBlock]()
     commit = _commit()
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += "" if "all" in names else f" --sections {','.join(chosen)}"

@@ -17,17 +17,20 @@ from finlab.arrays import AnyArray, Array
 from finlab.physics import plant_of
 from finlab.physics.objective import command_effort
 from finlab.research.evaluation.method_specs import MethodSpec
-from finlab.research.evaluation.splits import Case
+from finlab.research.evaluation.splits import SplitCase
 from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
 
-Columns = dict[str, AnyArray]  # arrays of N entries by name
-LEVEL = 0.994426  # share of a normal variable within sqrt(2) times 1.96 standard deviations
+Columns = dict[str, AnyArray]
+"""Arrays of N entries by name."""
+LEVEL = 0.994426
+"""Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
 REPLICATES = 2000
-Interval = tuple[float, float]  # its low and its high end
+Interval = tuple[float, float]
+"""Its low and its high end."""
 
 
 def run_method(
-    method: MethodSpec, case: Case, *, number: int = 0, seed: int = 0, first: int | None = None
+    method: MethodSpec, case: SplitCase, *, number: int = 0, seed: int = 0, first: int | None = None
 ) -> Columns:
     """The columns of `score` of a method's answers to a case, whose targets, or only the first so
     many, are solved together; `number` is that of the layout in its split."""
@@ -37,7 +40,7 @@ def run_method(
 
 
 def score(
-    case: Case, targets: Array, command: Array, solve_ms: Array, *, number: int = 0
+    case: SplitCase, targets: Array, command: Array, solve_ms: Array, *, number: int = 0
 ) -> Columns:
     """Scores of answers (N, n, 3), which took `solve_ms` (N,), to targets (N, 6) of a case, whose
     wrench the plant computes: arrays (N,) `layout`, its number in its split; `fins`, how many it
@@ -56,7 +59,7 @@ def score(
     }
 
 
-def sigma_of(case: Case) -> Array:
+def sigma_of(case: SplitCase) -> Array:
     """What the errors of a case are divided by (6,) [N, N m]: its own standard deviation of
     wrenches, or that of the paper's data set."""
     return paper_sigma() if case.sigma is None else case.sigma

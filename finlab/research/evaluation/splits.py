@@ -17,6 +17,7 @@ from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, TableLaw, make_law, write_table
 from finlab.research.random_layouts import (
     TRAINING_BOX,
+    ActuatorMaker,
     random_azimuth,
     random_fin_model,
     random_layout,
@@ -25,27 +26,30 @@ from finlab.research.random_layouts import (
     random_thruster,
     random_tilt,
 )
-from finlab.research.random_layouts import Draw as ActuatorDraw
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training
 box."""
-OOD_FINS = (6, 8)  # least and most fins in split `ood-fins`
-MANY_FINS = (9, 12)  # least and most fins in split `many-fins`
+OOD_FINS = (6, 8)
+"""Least and most fins in split `ood-fins`."""
+MANY_FINS = (9, 12)
+"""Least and most fins in split `many-fins`."""
 NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as
 parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis
 [m]."""
-DOMAIN = 0x7E57  # leads the seed of every test case; training seeds begin otherwise
+DOMAIN = 0x7E57
+"""Leads the seed of every test case; training seeds begin otherwise."""
 OWN_SIGMA = (
     *("fins", "fins-mixed", "tables"),
     *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
 )
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than
 those of training: errors there are relative to what the robot can do."""
-N_SIGMA = 4096  # uniform commands from which such a robot's yardstick is computed
+N_SIGMA = 4096
+"""Uniform commands from which such a robot's yardstick is computed."""
 LEAST_SIGMA = 0.05
 """Least deviation on an axis, as a share of the largest one among the forces, or among the
 torques."""
@@ -53,16 +57,20 @@ torques."""
 GRID = (8, 9, 12)
 """Amplitudes, frequencies and zero directions of a table; the first two range over the fin's
 limits, the last over the circle."""
-NOISE = 0.03  # standard deviation of each component of a force, as a share of it
+NOISE = 0.03
+"""Standard deviation of each component of a force, as a share of it."""
 
 
-class Case(NamedTuple):
+class SplitCase(NamedTuple):
     """One layout with targets that its healthy fins can deliver, and what errors on it are divided
     by."""
 
-    layout: Layout  # all fins, lost ones included
-    targets: Array  # desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins
-    lost: tuple[str, ...]  # names of the fins that do not work
+    layout: Layout
+    """All fins, lost ones included."""
+    targets: Array
+    """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
+    lost: tuple[str, ...]
+    """Names of the fins that do not work."""
     sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
@@ -72,7 +80,7 @@ class Case(NamedTuple):
         return self.layout.without(self.lost)
 
 
-def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
+def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[SplitCase]:
     """The test cases of a split, one of `SPLITS`: layouts, and targets for each of them.
 
     Layout k and its first targets depend on the split, the seed and k alone, so that a small run is
@@ -90,7 +98,7 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
     return [make_case(name, n_targets, seed, k) for k in range(n_layouts)]
 
 
-def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
+def make_case(split: str, n_targets: int, seed: int, k: int) -> SplitCase:
     """Case k of `make_split`."""
     entropy = (DOMAIN, SPLITS[split][0], seed, k)
     layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
@@ -98,7 +106,7 @@ def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     plant = Plant(layout.without(lost))
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
     own = own_sigma(plant, np.random.default_rng(sigma_seed)) if split in OWN_SIGMA else None
-    return Case(layout, targets, lost, own)
+    return SplitCase(layout, targets, lost, own)
 
 
 def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
@@ -187,7 +195,7 @@ def _table_folder() -> "TemporaryDirectory[str]":
     return TemporaryDirectory(prefix="finlab-tables-")
 
 
-def _robots(*kinds: ActuatorDraw, count: tuple[int, int], each: bool = False) -> Draw:
+def _robots(*kinds: ActuatorMaker, count: tuple[int, int], each: bool = False) -> Draw:
     """Robots of random actuators of some kinds; options of `random_robot`."""
     return lambda rng, name: (random_robot(rng, name, count, kinds, each), ())
 

@@ -28,11 +28,12 @@ from finlab.whole_file import write_whole
 
 WIDTH = 64
 """Of the hidden layers."""
-FAR = 1e-4
+MESSAGE_MIN = 1e-4
 """Size of a message's vectors, as a share of the yardstick, below which it is left out."""
-HELD_OUT = 0.1
+HELD_OUT_SHARE = 0.1
 """Share of the robots by which the networks are told how far to trust them."""
 WEIGHTS_FILE = "interaction.safetensors"
+"""File of the networks in the folder of a training."""
 
 
 def recipe(steps: int = 1800, batch: int = 512, minutes: float | None = None) -> LoopSettings:
@@ -56,19 +57,18 @@ class Rows(NamedTuple):
         first = self.starts[samples]
         count = self.starts[samples + 1] - self.starts[samples]
         owner = torch.repeat_interleave(torch.arange(len(samples)), count)
-        place = torch.arange(len(owner)) - torch.repeat_interleave(
-            torch.cumsum(count, 0) - count, count
-        )
-        rows = torch.repeat_interleave(first, count) + place
+        before = torch.cumsum(count, 0) - count
+        number = torch.arange(len(owner)) - torch.repeat_interleave(before, count)
+        rows = torch.repeat_interleave(first, count) + number
         return self.features[rows], self.vectors[rows], owner
 
 
-class DataSet(NamedTuple):
+class InteractionSamples(NamedTuple):
     """Samples of many robots."""
 
     rows: dict[str, Rows]
     """Of `pair` and `hull`."""
-    left: Tensor
+    residual: Tensor
     """What the laws leave of the wrenches (N, 6), on the yardsticks."""
     size: Tensor
     """Root mean squares (N, 6) of the wrenches of their robots, on the yardsticks."""
@@ -76,19 +76,20 @@ class DataSet(NamedTuple):
     """The robot (N,) of each sample."""
 
 
-def data_set(samples: Sequence[Samples]) -> DataSet:
+def data_set(samples: Sequence[Samples]) -> InteractionSamples:
     """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots,
     or none with a jet."""
     parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
-    left = []
-    size = []
-    robot = []
-    for k, one in enumerate(samples):
-        force, missed, scale = left_by_laws(one)
-        left.append(missed)
-        size.append(np.broadcast_to(np.sqrt((one.wrench**2).mean(axis=0)) / scale, missed.shape))
-        robot.append(np.full(len(missed), k))
-        geometry = jet_geometry_of(one.layout)
+    residuals = []
+    sizes = []
+    robots = []
+    for k, of_robot in enumerate(samples):
+        force, residual, scale = left_by_laws(of_robot)
+        residuals.append(residual)
+        size = np.sqrt((of_robot.wrench**2).mean(axis=0)) / scale
+        sizes.append(np.broadcast_to(size, residual.shape))
+        robots.append(np.full(len(residual), k))
+        geometry = jet_geometry_of(of_robot.layout)
         for name, made in messages_of(geometry, force, scale).items():
             parts[name].append(made)
     if len(samples) < 10 or not sum(len(part[0]) for part in parts["pair"]):
@@ -100,8 +101,12 @@ def data_set(samples: Sequence[Samples]) -> DataSet:
         features, vectors, counts = (np.concatenate(each) for each in zip(*several, strict=True))
         starts = torch.from_numpy(np.concatenate([[0], np.cumsum(counts)]))
         rows[name] = Rows(_tensor(features), _tensor(vectors), starts)
-    remains, sizes = (_tensor(np.concatenate(part)) for part in (left, size))
-    return DataSet(rows, remains, sizes, torch.from_numpy(np.concatenate(robot)))
+    return InteractionSamples(
+        rows=rows,
+        residual=_tensor(np.concatenate(residuals)),
+        size=_tensor(np.concatenate(sizes)),
+        robot=torch.from_numpy(np.concatenate(robots)),
+    )
 
 
 def messages_of(
@@ -119,7 +124,7 @@ def messages_of(
     for name, (packed, arms) in rows.items():
         features, vectors = unpacked(name, packed)
         wrenches = np.einsum("kpvb,pbw->kpvw", vectors, arms)
-        counts = np.abs(wrenches).max(axis=(2, 3), initial=0.0) > FAR
+        counts = np.abs(wrenches).max(axis=(2, 3), initial=0.0) > MESSAGE_MIN
         result[name] = (
             features[counts].astype(np.float32),
             wrenches[counts].astype(np.float32),
@@ -139,18 +144,19 @@ def train(
     root mean square error on robots that were held out, on the yardstick."""
     data = data_set(samples)
     robots = torch.from_numpy(np.random.default_rng(seed).permutation(len(samples)))
-    held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT * len(samples)))])
+    held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT_SHARE * len(samples)))])
     known = torch.nonzero(~held)[:, 0]
     unknown = torch.nonzero(held)[:, 0]
     weights = {name: value.requires_grad_() for name, value in first_weights(seed).items()}
-    identity = {"recipe": str(settings), "seed": seed, "samples": len(data.left)}
+    identity = {"recipe": str(settings), "seed": seed, "samples": len(data.residual)}
 
     def terms_of(step: int) -> dict[str, Tensor]:
         total = torch.zeros(())
         for member in range(MEMBERS):
-            draw = seeded_generator(seed, step * MEMBERS + member, torch.device("cpu"))
-            some = known[torch.randint(len(known), (settings.batch_size,), generator=draw)]
-            total = total + ((told(weights, member, data, some) - data.left[some]) ** 2).mean()
+            generator = seeded_generator(seed, step * MEMBERS + member, torch.device("cpu"))
+            batch = known[torch.randint(len(known), (settings.batch_size,), generator=generator)]
+            error = predicted(weights, member, data, batch) - data.residual[batch]
+            total = total + (error**2).mean()
         return {"loss": total / MEMBERS}
 
     def save(shipped: State, made: dict[str, Any]) -> None:
@@ -163,8 +169,8 @@ def train(
         run.run(terms_of, save)
     with torch.no_grad():
         shipped = {name: torch.from_numpy(np.asarray(value)) for name, value in run.shipped.items()}
-        each = torch.stack([told(shipped, member, data, unknown) for member in range(MEMBERS)])
-    error = (each.mean(dim=0) - data.left[unknown]).double().numpy()
+        each = torch.stack([predicted(shipped, member, data, unknown) for member in range(MEMBERS)])
+    error = (each.mean(dim=0) - data.residual[unknown]).double().numpy()
     trust, _ = parts_of_error(
         error, each.std(dim=0).double().numpy(), data.size[unknown].double().numpy()
     )
@@ -172,7 +178,9 @@ def train(
     return float(np.sqrt((error**2).sum(axis=1).mean()))
 
 
-def told(weights: dict[str, Any], member: int, data: DataSet, samples: Tensor) -> Tensor:
+def predicted(
+    weights: dict[str, Any], member: int, data: InteractionSamples, samples: Tensor
+) -> Tensor:
     """What one network says that the laws leave of the wrenches of some samples (B, 6)."""
     result = torch.zeros((len(samples), 6))
     for name in FORMS:

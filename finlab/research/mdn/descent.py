@@ -28,9 +28,8 @@ from finlab.research.mdn import effort_fins
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
-HALF_STEPS = 5
-"""Steps after which forces go only half the way: those that are not settled by then jump to and
-fro."""
+FULL_STEPS = 5
+"""Steps after which steps are halved: forces that have not converged by then oscillate."""
 
 
 class EffortProblem(NamedTuple):
@@ -68,29 +67,40 @@ def effort_problem(
 def descend(
     problem: EffortProblem, target: Array, force: AnyArray, steps: int
 ) -> Iterator[effort_fins.Projected]:
-    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give
-    of them, then what each of `steps` problems makes of it."""
+    """Follows forces to cheap ones that give a target.
+
+    Each step solves B M B^T l = w - B shift for the multipliers l, and takes y = shift + M B^T l.
+
+    Args:
+        problem: the robot.
+        target: normalized targets w (R, 6).
+        force: to begin with (R, n), complex [N].
+        steps: number of quadratic problems.
+
+    Yields:
+        What fins can give of the forces, at first and after each step.
+    """
     fins = problem.fins
-    reached = fins.project(force)
-    yield reached
-    cut = np.ones(force.shape)
-    before = reached.force
+    projected = fins.project(force)
+    yield projected
+    mobility_factor = np.ones(force.shape)
+    before = projected.force
     for step in range(steps):
-        shift, a, b = _respond(problem, reached, cut)
-        missing = target - wrench(problem, shift)
-        matrix = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
-        matrix[:, ::7] += effort_fins.LEAST  # the diagonal
-        multiplier = solve(matrix.reshape(-1, 6, 6), missing[..., None])[..., 0]
-        pull = (multiplier @ problem.effectiveness.T).view(complex)
-        answer = shift + a * pull + b * pull.conj()
-        if step >= HALF_STEPS:
-            answer = 0.5 * (answer + before)
-        before = answer
-        reached = fins.project(answer)
-        cut = np.minimum(
-            cut * fins.largest * reached.gauge / np.maximum(reached.wanted, effort_fins.LEAST), 1.0
-        )
-        yield reached
+        shift, a, b = _respond(problem, projected, mobility_factor)
+        residual = target - wrench(problem, shift)
+        BMB = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
+        BMB[:, ::7] += effort_fins.LEAST  # the diagonal
+        multiplier = solve(BMB.reshape(-1, 6, 6), residual[..., None])[..., 0]
+        p = (multiplier @ problem.effectiveness.T).view(complex)  # B^T l
+        y = shift + a * p + b * p.conj()
+        if step >= FULL_STEPS:
+            y = 0.5 * (y + before)
+        before = y
+        projected = fins.project(y)
+        largest = fins.largest * projected.gauge
+        unbounded = np.maximum(projected.wanted, effort_fins.LEAST)
+        mobility_factor = np.minimum(mobility_factor * largest / unbounded, 1.0)
+        yield projected
 
 
 def wrench(problem: EffortProblem, force: AnyArray) -> Array:
@@ -98,10 +108,10 @@ def wrench(problem: EffortProblem, force: AnyArray) -> Array:
     return np.ascontiguousarray(force).view(float) @ problem.effectiveness
 
 
-def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Array, Array]:
-    """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
-    row = problem.fins.lookup(reached.size / reached.gauge)
-    direction = reached.direction
+def realize(problem: EffortProblem, projected: effort_fins.Projected) -> tuple[Array, Array]:
+    """Returns commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
+    row = problem.fins.lookup(projected.size / projected.gauge)
+    direction = projected.direction
     turn = wrapped(direction - problem.fins.deflection(direction))
     command = np.stack(
         [row[..., effort_fins.AMPLITUDE], row[..., effort_fins.FREQUENCY], turn], axis=-1
@@ -111,22 +121,36 @@ def realize(problem: EffortProblem, reached: effort_fins.Projected) -> tuple[Arr
 
 
 def _respond(
-    problem: EffortProblem, reached: effort_fins.Projected, cut: Array
+    problem: EffortProblem, projected: effort_fins.Projected, mobility_factor: Array
 ) -> tuple[AnyArray, Array, AnyArray]:
-    """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by
-    the quadratics that touch the efforts at the present forces."""
-    row = problem.fins.lookup(reached.size / reached.gauge)
-    direction = reached.direction
-    # The same command gives less in weaker directions, so a newton more costs more there.
-    across = np.exp(row[..., effort_fins.MOBILITY]) * reached.gauge**2 * cut
+    """How fins respond to p = B_i^T l by the quadratics that touch the efforts at the present
+    forces.
+
+    Args:
+        problem: the robot.
+        projected: the present forces.
+        mobility_factor: by which M is cut (R, n).
+
+    Returns:
+        shift, a and b of y = shift + a p + b conj(p), each (R, n).
+    """
+    row = problem.fins.lookup(projected.size / projected.gauge)
+    direction = projected.direction
+    # M across and along the force. The same command gives less in weaker directions, so a newton
+    # more costs more there.
+    mobility = np.exp(row[..., effort_fins.MOBILITY])
+    across = mobility * projected.gauge**2 * mobility_factor
     softness = 1.0 / row[..., effort_fins.STIFFNESS]
     along = across * softness
     turn = wrapped(direction - problem.fins.deflection(direction))
-    size = np.maximum(reached.size, effort_fins.LEAST)
+    size = np.maximum(projected.size, effort_fins.LEAST)
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
-    pull = 2.0 * problem.direction_cost * across / size
-    held = 1.0 / (1.0 + pull / size)
-    across = across * held
-    unit = reached.unit
-    shift = (reached.size * (1.0 - softness) * cut - 1j * pull * turn * held) * unit
-    return shift, 0.5 * (along + across), 0.5 * (along - across) * unit * unit
+    restoring = 2.0 * problem.direction_cost * across / size
+    turn_factor = 1.0 / (1.0 + restoring / size)
+    across = across * turn_factor
+    unit = projected.unit
+    shift_along = projected.size * (1.0 - softness) * mobility_factor
+    shift = (shift_along - 1j * restoring * turn * turn_factor) * unit
+    a = 0.5 * (along + across)
+    b = 0.5 * (along - across) * unit * unit
+    return shift, a, b

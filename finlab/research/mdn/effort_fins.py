@@ -24,23 +24,24 @@ from finlab.layout import Fin, Layout
 from finlab.physics.objective import effort_of_shares, effort_scale
 
 LEVELS = 49
-"""Sizes of force."""
-AMPLITUDES, FREQUENCIES = 193, 49
-"""Commands at which a law is asked."""
-FLAT = 1e-5
+"""Sizes of force in a table."""
+AMPLITUDES = 193
+"""Amplitudes at which a law is evaluated."""
+FREQUENCIES = 49
+"""Frequencies at which it is."""
+FORCE_TOLERANCE = 1e-5
 """By how much, as a share, a force may fall short of a size and still count as giving it."""
-CONVEX = 0.3
+STIFFNESS_MIN = 0.3
 """Least elasticity of the marginal effort that is followed; below it, and where effort is concave,
 a steeper quadratic is touched, which never overshoots."""
-STIFFEST = 10.0
+STIFFNESS_MAX = 10.0
 """Elasticities above this one count as this one."""
-MARGINAL = 1e-3
+MARGINAL_EFFORT_MIN = 1e-3
 """Least marginal effort, as a share of the mean one."""
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
-PLACES = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
-"""From the angle of a force in the table to its place among the levels, of which none is past the
-last."""
+LEVELS_PER_ANGLE = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
+"""From the angle of a force in a table to its level, of which none is past the last."""
 
 AMPLITUDE, FREQUENCY, EFFORT, MOBILITY, STIFFNESS = range(5)
 """Columns of a table: amplitude [rad], frequency [Hz], effort, logarithm of the mobility T /
@@ -99,13 +100,13 @@ class EffortFins:
         even = all(each.gauge is None for each in compiled)
         gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]
         return cls(
-            np.array([size[0] for size, _ in costs]),
-            np.array([size[-1] for size, _ in costs]),
-            np.stack([table for _, table in costs]),
-            None if even else np.array(gauges),
-            np.array([np.broadcast_to(each.deflection, POINTS) for each in compiled]),
-            np.array([each.middle for each in compiled]),
-            np.array([each.half for each in compiled]),
+            smallest=np.array([size[0] for size, _ in costs]),
+            largest=np.array([size[-1] for size, _ in costs]),
+            table=np.stack([table for _, table in costs]),
+            gauge=None if even else np.array(gauges),
+            lean=np.array([np.broadcast_to(each.deflection, POINTS) for each in compiled]),
+            middle=np.array([each.middle for each in compiled]),
+            half=np.array([each.half for each in compiled]),
         )
 
     @cached_property
@@ -126,7 +127,7 @@ class EffortFins:
         return np.stack([rows, np.diff(rows, axis=0, append=rows[-1:])], axis=1)
 
     @cached_property
-    def _first(self) -> NDArray[np.intp]:
+    def _first_rows(self) -> NDArray[np.intp]:
         """Where each fin's rows begin (n,)."""
         return np.arange(len(self.largest)) * LEVELS
 
@@ -149,19 +150,20 @@ class EffortFins:
     def lookup(self, size: Array) -> Array:
         """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest
         directions."""
-        place = size - self.smallest
-        place /= self.largest - self.smallest + LEAST
-        np.minimum(np.maximum(place, 0.0, out=place), 1.0, out=place)
-        np.sqrt(np.sqrt(place, out=place), out=place)
-        np.arcsin(place, out=place)
-        place *= PLACES
-        level = place.astype(np.intp)
-        place -= level
-        level += self._first
-        step = self._steps.take(level, axis=0)
-        taken: Array = step[..., 1, :] * place[..., None]
-        taken += step[..., 0, :]
-        return taken
+        # Levels are even in the angle psi with share = sin^4 psi; in place, since it is a hot loop.
+        position = size - self.smallest
+        position /= self.largest - self.smallest + LEAST
+        np.minimum(np.maximum(position, 0.0, out=position), 1.0, out=position)
+        np.sqrt(np.sqrt(position, out=position), out=position)
+        np.arcsin(position, out=position)
+        position *= LEVELS_PER_ANGLE
+        level = position.astype(np.intp)
+        position -= level
+        level += self._first_rows
+        steps = self._steps.take(level, axis=0)
+        rows: Array = steps[..., 1, :] * position[..., None]
+        rows += steps[..., 0, :]
+        return rows
 
     def project(self, force: AnyArray) -> Projected:
         """What the fins can do nearest to forces (R, n), complex."""
@@ -169,10 +171,10 @@ class EffortFins:
         unit = force / wanted
         if not self.turns_fully:
             offset = np.angle(unit * np.exp(-1j * self.middle))
-            held = np.clip(offset, -self.half, self.half)
-            excess = np.abs(offset - held)
+            in_arc = np.clip(offset, -self.half, self.half)
+            excess = np.abs(offset - in_arc)
             wanted = np.where(excess < 0.5 * np.pi, wanted * np.cos(excess), 0.0)
-            unit = np.exp(1j * (self.middle + held))
+            unit = np.exp(1j * (self.middle + in_arc))
         gauge = np.ones(len(self.half)) if self.gauge is None else self.gauges(np.angle(unit))
         size = np.minimum(np.maximum(wanted, self.smallest * gauge), self.largest * gauge)
         return Projected(unit, size, wanted, gauge)
@@ -194,18 +196,17 @@ def _costs(fin: Fin, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
     size = force[0, 0] + (force.max() - force[0, 0]) * share
     # Between grid points the square root of the force is nearly a straight line.
     rising = np.sqrt(np.maximum.accumulate(force, axis=1))
-    rising += (
-        np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)
-    )  # where it stays, the first
-    taken = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
-    effort = effort_of_shares(amplitude[:, None] / scale[0], taken / scale[1], 0.0)
-    effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FLAT) + 1e-15] = np.inf
+    # Where it is flat, the first frequency counts.
+    rising += np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)
+    # Of each amplitude the frequency that gives each size (AMPLITUDES, LEVELS), and its effort.
+    needed = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
+    effort = effort_of_shares(amplitude[:, None] / scale[0], needed / scale[1], 0.0)
+    effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FORCE_TOLERANCE) + 1e-15] = np.inf
     best = effort.argmin(axis=0)
     level = np.arange(LEVELS)
     slopes = _slopes(effort[best, level], size)
-    return size, np.stack(
-        [amplitude[best], taken[best, level], effort[best, level], *slopes], axis=-1
-    )
+    columns = [amplitude[best], needed[best, level], effort[best, level], *slopes]
+    return size, np.stack(columns, axis=-1)
 
 
 def _slopes(effort: Array, size: Array) -> tuple[Array, Array]:
@@ -214,9 +215,9 @@ def _slopes(effort: Array, size: Array) -> tuple[Array, Array]:
     if span <= 1e-12:
         return np.log(np.maximum(size, 1e-300)), np.ones(LEVELS)
     level = np.arange(LEVELS)
-    least = MARGINAL * max(float(np.ptp(effort)), 1e-12) / span
+    least = MARGINAL_EFFORT_MIN * max(float(np.ptp(effort)), 1e-12) / span
     marginal = np.maximum(np.gradient(effort, size + level * 1e-15 * size[-1]), least)
     height = np.log(np.maximum(size, 1e-9 * size[-1])) + level * 1e-9
     stiffness = np.gradient(np.log(marginal), height)
-    stiffness = np.where(stiffness > CONVEX, np.minimum(stiffness, STIFFEST), 1.0)
+    stiffness = np.where(stiffness > STIFFNESS_MIN, np.minimum(stiffness, STIFFNESS_MAX), 1.0)
     return np.log(np.maximum(size, 1e-5 * size[-1]) / marginal), stiffness

@@ -43,7 +43,7 @@ from finlab.research.mdn.network import NODE_SIZE, ForceMixture
 
 SHARES = (0.02, 0.1, 0.3, 0.6)
 """Shares of the largest force at which a fin's effort is looked up."""
-AROUND = 16
+N_DIRECTIONS = 16
 """Directions in which it is looked up."""
 RIDGE = 1e-6
 """Regularization of C C^T, relative to its trace."""
@@ -64,7 +64,7 @@ class RobotView(NamedTuple):
     """F (n,) [N]."""
 
 
-class Seen(NamedTuple):
+class RobotFeatures(NamedTuple):
     """N targets on one robot as the network sees them."""
 
     nodes: AnyArray
@@ -84,19 +84,17 @@ def robot_view(problem: EffortProblem) -> RobotView:
     fins = problem.fins
     n = len(problem.fins.maximum)
     full = fins.half >= np.pi
-    evenly = np.linspace(-1.0, 1.0, AROUND + 1)[
-        :-1, None
-    ]  # around a circle, no direction counts twice
-    direction = fins.middle + fins.half * np.where(
-        full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None]
-    )
+    # Around a circle, no direction counts twice.
+    on_circle = np.linspace(-1.0, 1.0, N_DIRECTIONS + 1)[:-1, None]
+    on_arc = np.linspace(-1.0, 1.0, N_DIRECTIONS)[:, None]
+    direction = fins.middle + fins.half * np.where(full, on_circle, on_arc)
     gauge = np.broadcast_to(fins.gauges(direction), direction.shape)
     unit = np.exp(1j * direction)
     top = np.maximum(fins.table[:, -1, EFFORT], 1e-12)
     shares = [fins.lookup(share * fins.largest)[..., EFFORT] / top for share in SHARES]
     reach = gauge * fins.largest / fins.maximum
     idle = problem.idle_direction + fins.deflection(problem.idle_direction)
-    counted = np.arange(n)
+    index = np.arange(n)
     static = [
         np.log(top / top.mean()),
         *shares,
@@ -108,65 +106,77 @@ def robot_view(problem: EffortProblem) -> RobotView:
         *_parts(np.where(full, 0.0, np.exp(1j * fins.middle))),
         problem.direction_cost / top,
         *_parts(np.where(problem.direction_cost > 0.0, np.exp(1j * idle), 0.0)),
-        2.0 * np.mod(0.5 + counted * GOLDEN, 1.0) - 1.0,
-        2.0 * np.mod(0.25 + counted * GOLDEN**2, 1.0) - 1.0,
+        2.0 * np.mod(0.5 + index * GOLDEN, 1.0) - 1.0,
+        2.0 * np.mod(0.25 + index * GOLDEN**2, 1.0) - 1.0,
         np.full(n, n / 12.0),
     ]
-    scaled = problem.effectiveness * np.repeat(fins.maximum, 2)[:, None]
-    gram = scaled.T @ scaled
+    # C^T, and P = C^T (C C^T)^-1 C with its 2 x 2 blocks as x -> a x + b conj(x).
+    C_T = problem.effectiveness * np.repeat(fins.maximum, 2)[:, None]  # (2n, 6)
+    gram = C_T.T @ C_T
     gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(6)
-    solver = np.linalg.solve(gram, scaled.T)
-    across = (scaled @ solver).reshape(n, 2, n, 2)
-    xx = across[:, 0, :, 0]
-    xz = across[:, 0, :, 1]
-    zx = across[:, 1, :, 0]
-    zz = across[:, 1, :, 1]
+    solver = np.linalg.solve(gram, C_T.T)
+    P = (C_T @ solver).reshape(n, 2, n, 2)
+    xx = P[:, 0, :, 0]
+    xz = P[:, 0, :, 1]
+    zx = P[:, 1, :, 0]
+    zz = P[:, 1, :, 1]
     a = 0.5 * ((xx + zz) + 1j * (zx - xz))
     b = 0.5 * ((xx - zz) + 1j * (zx + xz))
     return RobotView(
-        np.stack(static, axis=-1),
-        np.stack([a, b]),
-        solver[:, 0::2] + 1j * solver[:, 1::2],
-        fins.maximum,
+        static=np.stack(static, axis=-1),
+        blocks=np.stack([a, b]),
+        solver=solver[:, 0::2] + 1j * solver[:, 1::2],
+        largest=fins.maximum,
     )
 
 
-def see(view: RobotView, target: AnyArray) -> Seen:
-    """What the network sees of normalized targets (N, 6) on one robot."""
-    wanted = target @ view.solver
-    many = (
-        np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks)
+def features_of(view: RobotView, target: AnyArray) -> RobotFeatures:
+    """Returns the features of normalized targets (N, 6) on one robot."""
+    p = target @ view.solver
+    a, b = view.blocks
+    rows = len(target)
+    return features(
+        p,
+        np.broadcast_to(view.static, (rows, *view.static.shape)),
+        np.broadcast_to(a, (rows, *a.shape)),
+        np.broadcast_to(b, (rows, *b.shape)),
     )
-    return features(wanted, *many)
 
 
-def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
-    """The features of N targets p (N, n), complex, each on a robot of its own: `static` (N, n, 20)
-    as in `RobotView`, and both parts of the blocks of P (N, n, n), complex."""
-    rows, n = wanted.shape
-    size = np.abs(wanted)
-    frame = np.where(size > 1e-9, wanted, 1.0)
+def features(p: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> RobotFeatures:
+    """Returns the features of N targets, each on a robot of its own.
+
+    Args:
+        p: least shares that give each target (N, n), complex.
+        static: node features as in `RobotView` (N, n, 20).
+        a: first part of the blocks of P (N, n, n), complex.
+        b: second part (N, n, n), complex.
+    """
+    rows, n = p.shape
+    size = np.abs(p)
+    frame = np.where(size > 1e-9, p, 1.0)
     frame = frame / np.abs(frame)
-    back = frame.conj()
+    to_frame = frame.conj()
     nodes = np.empty((rows, n, NODE_SIZE), dtype=np.float32)
     nodes[..., 0] = np.sqrt(size)
     nodes[..., 1] = size / (1.0 + size)
     nodes[..., 2] = np.log(size + 1e-3) / 7.0
     nodes[..., 6:] = static
-    for place in VECTORS:
-        turned = (static[..., place] + 1j * static[..., place + 1]) * back
-        nodes[..., 6 + place] = turned.real
-        nodes[..., 7 + place] = turned.imag
-    a = a * back[:, :, None] * frame[:, None]
-    b = b * back[:, :, None] * back[:, None]
+    for column in VECTORS:
+        in_frame = (static[..., column] + 1j * static[..., column + 1]) * to_frame
+        nodes[..., 6 + column] = in_frame.real
+        nodes[..., 7 + column] = in_frame.imag
+    a = a * to_frame[:, :, None] * frame[:, None]
+    b = b * to_frame[:, :, None] * to_frame[:, None]
     pairs = np.stack([a.real, a.imag, b.real, b.imag], axis=-1).astype(np.float32)
-    own = np.arange(n)
-    nodes[..., 3] = pairs[:, own, own, 0]
-    nodes[..., 4:6] = pairs[:, own, own, 2:]
-    return Seen(nodes, pairs, frame)
+    fin = np.arange(n)
+    nodes[..., 3] = pairs[:, fin, fin, 0]
+    nodes[..., 4:6] = pairs[:, fin, fin, 2:]
+    return RobotFeatures(nodes, pairs, frame)
 
 
 def _parts(values: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """Real and imaginary parts of complex numbers."""
     return values.real, values.imag
 
 
@@ -182,21 +192,29 @@ class Proposal(NamedTuple):
 def propose(
     mixture: ForceMixture,
     view: RobotView,
-    seen: Seen,
+    features: RobotFeatures,
     n_candidates: int,
     temperature: float,
     seed: int,
 ) -> Proposal:
-    """K proposals for N targets on one robot, from the network's mixture for what it sees of them.
+    """Returns K proposals for each of N targets on one robot, from the network's mixture.
 
     The components' means come first, by falling weight. Where K exceeds their number M, the rest
     are drawn by the components' weights, with variances times the temperature.
+
+    Args:
+        mixture: of all targets.
+        view: the robot.
+        features: what the network was given, for the frames of the fins.
+        n_candidates: K.
+        temperature: factor of the variances of what is drawn.
+        seed: of what is drawn.
     """
     weight, mean, std = mixture.complex_parts()
     rows, m, n = mean.shape
-    place = np.arange(rows)[:, None]
+    row = np.arange(rows)[:, None]
     component = np.argsort(-weight, axis=1)[:, :n_candidates]
-    root = mean[place, component]
+    root = mean[row, component]
     if n_candidates > m:
         rng = np.random.default_rng(seed)
         more = n_candidates - m
@@ -204,10 +222,11 @@ def propose(
         parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
         cumulative = weight.cumsum(1)
         others = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
-        spread = math.sqrt(temperature) * std[place, others]
-        drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
-        component, root = (np.hstack(both) for both in ((component, others), (root, drawn)))
-    return Proposal(shares(root) * (seen.frame * view.largest)[:, None], component)
+        spread = math.sqrt(temperature) * std[row, others]
+        drawn = mean[row, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
+        component = np.hstack([component, others])
+        root = np.hstack([root, drawn])
+    return Proposal(shares(root) * (features.frame * view.largest)[:, None], component)
 
 
 def shares(root: AnyArray) -> AnyArray:

@@ -17,8 +17,10 @@ from finlab.research.networks import layers
 from finlab.research.networks.layers import Weights
 from finlab.research.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
 
-NODE_SIZE, PAIR_SIZE = 26, 4
-"""Numbers of features of a fin and of a pair of fins."""
+NODE_SIZE = 26
+"""Number of features of a fin."""
+PAIR_SIZE = 4
+"""Number of features of a pair of fins."""
 LOG_STD = (-2.0, 2.0)
 """Middle and half width of the range of the log standard deviations."""
 
@@ -54,14 +56,14 @@ class ForceNetworkConfig:
         shapes |= linear_shapes("head", width, 3 * m) | linear_shapes("weight", width, m)
         for i in range(self.layers):
             name = f"layers.{i}"
-            look = f"layers.{i}.look"
-            shapes |= {f"{look}.attention": (self.heads, width // self.heads)}
+            attention = f"layers.{i}.look"
+            shapes |= {f"{attention}.attention": (self.heads, width // self.heads)}
             shapes |= {
-                f"{look}.target.weight": (width, width),
-                f"{look}.pair.weight": (width, PAIR_SIZE),
+                f"{attention}.target.weight": (width, width),
+                f"{attention}.pair.weight": (width, PAIR_SIZE),
             }
-            shapes |= linear_shapes(f"{look}.source", width, width)
-            shapes |= linear_shapes(f"{look}.out", width, width)
+            shapes |= linear_shapes(f"{attention}.source", width, width)
+            shapes |= linear_shapes(f"{attention}.out", width, width)
             shapes |= linear_shapes(f"{name}.up", width, self.feedforward)
             shapes |= linear_shapes(f"{name}.down", self.feedforward, width)
             shapes |= norm_shapes(f"{name}.norm1", width) | norm_shapes(f"{name}.norm2", width)
@@ -71,11 +73,11 @@ class ForceNetworkConfig:
         """The mixture for fins (B, n, 26) and pairs (B, n, n, 4), with these weights."""
         hidden = layers.linear(w, "enter", nodes)
         for name in (f"layers.{i}" for i in range(self.layers)):
-            seen = layers.layer_norm(w, f"{name}.norm1", hidden)
-            seen = layers.graph_attention(w, f"{name}.look", seen, pairs)
-            hidden = hidden + layers.linear(w, f"{name}.look.out", seen)
-            seen = layers.layer_norm(w, f"{name}.norm2", hidden)
-            hidden = hidden + layers.feed_forward(w, f"{name}.up", f"{name}.down", seen)
+            normed = layers.layer_norm(w, f"{name}.norm1", hidden)
+            attended = layers.graph_attention(w, f"{name}.look", normed, pairs)
+            hidden = hidden + layers.linear(w, f"{name}.look.out", attended)
+            normed = layers.layer_norm(w, f"{name}.norm2", hidden)
+            hidden = hidden + layers.feed_forward(w, f"{name}.up", f"{name}.down", normed)
         hidden = layers.layer_norm(w, "norm", hidden)
         raw = layers.linear(w, "head", hidden)
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 3)
@@ -97,15 +99,17 @@ class ForceMixture(NamedTuple):
     """Of both components (B, n, M)."""
 
     def log_prob(self, way: Values, temper: float = 1.0) -> Values:
-        """Log likelihoods (B, L) of L ways (B, L, n, 2) to deliver each target.
+        """Returns log likelihoods (B, L): T log sum_m exp(log p_m / T).
 
-        With `temper` T above one components share what they stand for: T log sum exp(log p / T).
+        Args:
+            way: L forces for each target, as roots of shares (B, L, n, 2).
+            temper: T; above 1 several components may stand for one force.
         """
-        apart = way[:, :, :, None] - self.mean[:, None]  # (B, L, n, M, 2)
-        scaled = (apart * apart).sum(-1) * library_of(way).exp(-2.0 * self.log_std)[:, None]
+        deviation = way[:, :, :, None] - self.mean[:, None]  # (B, L, n, M, 2)
+        scaled = (deviation * deviation).sum(-1) * library_of(way).exp(-2.0 * self.log_std)[:, None]
         normal = -0.5 * scaled - (2.0 * self.log_std + math.log(2.0 * math.pi))[:, None]
-        each = layers.log_softmax(self.logits)[:, None] + normal.sum(2)
-        return temper * layers.log_sum_exp(each / temper)
+        by_component = layers.log_softmax(self.logits)[:, None] + normal.sum(2)  # (B, L, M)
+        return temper * layers.log_sum_exp(by_component / temper)
 
     def complex_parts(self) -> tuple[AnyArray, AnyArray, AnyArray]:
         """Weights (B, M), means (B, M, n) as complex numbers, and standard deviations (B, M, n); of

@@ -19,7 +19,12 @@ from finlab.errors import CheckpointError, DataError, LayoutError
 from finlab.files import parse_json
 from finlab.files.guarded import decoded, read_file
 from finlab.layout import FinModelSpec
-from finlab.research.networks.trained import Normalization, State, TrainedWeights, check_arrays
+from finlab.research.networks.trained import (
+    State,
+    TrainedWeights,
+    WrenchNormalization,
+    check_arrays,
+)
 from finlab.whole_file import make_folder, write_whole
 
 FORMAT = "finlab-checkpoint"
@@ -63,7 +68,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
             raise ValueError(f"{min(known)!r:.80} is not expected")
         return TrainedWeights(
             name=name,
-            normalization=Normalization.parse(config["normalization"]),
+            normalization=WrenchNormalization.parse(config["normalization"]),
             network_sizes=config["network"] and dict(config["network"]),
             network=_part("network", tensors),
             surrogate_sizes=config["surrogate"] and dict(config["surrogate"]),
@@ -112,12 +117,12 @@ def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
     return read_checkpoint(folder)
 
 
-def read_normalization(folder: Path) -> Normalization:
+def read_normalization(folder: Path) -> WrenchNormalization:
     """Only the wrench statistics of a checkpoint, for methods that need no network. Raises
     CheckpointError: as `parse_checkpoint`."""
     config = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,))
     try:
-        return Normalization.parse(config.get("normalization"))
+        return WrenchNormalization.parse(config.get("normalization"))
     except ValueError as error:
         raise CheckpointError(
             f"{folder}/{CONFIG_FILE}: normalization is missing or malformed"

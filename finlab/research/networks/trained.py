@@ -24,7 +24,7 @@ LARGEST_WEIGHT = 1e6
 NaN."""
 
 
-class Normalization(NamedTuple):
+class WrenchNormalization(NamedTuple):
     """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
 
     mean: Array
@@ -32,7 +32,7 @@ class Normalization(NamedTuple):
     """Per-axis standard deviation; `sigma` in the error measure."""
 
     @classmethod
-    def parse(cls, values: Any) -> Normalization:
+    def parse(cls, values: Any) -> WrenchNormalization:
         """The statistics under the keys `mean` and `std`. Raises ValueError: there are no such six
         numbers."""
         try:
@@ -86,7 +86,7 @@ class TrainedWeights:
     normalize by."""
 
     name: str
-    normalization: Normalization
+    normalization: WrenchNormalization
     network_sizes: Mapping[str, Any] | None = None
     """Sizes of the network and what it is fed, as in the file; None where only a surrogate was
     trained."""

@@ -22,10 +22,19 @@ RAW_SIZE = 10
 
 
 def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
-    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3),
-    scaled."""
+    """Returns the node features x_i (..., n, 10) of fins, scaled.
+
+    Args:
+        position: (..., n, 3) [m].
+        mounting_angle: (..., n) [rad].
+        lower: lower limits of commands (..., n, 3) [rad, Hz, rad].
+        upper: upper ones (..., n, 3).
+    """
     xp = library_of(position)
-    limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
+    limits = []
+    for i, scale in enumerate(SCALES):
+        limits.append(lower[..., i] / scale)
+        limits.append(upper[..., i] / scale)
     angle = mounting_angle[..., None] / math.pi
     return xp.concatenate([position / POSITION_SCALE, angle, xp.stack(limits, axis=-1)], axis=-1)
 
@@ -67,12 +76,12 @@ class NetworkConfig:
             shapes |= linear_shapes(f"{name}.source", width, width)
             shapes |= linear_shapes(f"{name}.target", width, width)
         for name in self._named("transformer.layers", self.transformer_layers):
-            look = f"{name}.self_attn"
+            attention = f"{name}.self_attn"
             shapes |= {
-                f"{look}.in_proj_weight": (3 * width, width),
-                f"{look}.in_proj_bias": (3 * width,),
+                f"{attention}.in_proj_weight": (3 * width, width),
+                f"{attention}.in_proj_bias": (3 * width,),
             }
-            shapes |= linear_shapes(f"{look}.out_proj", width, width)
+            shapes |= linear_shapes(f"{attention}.out_proj", width, width)
             shapes |= linear_shapes(f"{name}.linear1", width, self.feedforward)
             shapes |= linear_shapes(f"{name}.linear2", self.feedforward, width)
             shapes |= norm_shapes(f"{name}.norm1", width) | norm_shapes(f"{name}.norm2", width)
@@ -86,10 +95,15 @@ class NetworkConfig:
     def __call__(
         self, w: Weights, x: Values, target: Values, mask: Values | None = None
     ) -> "Mixture":
-        """The mixtures that a network with these weights gives for node features (B, n, 10) and
-        normalized, centred targets (B, 6). Where robots have fewer than n fins, `mask` (B, n) is
-        the padding mask, True where there is one: GATv2's edges keep to these, and so do the keys
-        of self-attention."""
+        """Returns the mixtures that a network gives.
+
+        Args:
+            w: its weights.
+            x: node features (B, n, 10).
+            target: normalized, centred targets (B, 6).
+            mask: the padding mask (B, n) where robots have fewer than n fins, True where there is
+                one: GATv2's edges keep to these, and so do the keys of self-attention.
+        """
         return self.mixture(w, self.encoded(w, x, target, mask))
 
     def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:
@@ -102,19 +116,20 @@ class NetworkConfig:
         wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
         hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
         for name in self._named("transformer.layers", self.transformer_layers):
-            seen = layers.layer_norm(w, f"{name}.norm1", hidden)
-            hidden = hidden + layers.self_attention(w, f"{name}.self_attn", self.heads, seen, mask)
-            seen = layers.layer_norm(w, f"{name}.norm2", hidden)
-            hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", seen)
+            attention = f"{name}.self_attn"
+            normed = layers.layer_norm(w, f"{name}.norm1", hidden)
+            hidden = hidden + layers.self_attention(w, attention, self.heads, normed, mask)
+            normed = layers.layer_norm(w, f"{name}.norm2", hidden)
+            hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", normed)
         return layers.layer_norm(w, "norm", hidden)
 
     def mixture(self, w: Weights, hidden: Values) -> "Mixture":
         """The mixtures of fins with features (B, n, width)."""
-        raw, logits = (layers.linear(w, end, hidden) for end in ("head", "weight"))
+        logits = layers.linear(w, "weight", hidden)
+        raw = layers.linear(w, "head", hidden)
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
-        return Mixture(
-            logits, raw[..., :3], LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:])
-        )
+        log_std = LOG_STD_BOUND * library_of(raw).tanh(0.5 * raw[..., 3:])
+        return Mixture(logits, raw[..., :3], log_std)
 
     @staticmethod
     def _named(kind: str, count: int) -> list[str]:
@@ -146,14 +161,17 @@ class Mixture(NamedTuple):
         return layers.log_sum_exp(log_weight + log_normal)
 
     def sample(self, uniform: Values, normal: Values, temperature: float = 1.0) -> Values:
-        """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the
-        power 1/T, the Gaussians keep their deviations (Eq. 3).
+        """Returns commands (B, K, n, 3): the weights are raised to the power 1/T, the Gaussians
+        keep their deviations (Eq. 3).
 
-        Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the
-        rest.
+        Args:
+            uniform: numbers in [0, 1) that choose components (B, n, K).
+            normal: standard normal numbers (B, n, K, 3).
+            temperature: T, from 0.
         """
         weight = layers.softmax(layers.log_softmax(self.logits) * (1.0 / max(temperature, 1e-6)))
         cumulative = weight.cumsum(-1)[..., None, :-1]
         choice = (uniform[..., None] > cumulative).sum(-1)[..., None]
-        mean, log_std = (layers.take(part, choice, 2) for part in (self.mean, self.log_std))
+        mean = layers.take(self.mean, choice, 2)
+        log_std = layers.take(self.log_std, choice, 2)
         return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
-from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
+from finlab.allocation.settings import MAX_CANDIDATES, Settings, choice, number, switch
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
@@ -32,7 +32,7 @@ class PaperSettings(Settings):
     turn on beyond the seam.
     """
 
-    n_candidates: int = number(64, 1, MOST_CANDIDATES, "candidates K drawn from the mixture")
+    n_candidates: int = number(64, 1, MAX_CANDIDATES, "candidates K drawn from the mixture")
     temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
     gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
     n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")
@@ -79,14 +79,13 @@ class Paper(LearnedMethod, LeastErrorMethod):
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
-        self._effectiveness = (self.surrogate.effectiveness / weights.normalization.std).reshape(
-            -1, 6
-        )
+        effectiveness = self.surrogate.effectiveness / weights.normalization.std
+        self._effectiveness = effectiveness.reshape(-1, 6)
         """Normalized wrench (3n, 6) per newton of each fin's force along the axes of the body."""
         self.limits = layout.lower.astype(np.float32), layout.upper.astype(np.float32)
         """Lower and upper limits (n, 3), in single precision as all else here."""
-        place = layout.position, layout.mounting_angle, layout.lower, layout.upper
-        self._features = raw_features(*place).astype(np.float32)
+        features = raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)
+        self._features = features.astype(np.float32)
         self._effort = EffortMeter(layout.upper)
         self._commands = CommandProblem.of(self.plant, weights.normalization.std)
         """Brings directions to the nearer end of an arc, as angles."""
@@ -104,14 +103,14 @@ class Paper(LearnedMethod, LeastErrorMethod):
 
     def _solve_chunk(self, targets: AnyArray, seed: int) -> Solution:
         settings = self.settings
-        sampled, wanted = self._sampled(targets, seed)
+        sampled, normalized = self._sampled(targets, seed)
         chosen = sampled[:, : settings.n_refined]
         if not settings.mean_only:
-            chosen = self._refine(chosen, wanted)
-        if (
-            not self._by_likelihood
-        ):  # without physics in the ranking the likeliest candidate stays the answer
-            chosen = _take(chosen, np.argsort(self._score(chosen, wanted), axis=1, kind="stable"))
+            chosen = self._refine(chosen, normalized)
+        # Without physics in the ranking the likeliest candidate stays the answer.
+        if not self._by_likelihood:
+            order = np.argsort(self._score(chosen, normalized), axis=1, kind="stable")
+            chosen = _take(chosen, order)
         return Solution(
             self._inside(chosen[:, 0]),
             wrench=self.surrogate.wrench(chosen[:, 0]).astype(np.float64),
@@ -124,18 +123,25 @@ class Paper(LearnedMethod, LeastErrorMethod):
         return self.settings.ranking == "nll" and not self.settings.mean_only
 
     def _sampled(self, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
-        """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N,
-        6)."""
+        """Samples the mixture (Eq. 3) and ranks what comes.
+
+        Args:
+            targets: wrenches (N, 6) [N, N m].
+            seed: of the samples.
+
+        Returns:
+            Raw candidates (N, K, n, 3), best first, and normalized targets (N, 6) for `_score`.
+        """
         std = self.normalization.std
-        wanted = ((targets - self.surrogate.bias) / std).astype(np.float32)
+        normalized = ((targets - self.surrogate.bias) / std).astype(np.float32)
         mixture = self._predict((targets - self.normalization.mean) / std)
-        drawn = to_command(self._draw(mixture, seed), *self.limits)
-        sampled = self._commands.feasible(drawn)
+        sampled = to_command(self._draw(mixture, seed), *self.limits)
+        sampled = self._commands.feasible(sampled)
         if self._by_likelihood:
             score = -mixture.log_prob(to_normalized(sampled, *self.limits)).sum(-1)
         else:
-            score = self._score(sampled, wanted)
-        return _take(sampled, np.argsort(score, axis=1, kind="stable")), wanted
+            score = self._score(sampled, normalized)
+        return _take(sampled, np.argsort(score, axis=1, kind="stable")), normalized
 
     def _predict(self, centred: AnyArray) -> Mixture:
         """The network's mixture for normalized, centred targets (N, 6)."""
@@ -155,25 +161,29 @@ class Paper(LearnedMethod, LeastErrorMethod):
         normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
         return np.asarray(mixture.sample(uniform, normal, self.settings.temperature))
 
-    def _score(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
-        """J = J_norm (Eq. 8) + gamma J_en (Eq. 9) (N, K) of commands (N, K, n, 3), by the
-        surrogate."""
+    def _score(self, command: AnyArray, target: AnyArray) -> AnyArray:
+        """Returns J = J_norm (Eq. 8) + gamma J_en (Eq. 9), by the surrogate, (N, K).
+
+        Args:
+            command: (N, K, n, 3).
+            target: normalized targets (N, 6).
+        """
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
         force = self.surrogate.force(flat).reshape(rows, k, -1)
-        error = force @ self._effectiveness - wanted[:, None]
+        error = force @ self._effectiveness - target[:, None]
         effort = self._effort(flat).reshape(rows, k)
         return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * effort)
 
-    def _refine(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
+    def _refine(self, command: AnyArray, target: AnyArray) -> AnyArray:
         """Refined commands (N, K, n, 3), inside the limits."""
         if self.settings.refinement == "none":
             return command
         shape = command.shape
         steps = self.settings.n_steps
         flat = command.reshape(-1, *shape[2:])
-        target = np.repeat(wanted, shape[1], axis=0)
-        parts = [self._adam(flat[k], target[k], steps) for k in blocks_of(len(flat))]
+        targets = np.repeat(target, shape[1], axis=0)
+        parts = [self._adam(flat[k], targets[k], steps) for k in blocks_of(len(flat))]
         return np.concatenate(parts).reshape(shape)
 
     def _adam(self, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
@@ -185,9 +195,10 @@ class Paper(LearnedMethod, LeastErrorMethod):
         lower, upper = self.limits
         x = to_normalized(command, lower, upper)
         half = np.float32(0.5) * (upper - lower)
-        mean = np.zeros_like(x)
-        square = np.zeros_like(x)
-        keep_mean, keep_square = ADAM_DECAY
+        # Kingma and Ba's m, v, beta_1 and beta_2.
+        m = np.zeros_like(x)
+        v = np.zeros_like(x)
+        beta_1, beta_2 = ADAM_DECAY
         best = x.copy()
         least = np.full(len(x), np.inf, np.float32)
         for step in range(steps + 1):
@@ -198,14 +209,14 @@ class Paper(LearnedMethod, LeastErrorMethod):
             if step == steps:
                 break
             gradient = half * jacobian
-            mean += (1.0 - keep_mean) * (gradient - mean)
-            square += (1.0 - keep_square) * (gradient * gradient - square)
-            rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
-            size = np.sqrt(square / np.float32(1.0 - keep_square ** (step + 1)))
-            x -= np.float32(rate) * mean / (size + np.float32(1e-8))
+            m += (1.0 - beta_1) * (gradient - m)
+            v += (1.0 - beta_2) * (gradient * gradient - v)
+            rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - beta_1 ** (step + 1))
+            v_hat_root = np.sqrt(v / np.float32(1.0 - beta_2 ** (step + 1)))
+            x -= np.float32(rate) * m / (v_hat_root + np.float32(1e-8))
             # A full turn is two units wide.
-            turned = np.remainder(x[..., 2] + np.float32(1.0), np.float32(2.0)) - np.float32(1.0)
-            x[..., 2] = np.where(self.plant.full_turn, turned, x[..., 2])
+            wrapped = np.remainder(x[..., 2] + np.float32(1.0), np.float32(2.0)) - np.float32(1.0)
+            x[..., 2] = np.where(self.plant.full_turn, wrapped, x[..., 2])
             np.clip(x, -1.0, 1.0, out=x)
         return np.asarray(to_command(best, lower, upper))
 

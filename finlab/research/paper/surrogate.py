@@ -21,6 +21,7 @@ from finlab.research.paper.network import RAW_SIZE, raw_features
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
 DESCRIPTOR = 64
+"""Size of the descriptor of a whole layout."""
 BLOCK = 64
 """Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a
 megabyte."""
@@ -76,15 +77,18 @@ class LayoutSurrogate:
         damaged one."""
         self.config = SurrogateConfig.of(weights)
         self._w = layers.single_precision(weights.surrogate)
-        place = layout.position, layout.mounting_angle, layout.lower, layout.upper
-        features = raw_features(*place).astype(np.float32)
-        self._fins = features @ self._w["net.0.weight"][:, :RAW_SIZE].T + self._w["net.0.bias"]
-        self._lower, self._upper = (
-            limit.astype(np.float32) for limit in (layout.lower, layout.upper)
+        features = raw_features(
+            layout.position, layout.mounting_angle, layout.lower, layout.upper
+        ).astype(np.float32)
+        # The first layer's part that does not depend on the command, (n, hidden).
+        self._first_of_fins = (
+            features @ self._w["net.0.weight"][:, :RAW_SIZE].T + self._w["net.0.bias"]
         )
+        self._lower = layout.lower.astype(np.float32)
+        self._upper = layout.upper.astype(np.float32)
         self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
-        described = np.tanh(layers.linear(self._w, "descriptor.0", features)).mean(0)
-        scale, self.bias = np.split(layers.linear(self._w, "affine", described), 2)
+        descriptor = np.tanh(layers.linear(self._w, "descriptor.0", features)).mean(0)
+        scale, self.bias = np.split(layers.linear(self._w, "affine", descriptor), 2)
         """Wrench (6,) [N, N m] of fins that give no force."""
         effectiveness = force_effectiveness(layout.position, np.zeros_like(layout.mounting_angle))
         self.effectiveness: AnyArray = effectiveness * (1.0 + scale)
@@ -97,8 +101,15 @@ class LayoutSurrogate:
     def force_and_pullback(
         self, command: AnyArray
     ) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
-        """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the
-        commands, (R, n, 3) each."""
+        """Returns forces and their vector-Jacobian product.
+
+        Args:
+            command: (R, n, 3).
+
+        Returns:
+            Forces (R, n, 3) [N], and a function from a number's derivatives by them (R, n, 3) to
+            those by the commands (R, n, 3).
+        """
         jacobian: list[AnyArray] = []
         force = self._forward(command, jacobian)
 
@@ -126,7 +137,7 @@ class LayoutSurrogate:
         x = trained.to_normalized(command.astype(np.float32), self._lower, self._upper)
         z = (
             layers.linear({"command.weight": self._w["net.0.weight"][:, RAW_SIZE:]}, "command", x)
-            + self._fins
+            + self._first_of_fins
         )
         for name in self.config.layers()[1:]:
             gate = 0.5 * np.tanh(0.5 * z) + 0.5  # 1 / (1 + exp(-z)), which never overflows

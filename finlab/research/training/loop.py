@@ -5,6 +5,8 @@ All that a step depends on is a function of its number: the batch, the noise, th
 that was killed and goes on from its last state ends with the weights of one that was not.
 """
 
+from __future__ import annotations
+
 import csv
 import io
 import math
@@ -13,27 +15,36 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from finlab.display.figures import figure_bytes, panels
 from finlab.errors import DataError
 from finlab.research.networks.trained import Shapes, State
 from finlab.research.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
-LOG_FILE = (
-    "log.csv"  # one row per logged step: step, samples, seconds, learning rate and every loss term
-)
-STATE_FILE = "resume.pt"  # what a run goes on from
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOG_FILE = "log.csv"
+"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
+STATE_FILE = "resume.pt"
+"""What a run goes on from."""
 CURVES_FILE = "curves.png"
-APART = ("step", "samples", "seconds")  # columns of the log that are no curves
-LOG_EVERY = 20  # steps after which a row is logged
-SAVE_EVERY_S = 15.0  # seconds after which state, log and checkpoint are written
-CLIP = 1.0  # longest gradient
+"""A picture of the log."""
+NO_CURVES = ("step", "samples", "seconds")
+"""Columns of the log that are no curves."""
+LOG_EVERY = 20
+"""Steps after which a row is logged."""
+SAVE_EVERY_S = 15.0
+"""Time after which state, log and checkpoint are written [s]."""
+GRADIENT_MAX = 1.0
+"""Norm to which a longer gradient is clipped."""
 
 Terms = Callable[[int], dict[str, Tensor]]
 """Loss terms of a step of training, `loss` among them, as means over the batch."""
@@ -47,8 +58,10 @@ class LoopSettings:
     steps: int
     batch_size: int
     learning_rate: float
-    warmup: int = 0  # steps over which it rises linearly, if there are as many
-    cosine: bool = True  # whether it falls to a hundredth along a cosine, or stays
+    warmup: int = 0
+    """Steps over which it rises linearly, if there are as many."""
+    cosine: bool = True
+    """Whether it falls to a hundredth along a cosine, or stays."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None
@@ -197,7 +210,7 @@ class Training:
         terms = terms_of(step)
         terms["loss"].backward()
         self.place.average(self.weights.values())
-        nn.utils.clip_grad_norm_(self.weights.values(), CLIP)
+        nn.utils.clip_grad_norm_(self.weights.values(), GRADIENT_MAX)
         self.optimizer.step()
         # The average starts short and grows, so that early weights are soon forgotten.
         decay = min(self.settings.ema, (1 + step) / (10 + step))
@@ -255,24 +268,23 @@ def _table(rows: list[dict[str, float]]) -> str:
 
 def curves(rows: list[dict[str, float]]) -> bytes | None:
     """A PNG of a log's columns over its steps; None without matplotlib, and of an empty log."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        return None
-    names = [name for name in rows[0] if name not in APART] if rows else []
+    names = [name for name in rows[0] if name not in NO_CURVES] if rows else []
     if not names:
         return None
-    figure = Figure(figsize=(8.0, 2.0 * len(names)), layout="constrained")
+    try:
+        return figure_bytes(lambda: _curves_picture(rows, names), "png")
+    except ImportError:
+        return None
+
+
+def _curves_picture(rows: list[dict[str, float]], names: list[str]) -> Figure:
+    """A panel for each of the named columns."""
+    figure, axes = panels((8.0, 2.0 * len(names)), len(names), sharex=True)
     steps = [row["step"] for row in rows]
-    for axes, name in zip(
-        figure.subplots(len(names), sharex=True, squeeze=False)[:, 0], names, strict=True
-    ):
+    for panel, name in zip(axes[:, 0], names, strict=True):
         values = [row[name] for row in rows]
-        axes.plot(steps, values, linewidth=1.0)
-        axes.set_yscale("log" if min(values) > 0.0 else "symlog")
-        axes.set_ylabel(name.replace("_", " "))
-        axes.grid(alpha=0.3)
-    axes.set_xlabel("step")
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    return content.getvalue()
+        panel.plot(steps, values, linewidth=1.0)
+        panel.set_yscale("log" if min(values) > 0.0 else "symlog")
+        panel.set_ylabel(name.replace("_", " "))
+    axes[-1, 0].set_xlabel("step")
+    return figure

@@ -20,7 +20,7 @@ from finlab.layout import Layout
 from finlab.layout.effectiveness import layout_effectiveness
 
 NO_WRENCH = np.zeros(6)
-"""Of fins that have given nothing."""
+"""Wrench of actuators that have given nothing [N, N m]."""
 
 
 class Measurement(NamedTuple):
@@ -136,21 +136,34 @@ class Completion:
     def __init__(
         self, layout: Layout, lost: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
     ) -> None:
-        """Prepares for the actuators that work, at least one, the wanted and the free axes, by
-        their names. Raises LayoutError: an unknown name, or no actuator is left."""
+        """Prepares for the actuators that work.
+
+        Args:
+            layout: the robot.
+            lost: names of actuators that do not work.
+            axes: names of the axes that are commanded, c below.
+            free: names of those that may be anything; the others are held at 0, h below.
+
+        Raises:
+            LayoutError: an unknown name, or no actuator is left.
+        """
+        # Forces y with B_c y = w_c exactly, of which B_h y = 0 comes nearest: with the
+        # pseudoinverse B_c^+ and a basis N of the null space of B_c,
+        #     y = (B_c^+ - N (B_h N)^+ B_h B_c^+) w_c.
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
-        planar = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
+        B = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
         chosen = mask_of(axes)
-        wanted = planar[chosen]
-        held = planar[~mask_of((*axes, *free))]
-        left, values, right = np.linalg.svd(wanted)
-        rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
-        self.controllable = rank == len(wanted)
+        B_c = B[chosen]
+        B_h = B[~mask_of((*axes, *free))]
+        U, singular_values, V_T = np.linalg.svd(B_c)
+        largest = max(float(singular_values[0]), 1e-9)
+        rank = int((singular_values > RANK_TOLERANCE * largest).sum())
+        self.controllable = rank == len(B_c)
         """Whether the working actuators can give any small combination of the wanted axes."""
-        inverse = right[:rank].T @ np.diag(1.0 / values[:rank]) @ left[:, :rank].T
-        spare = right[rank:].T
-        give = inverse - spare @ np.linalg.pinv(held @ spare, rcond=RANK_TOLERANCE) @ held @ inverse
-        scaled = planar @ give * scale[chosen] / scale[:, None]
+        B_c_inverse = V_T[:rank].T @ np.diag(1.0 / singular_values[:rank]) @ U[:, :rank].T
+        N = V_T[rank:].T
+        correction = N @ np.linalg.pinv(B_h @ N, rcond=RANK_TOLERANCE) @ B_h @ B_c_inverse
+        scaled = B @ (B_c_inverse - correction) * scale[chosen] / scale[:, None]
         self.matrix = np.zeros((6, 6))
         """Wrench with the wanted axes filled in, to the whole wrench (6, 6)."""
         self.matrix[:, chosen] = np.where(np.abs(scaled) < 1e-9, 0.0, scaled)
@@ -164,15 +177,21 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
     """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins
     that push sideways hardly push ahead: with them sway is headed against. A robot that lifts by
     rudders alone dives by its pitch, and one that does not lift at all is steered in the plane."""
-    lifts = ("Fx", "Fz", "Tz")
+    surge_heave_yaw = ("Fx", "Fz", "Tz")
     rudders = layout.by_flow
-    driven = layout.without(rudders) if len(rudders) < layout.n else layout
-    candidates: list[tuple[Layout, tuple[str, ...]]]
-    candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]
+    without_rudders = layout.without(rudders) if len(rudders) < layout.n else layout
+    candidates: list[tuple[Layout, tuple[str, ...]]] = []
     if not layout.n_fins:
-        candidates = [(driven, ("Fx", "Fy", "Fz", "Tz")), *candidates, (layout, ("Fx", "Fy", "Tz"))]
-    able = (axes for robot, axes in candidates if Completion(robot, (), axes).controllable)
-    return next(able, lifts)
+        candidates.append((without_rudders, ("Fx", "Fy", "Fz", "Tz")))
+    candidates.append((without_rudders, surge_heave_yaw))
+    if rudders:
+        candidates.append((layout, ("Fx", "Ty", "Tz")))
+    if not layout.n_fins:
+        candidates.append((layout, ("Fx", "Fy", "Tz")))
+    for robot, axes in candidates:
+        if Completion(robot, (), axes).controllable:
+            return axes
+    return surge_heave_yaw
 
 
 def steers(layout: Layout, lost: Sequence[str] = ()) -> bool:
@@ -182,8 +201,20 @@ def steers(layout: Layout, lost: Sequence[str] = ()) -> bool:
 
 
 def steerable_loss(layout: Layout, count: int, lost: Sequence[str] = ()) -> tuple[str, ...] | None:
-    """The first actuators, so many besides the lost ones, without which a robot can still be
-    steered."""
+    """Returns the names of the first actuators without which a robot can still be steered.
+
+    Args:
+        layout: the robot.
+        count: how many besides the lost ones.
+        lost: names of actuators that do not work anyway.
+
+    Returns:
+        Their names; None where there are no such.
+    """
     working = [name for name in layout.names if name not in lost]
-    ways = combinations(working, count) if count < len(working) else ()
-    return next((way for way in ways if not count or steers(layout, (*lost, *way))), None)
+    if count >= len(working):
+        return None
+    for more_lost in combinations(working, count):
+        if count == 0 or steers(layout, (*lost, *more_lost)):
+            return more_lost
+    return None

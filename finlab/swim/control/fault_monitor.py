@@ -1,5 +1,9 @@
 """Notices fins that are torn, lost or stuck, from how the robot moves, and takes repaired ones
-back."""
+back.
+
+`Hypotheses` says how likely each fault is; here is decided which of them to act on, and what the
+allocator is told.
+"""
 
 import math
 from typing import NamedTuple
@@ -19,21 +23,22 @@ from finlab.swim.control.probe import Probe
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
-OPPOSED_BELOW, OPPOSED_SURE = -0.3, 3.0
-"""A strength below which an actuator pushes the other way than the layout says, and standard
-deviations by which it lies below 0."""
+OPPOSED_BELOW = -0.3
+"""A strength below which an actuator pushes the other way than the layout says."""
+OPPOSED_DEVIATIONS = 3.0
+"""Standard deviations by which it then lies below 0, too."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
-HOLD_S = 0.2
+CONFIRM_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides
 nothing."""
-HOLD_EARLY_S = 0.5
+CONFIRM_EARLY_S = 0.5
 """The same before current and trim are learned, when only what pushes the other way is acted on
 [s]."""
-ASTRAY = 1e4
+MODEL_MISFIT_MAX = 1e4
 """A misfit of the motion, a variance over that of the settings, from which on nothing can be told
 of it."""
-COARSE = 0.05
+STRENGTH_STEP = 0.05
 """The allocator is given strengths in steps of this size, so that its problem is the same for many
 ticks."""
 
@@ -73,19 +78,23 @@ class FaultMonitor:
         self.layout = layout
         self.settings = MonitorSettings() if settings is None else settings
         self._model = MotionModel(layout, self.period_s)
-        self._beliefs = Hypotheses(layout.n, self._model.inertia, self.settings)
+        self._hypotheses = Hypotheses(layout.n, self._model.inertia, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
         n = layout.n
-        self._torn, self._lost, self._told, self._back, self._coming_back = np.zeros(
-            (5, n), dtype=bool
-        )
+        self._is_torn = np.zeros(n, dtype=bool)
+        self._is_lost = np.zeros(n, dtype=bool)
+        self._is_announced = np.zeros(n, dtype=bool)  # lost by what was said, and left alone
+        self._is_opposed = np.zeros(n, dtype=bool)
+        self._is_returning = np.zeros(n, dtype=bool)  # from a probe to what is commanded
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
         self._suspect = 0
-        self._sure = 0
-        self._held = np.full(n, np.nan)
-        self._since = self._model.motion.direction.copy()
-        self._coarse = np.ones(n)
+        """The fin that is likeliest to have changed, index."""
+        self._n_certain = 0
+        """Ticks for which that has been all but certain."""
+        self._stuck_at = np.full(n, np.nan)
+        self._direction_at_event = self._model.motion.direction.copy()
+        self._reported_strength = np.ones(n)
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._velocity: Array | None = None
 
@@ -93,13 +102,13 @@ class FaultMonitor:
     def opposed(self) -> tuple[str, ...]:
         """Names of those that push the other way than the layout says; the allocator does without
         them until the layout is put right."""
-        return tuple(self.layout.names[k] for k in np.flatnonzero(self._back))
+        return tuple(self.layout.names[k] for k in np.flatnonzero(self._is_opposed))
 
     @property
     def tells(self) -> bool:
         """Whether losses would show: not where the robot moves far otherwise than its model
         says."""
-        return self._beliefs.misfit < ASTRAY
+        return self._hypotheses.misfit < MODEL_MISFIT_MAX
 
     def step(self, measurement: Measurement, command: Array | None) -> Diagnosis:
         """Takes what has been measured and says what is believed.
@@ -110,19 +119,19 @@ class FaultMonitor:
             command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None
                 before the first.
         """
-        beliefs = self._beliefs
+        hypotheses = self._hypotheses
         m = measurement
-        seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
-        last = self._velocity
+        measured = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
+        velocity_before = self._velocity
         self._velocity = m.velocity
-        if last is None or command is None:
-            beliefs.state[:8] = seen
+        if velocity_before is None or command is None:
+            hypotheses.state[:8] = measured
             return self.verdict()
-        other = self._other_direction(beliefs.feed(self.period_s))
-        step = self._model.step(beliefs.state, m.yaw, command, self._held, other)
-        beliefs.predict(step, self.period_s)
-        beliefs.update(seen, m.velocity is last)
-        self._judge(other)
+        other = self._other_direction(hypotheses.mix(self.period_s))
+        step = self._model.step(hypotheses.state, m.yaw, command, self._stuck_at, other)
+        hypotheses.predict(step, self.period_s)
+        hypotheses.update(measured, m.velocity is velocity_before)
+        self._decide(other)
         return self.verdict()
 
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
@@ -131,9 +140,9 @@ class FaultMonitor:
         A fin that is said to be lost is left alone until another state is said: no probe moves it.
         Raises LayoutError: there is no fin of that name."""
         fin = self.layout.index(name)
-        self._beliefs.believe(fin, strength)
+        self._hypotheses.believe(fin, strength)
         self._mark(fin, strength, stuck)
-        self._told[fin] = self._lost[fin]
+        self._is_announced[fin] = self._is_lost[fin]
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
@@ -142,11 +151,11 @@ class FaultMonitor:
         self.layout = layout
         self._model.adopt(layout)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
-        self._torn[:] = False
-        self._lost &= ~self._back
-        self._back[:] = False
-        for k in np.flatnonzero(~self._lost):
-            self._beliefs.believe(int(k), 1.0)
+        self._is_torn[:] = False
+        self._is_lost &= ~self._is_opposed
+        self._is_opposed[:] = False
+        for k in np.flatnonzero(~self._is_lost):
+            self._hypotheses.believe(int(k), 1.0)
 
     def probed(self, command: Array) -> Array:
         """The command (n, 3) with what keeps the fins known.
@@ -157,109 +166,135 @@ class FaultMonitor:
         no faster than the rates of the drives allow from what was returned last, as does the way
         back to what is commanded.
         """
-        lost = self._lost & ~self._told
+        lost = self._is_lost & ~self._is_announced
         direction = self._model.motion.direction
-        wanted = self._probe.added(command, lost, direction)
-        own = (np.isfinite(wanted[:, :1]) & ~(wanted == command)).any(axis=1) | self._coming_back
-        rests = np.isnan(self._sent[:, :1])
-        box = self._rates.box(np.where(rests, self._model.motion.command, self._sent))
-        result = np.where(own[:, None], box.clipped(wanted), wanted)
-        self._coming_back = (np.isfinite(result) & ~(result == command)).any(axis=1)
+        probed = self._probe.added(command, lost, direction)
+        is_probed = (np.isfinite(probed[:, :1]) & ~(probed == command)).any(axis=1)
+        is_limited = is_probed | self._is_returning
+        is_idle = np.isnan(self._sent[:, :1])
+        box = self._rates.box(np.where(is_idle, self._model.motion.command, self._sent))
+        result = np.where(is_limited[:, None], box.clip(probed), probed)
+        self._is_returning = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
         return result
 
     def verdict(self) -> Diagnosis:
         """What is believed now."""
-        beliefs = self._beliefs
-        strength = beliefs.strength.copy()
-        by_kind = beliefs.probability
-        probability = beliefs.changed
-        stuck = ~np.isnan(self._held)
+        hypotheses = self._hypotheses
+        strength = hypotheses.strength.copy()
+        by_kind = hypotheses.probability
+        probability = hypotheses.changed
+        stuck = ~np.isnan(self._stuck_at)
         damage = Damage()
-        broken = self._lost | self._torn | stuck
+        broken = self._is_lost | self._is_torn | stuck
         if True in broken.tolist():
-            # The last but one belief is a whole fin, the last one of a stuck fin that it turns
+            # The last but one hypothesis is a whole fin, the last one of a stuck fin that it turns
             # again.
             works = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
             probability = np.where(broken, 1.0 - works, probability)
             damage = self._damage(strength)
-        return Diagnosis(damage, probability, strength, beliefs.strength_std)
+        return Diagnosis(damage, probability, strength, hypotheses.strength_std)
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""
         names = self.layout.names
         parts = self.layout.actuators
-        far = np.abs(strength - self._coarse) > 0.75 * COARSE
-        steps = np.clip(np.round(strength / COARSE), 1, round(1 / COARSE)) * COARSE
-        self._coarse = np.where(far, steps, self._coarse)
-        torn = [k for k in np.flatnonzero(self._torn) if parts[k] not in self._tables]
-        stuck = np.flatnonzero(~np.isnan(self._held) & ~self._lost)
+        is_far = np.abs(strength - self._reported_strength) > 0.75 * STRENGTH_STEP
+        rounded = (
+            np.clip(np.round(strength / STRENGTH_STEP), 1, round(1 / STRENGTH_STEP)) * STRENGTH_STEP
+        )
+        self._reported_strength = np.where(is_far, rounded, self._reported_strength)
+        torn = [k for k in np.flatnonzero(self._is_torn) if parts[k] not in self._tables]
+        stuck = np.flatnonzero(~np.isnan(self._stuck_at) & ~self._is_lost)
         return Damage.known(
             self.layout,
-            [names[k] for k in np.flatnonzero(self._lost)],
-            {names[k]: float(self._coarse[k]) for k in torn},
-            {names[k]: float(self._held[k]) for k in stuck},
+            [names[k] for k in np.flatnonzero(self._is_lost)],
+            {names[k]: float(self._reported_strength[k]) for k in torn},
+            {names[k]: float(self._stuck_at[k]) for k in stuck},
         )
 
-    def _other_direction(self, fresh: Array) -> Array:
-        """Where actuators (n,) are by the beliefs that they stick: where they were when it may have
-        begun."""
-        turn = self._model.motion.direction - self._since
+    def _other_direction(self, new_share: Array) -> Array:
+        """Where actuators (n,) are by the hypotheses that they stick: where they were when it may
+        have begun.
+
+        Args:
+            new_share: how much of each hypothesis about a fin is new (n, m).
+        """
+        turn = self._model.motion.direction - self._direction_at_event
         turn -= TURN * np.round(turn / TURN) * self._model.motion.angles
-        self._since += fresh[:, -1] * turn
-        return np.where(np.isnan(self._held), self._since, np.nan)
+        self._direction_at_event += new_share[:, -1] * turn
+        return np.where(np.isnan(self._stuck_at), self._direction_at_event, np.nan)
 
-    def _judge(self, other: Array) -> None:
-        """Acts on what has become all but certain."""
-        beliefs = self._beliefs
-        strength = beliefs.strength
-        back = (
-            (strength < OPPOSED_BELOW)
-            & (strength < -OPPOSED_SURE * beliefs.strength_std)
-            & ~self._back
-        )
-        if back.any() and (self._lost | back).sum() < self.layout.n:
-            for each in np.flatnonzero(back):
-                self._mark(int(each), -1.0, math.nan)
-        if True in self._torn.tolist():
-            strength = beliefs.strength
-            gone = self._torn & (strength < LOST_BELOW)
-            if gone.any() and (self._lost | gone).sum() < self.layout.n:
-                self._lost |= gone
-                self._torn &= ~gone
-                for index in np.flatnonzero(gone):
-                    beliefs.believe(int(index), 0.0)
-            self._torn &= strength < WHOLE_ABOVE
-        if beliefs.doubt < self.settings.threshold:
-            self._sure = 0
+    def _decide(self, other: Array) -> None:
+        """Acts on what has become all but certain.
+
+        Args:
+            other: where actuators (n,) stick by the hypotheses that they do, see
+                `_other_direction`.
+        """
+        hypotheses = self._hypotheses
+        self._mark_opposed()
+        self._follow_torn()
+        if hypotheses.doubt < self.settings.threshold:
+            self._n_certain = 0
             return
-        by_kind = beliefs.probability
-        total = beliefs.changed if beliefs.settled else by_kind[:, OPPOSED]
-        fin = int(total.argmax())
-        sure = float(total[fin]) >= self.settings.threshold
-        self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
+        by_kind = hypotheses.probability
+        changed = hypotheses.changed if hypotheses.settled else by_kind[:, OPPOSED]
+        fin = int(changed.argmax())
+        if float(changed[fin]) < self.settings.threshold:
+            self._n_certain = 0
+        elif fin == self._suspect:
+            self._n_certain += 1
+        else:
+            self._n_certain = 1
         self._suspect = fin
-        if self._sure * self.period_s < (HOLD_S if beliefs.settled else HOLD_EARLY_S) - 1e-9:
+        confirm_s = CONFIRM_S if hypotheses.settled else CONFIRM_EARLY_S
+        if self._n_certain * self.period_s < confirm_s - 1e-9:
             return
         kind = int(by_kind[fin].argmax())
-        both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
-        if self._lost.sum() + 2 < self.layout.n and both.max() > by_kind[fin, kind]:
+        n_lost = self._is_lost.sum()
+        with_fin = (hypotheses.pairs == fin).any(axis=1)
+        both = np.where(with_fin, hypotheses.both, 0.0)
+        if n_lost + 2 < self.layout.n and both.max() > by_kind[fin, kind]:
             pair = int(both.argmax())
-            beliefs.adopt_both(pair)
-            for fin in beliefs.pairs[pair].tolist():
-                self._told[fin] = False
-                self._mark(fin, 0.0, math.nan)
+            hypotheses.adopt_both(pair)
+            for each in hypotheses.pairs[pair].tolist():
+                self._is_announced[each] = False
+                self._mark(each, 0.0, math.nan)
             return
-        turned = kind == len(LEVELS)
-        level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
-        if level < LOST_BELOW and self._lost.sum() == self.layout.n - 1:
+        has_turned = kind == len(LEVELS)
+        level = float(hypotheses.strength[fin]) if has_turned else LEVELS[kind]
+        if level < LOST_BELOW and n_lost == self.layout.n - 1:
             return  # the last one that works
-        beliefs.adopt(fin, kind)
-        self._told[fin] = False
-        self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
+        hypotheses.adopt(fin, kind)
+        self._is_announced[fin] = False
+        self._mark(fin, level, float(other[fin]) if has_turned else float(self._stuck_at[fin]))
+
+    def _mark_opposed(self) -> None:
+        """Takes actuators with a negative strength for ones that push the other way."""
+        strength = self._hypotheses.strength
+        is_certain = strength < -OPPOSED_DEVIATIONS * self._hypotheses.strength_std
+        opposed = (strength < OPPOSED_BELOW) & is_certain & ~self._is_opposed
+        if opposed.any() and (self._is_lost | opposed).sum() < self.layout.n:
+            for each in np.flatnonzero(opposed):
+                self._mark(int(each), -1.0, math.nan)
+
+    def _follow_torn(self) -> None:
+        """Takes torn fins for lost or whole, as their strength goes."""
+        if True not in self._is_torn.tolist():
+            return
+        strength = self._hypotheses.strength
+        gone = self._is_torn & (strength < LOST_BELOW)
+        if gone.any() and (self._is_lost | gone).sum() < self.layout.n:
+            self._is_lost |= gone
+            self._is_torn &= ~gone
+            for index in np.flatnonzero(gone):
+                self._hypotheses.believe(int(index), 0.0)
+        self._is_torn &= strength < WHOLE_ABOVE
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
-        self._lost[fin] = strength < LOST_BELOW
-        self._back[fin] = strength < OPPOSED_BELOW
-        self._torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
-        self._held[fin] = stuck if strength >= LOST_BELOW else math.nan
+        """Notes the state of a fin: its strength, and where it is stuck (NaN: it is not)."""
+        self._is_lost[fin] = strength < LOST_BELOW
+        self._is_opposed[fin] = strength < OPPOSED_BELOW
+        self._is_torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
+        self._stuck_at[fin] = stuck if strength >= LOST_BELOW else math.nan

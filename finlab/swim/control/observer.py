@@ -1,10 +1,11 @@
-"""Place, motion and disturbances of a robot, from sensors and from its own model.
+"""Pose, motion and disturbances of a robot, from sensors and from its own model.
 
-An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge,
-heave and yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the
-current, which shows in how the water carries the robot sideways. It is carried on by what the
-actuators give, not by what was asked of them, so nothing winds up where a wrench is out of reach.
-Pose comes from these velocities, corrected slowly by markers, pressure and the IMU's tilt.
+The controllers' observer. An extended Kalman filter holds surge, sway, heave and yaw rate, the
+accelerations along surge, heave and yaw that the model does not explain (a wrong damping or
+buoyancy, a weak fin), and the current, which shows in how the water carries the robot sideways. It
+is carried on by what the actuators give, not by what was asked of them, so nothing winds up where a
+wrench is out of reach. Pose comes from these velocities, corrected slowly by markers, pressure and
+the IMU's tilt.
 """
 
 import math
@@ -26,36 +27,44 @@ from finlab.swim.vehicle.vehicle import Vehicle
 AXES = [0, 1, 2, 5]
 """Surge, sway, heave and yaw among the six."""
 MOTION = slice(0, 4)
+"""Surge, sway and heave speed and yaw rate in the state."""
 UNKNOWN = slice(4, 7)
+"""The accelerations that the model does not explain in the state."""
 CURRENT = slice(7, 9)
+"""The horizontal velocity of the water in the state."""
 DRIVEN = [0, 2, 3]
-"""Where what is in the state, and which of the motions the unknown accelerations (3,) change."""
-UNKNOWN_FORCE = 0.006
+"""Which of the motions the unknown accelerations (3,) change: surge, heave and yaw."""
+FORCE_NOISE = 0.006
 """Unknown force that comes and goes, per root of a second, as a share of what all fins can give
 together."""
-UNKNOWN_BY_RUDDERS = 0.15
+FORCE_NOISE_OF_RUDDERS = 0.15
 """The same of a robot that rudders steer: their force goes with the square of a speed, and moments
 of the water on the hull outweigh it."""
-LASTING_FORCE = 0.003
-"""The same of the change of what stays."""
-CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
-"""Expected current [m/s], and its change per root of a second."""
-VELOCITY_NOISE, RATE_NOISE = 0.02, 0.04
-"""Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat
-adds."""
-ASTRAY = 1.0
-"""A motion [m/s, rad/s] this far from the one that is seen tells nothing of unknown forces: the
+FORCE_DRIFT = 0.003
+"""The same of the change of the unknown force that is constant."""
+CURRENT_SPEED = 0.05
+"""Standard deviation of the current that is expected [m/s]."""
+CURRENT_DRIFT = 0.002
+"""Of its change, per root of a second [m/s]."""
+VELOCITY_NOISE = 0.02
+"""Expected noise of a measured velocity, with what the fins' beat adds [m/s]."""
+RATE_NOISE = 0.04
+"""The same of a yaw rate [rad/s]."""
+DIVERGED = 1.0
+"""An innovation of the motion [m/s, rad/s] from which on it tells nothing of unknown forces: the
 model cannot follow, as of a robot that water stops within a period."""
 CRUISE = 1.0
 """Speed [m/s] at which the strength of rudders counts."""
-OLDEST_S = 0.5
+MAX_AGE_S = 0.5
 """Age from which on a sample counts as so old [s]."""
-POSE_S, TILT_S = 1.5, 1.0
-"""Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
+POSE_S = 1.5
+"""Time constant with which measured positions and headings correct predicted ones [s]."""
+TILT_S = 1.0
+"""The same of roll and pitch [s]."""
 
 
-class Estimate(NamedTuple):
-    """What is believed of now. World: z up; body: x forward, y left, z up."""
+class MotionEstimate(NamedTuple):
+    """The estimated pose and motion. World: z up; body: x forward, y left, z up."""
 
     position: Array
     """Position (3,) in the world [m]."""
@@ -95,38 +104,42 @@ class MotionObserver:
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
-        unknown = UNKNOWN_BY_RUDDERS if layout.by_flow else UNKNOWN_FORCE
-        self._noise = period_s * np.concatenate(
-            [
-                (unknown * strength) ** 2,
-                (unknown * LASTING_FORCE / UNKNOWN_FORCE * strength[DRIVEN]) ** 2,
-                [CURRENT_CHANGE**2] * 2,
-            ]
-        )
-        self._sensors = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2
+        force_noise = FORCE_NOISE_OF_RUDDERS if layout.by_flow else FORCE_NOISE
+        drift_share = force_noise * FORCE_DRIFT / FORCE_NOISE
+        variances = [
+            (force_noise * strength) ** 2,
+            (drift_share * strength[DRIVEN]) ** 2,
+            [CURRENT_DRIFT**2] * 2,
+        ]
+        self._noise = period_s * np.concatenate(variances)  # diagonal of Q (9,)
+        self._sensor_noise = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2  # of R (4,)
         self._transition = np.eye(9)
         self._transition[DRIVEN, range(4, 7)] = period_s
         times = np.array([POSE_S, POSE_S, POSE_S, TILT_S, TILT_S, POSE_S])
-        self._shares = 1.0 - np.exp(-period_s / times)
+        self._pose_gain = 1.0 - np.exp(-period_s / times)
         # Poses (position, roll, pitch and yaw) and motions of the last periods, the newest first.
-        self._poses: deque[Array] = deque(maxlen=max(1, math.ceil(OLDEST_S / period_s)))
+        self._poses: deque[Array] = deque(maxlen=max(1, math.ceil(MAX_AGE_S / period_s)))
         self._motions: deque[Array] = deque(maxlen=self._poses.maxlen)
         self._state = np.zeros(9)
-        self._first = np.diag(
-            [*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2]
+        self._covariance_at_start = np.diag(
+            [*self._sensor_noise, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2]
         )
-        self._covariance = self._first
+        self._covariance = self._covariance_at_start
         self._last_velocity: Array | None = None
-        self._estimate: Estimate | None = None
+        self._estimate: MotionEstimate | None = None
 
-    def step(self, measurement: Measurement, wrench: Array) -> Estimate:
-        """Takes a measurement and the wrench (6,) that the fins have given since the last one, as
-        far as known [N, N m]; returns what is believed."""
+    def step(self, measurement: Measurement, wrench: Array) -> MotionEstimate:
+        """Predicts over a period and corrects by a measurement.
+
+        Args:
+            measurement: of now.
+            wrench: (6,) that the actuators have given since the last one, as far as known [N, N m].
+        """
         m = measurement
         before = self._estimate
         pose = np.array([m.position[0], m.position[1], -m.depth, m.roll, m.pitch, m.yaw])
         if before is None:
-            self._state[MOTION] = self._seen(m)
+            self._state[MOTION] = self._measured_motion(m)
         else:
             self._predict(before, wrench)
             self._correct(m)
@@ -135,42 +148,53 @@ class MotionObserver:
             roll = before.roll + dt * float(m.rates[0])
             pitch = before.pitch + dt * float(m.rates[1])
             yaw = float(self._poses[0][5]) + dt * float(self._state[3])  # counted on over the seam
-            counted = np.array([x, y, z, roll, pitch, yaw])
-            counted[:3] += dt * in_world(self._state, roll, pitch, yaw)
+            predicted = np.array([x, y, z, roll, pitch, yaw])
+            predicted[:3] += dt * in_world(self._state, roll, pitch, yaw)
             marker, pressure, _, imu = m.ages
-            missed = pose - self._then(
-                self._poses, counted, [marker, marker, pressure, imu, imu, marker]
-            )
-            missed[5] = float(wrapped(missed[5]))
-            pose = counted + self._shares * missed
+            ages = [marker, marker, pressure, imu, imu, marker]
+            innovation = pose - self._when_sampled(self._poses, predicted, ages)
+            innovation[5] = float(wrapped(innovation[5]))
+            pose = predicted + self._pose_gain * innovation
         self._poses.appendleft(pose)
         self._motions.appendleft(self._state[MOTION].copy())
         self._last_velocity = m.velocity
         roll, pitch, yaw = pose[3:].tolist()
-        self._estimate = self._believed(m, pose[:3], roll, pitch, float(wrapped(yaw)))
+        self._estimate = self._estimate_of(m, pose[:3], roll, pitch, float(wrapped(yaw)))
         return self._estimate
 
-    def _then(self, past: deque[Array], now: Array, ages: Sequence[float]) -> Array:
-        """What each of some values was when a sample of it was taken, `ages` [s] ago, between what
-        was believed period by period; a sample is held against that, which moves it on to now."""
+    def _when_sampled(self, past: deque[Array], newest: Array, ages: Sequence[float]) -> Array:
+        """What k values (k,) were when samples of them were taken, between the periods linearly.
+
+        A late sample is held against that: its innovation then counts for now.
+
+        Args:
+            past: the values (k,) a period ago, two periods ago, and so on.
+            newest: the values of now (k,).
+            ages: how old each sample is (k,) [s].
+        """
         if not any(ages):
-            return now
-        known = np.array([now, *past])
-        back = np.minimum(np.array(ages) / self._dt, len(past))
-        row = np.minimum(back.astype(int), len(past) - 1)
-        each = np.arange(len(now))
-        after = known[row, each]
-        before = known[row + 1, each]
-        return np.asarray(after + (back - row) * (before - after))
+            return newest
+        known = np.array([newest, *past])
+        periods_ago = np.minimum(np.array(ages) / self._dt, len(past))
+        row = np.minimum(periods_ago.astype(int), len(past) - 1)
+        column = np.arange(len(newest))
+        after = known[row, column]
+        before = known[row + 1, column]
+        return np.asarray(after + (periods_ago - row) * (before - after))
 
-    def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
-        """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a
-        speed through the water [m/s]."""
+    def sway_after(self, sway: float, surge: float, yaw_rate: float) -> float:
+        """Returns the sway speed after a period by the model: v' = -D v / m_y - m_x / m_y u r.
+
+        Args:
+            sway: v, through the water [m/s].
+            surge: u, through the water [m/s].
+            yaw_rate: r [rad/s].
+        """
         damping = damping_rates(self._dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
-        pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
-        return math.exp(-self._dt * damping) * sway - self._dt * pushed
+        coriolis = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
+        return math.exp(-self._dt * damping) * sway - self._dt * coriolis
 
-    def slowed_by(self, motion: Array) -> Array:
+    def deceleration(self, motion: Array) -> Array:
         """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge,
         sway, heave and yaw [m/s^2, rad/s^2]."""
         surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
@@ -192,81 +216,114 @@ class MotionObserver:
         ax, ay = acceleration[:, :2].T
         speed = np.hypot(x, y)
         turning = (x * ay - y * ax) / np.maximum(speed * speed, slow * slow)
-        faster = (x * ax + y * ay) / np.maximum(speed, 1e-3)
-        rest = np.zeros(len(speed))
-        motion = np.stack([speed, rest, velocity[:, 2], turning], axis=-1)
-        changes = np.stack(
-            [faster, rest, acceleration[:, 2], np.gradient(turning, self._dt)], axis=-1
-        )
+        surge_rate = (x * ax + y * ay) / np.maximum(speed, 1e-3)
+        yaw_acceleration = np.gradient(turning, self._dt)
+        no_sway = np.zeros(len(speed))
+        nu = np.stack([speed, no_sway, velocity[:, 2], turning], axis=-1)  # (K, 4)
+        nu_rate = np.stack([surge_rate, no_sway, acceleration[:, 2], yaw_acceleration], axis=-1)
         result = np.zeros((len(speed), 6))
-        result[:, AXES] = self.inertia * (changes + self.slowed_by(motion))
+        result[:, AXES] = self.inertia * (nu_rate + self.deceleration(nu))
         return result
 
-    def _seen(self, m: Measurement) -> Array:
+    def _measured_motion(self, m: Measurement) -> Array:
+        """Surge, sway and heave speed and yaw rate (4,) by the sensors [m/s, rad/s]."""
         return np.array([*m.velocity.tolist(), float(m.rates[2])])
 
-    def _predict(self, before: Estimate, wrench: Array) -> None:
-        """The state over one period, and how much less is known of it."""
+    def _predict(self, before: MotionEstimate, wrench: Array) -> None:
+        """The filter over one period: x <- f(x), P <- F P F^T + Q.
+
+        Args:
+            before: the estimate at its beginning.
+            wrench: (6,) over the period [N, N m].
+        """
         dt = self._dt
         state = self._state
-        transition = self._transition
+        F = self._transition
         cosine = math.cos(before.yaw)
         sine = math.sin(before.yaw)
-        c, d = state[CURRENT].tolist()
-        flow = state[MOTION].copy()
-        flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
-        surge, sway, heave, yaw = flow.tolist()
+        current_x, current_y = state[CURRENT].tolist()
+        nu_r = state[MOTION].copy()
+        nu_r[0] -= cosine * current_x + sine * current_y
+        nu_r[1] -= cosine * current_y - sine * current_x
+        surge, sway, heave, yaw = nu_r.tolist()
         jacobian = damping_jacobian(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
-        kept = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
-        transition[range(4), range(4)] = kept
-        carried = 1.0 - kept[:2]
-        transition[0, CURRENT] = carried[0] * cosine, carried[0] * sine
-        transition[1, CURRENT] = -carried[1] * sine, carried[1] * cosine
+        decay = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
+        F[range(4), range(4)] = decay
+        # What damping takes of a motion it takes towards that of the water.
+        by_current = 1.0 - decay[:2]
+        F[0, CURRENT] = by_current[0] * cosine, by_current[0] * sine
+        F[1, CURRENT] = -by_current[1] * sine, by_current[1] * cosine
         state[MOTION] += dt * (before.drift + wrench[AXES] / self.inertia)
-        self._covariance = transition @ self._covariance @ transition.T
-        self._covariance.ravel()[::10] += self._noise
+        self._covariance = F @ self._covariance @ F.T
+        self._covariance.ravel()[::10] += self._noise  # its diagonal
 
     def _correct(self, m: Measurement) -> None:
-        """What the sensors have seen; a velocity counts where it is a new one."""
-        seen = self._seen(m)
+        """Corrects the state by the sensors: K = P H^T (H P H^T + R)^-1, x <- x + K innovation.
+
+        A velocity counts where it is a new one.
+        """
+        measured = self._measured_motion(m)
         _, _, dvl, imu = m.ages
-        missed = seen - self._then(self._motions, self._state[MOTION], [dvl, dvl, dvl, imu])
-        if not max(map(abs, missed.tolist())) < ASTRAY:
+        expected = self._when_sampled(self._motions, self._state[MOTION], [dvl, dvl, dvl, imu])
+        innovation = measured - expected
+        if not max(map(abs, innovation.tolist())) < DIVERGED:
             self._state[:] = 0.0
-            self._covariance = self._first
-            self._state[MOTION] = seen
+            self._covariance = self._covariance_at_start
+            self._state[MOTION] = measured
             return
         rows = slice(3 if m.velocity is self._last_velocity else 0, 4)
-        covariance = self._covariance
-        spread = covariance[rows, rows] + np.diag(self._sensors[rows])
-        gain = np.linalg.solve(spread, covariance[rows]).T
-        self._state += gain @ missed[rows]
-        self._covariance = covariance - gain @ covariance[rows]
+        P = self._covariance
+        S = P[rows, rows] + np.diag(self._sensor_noise[rows])
+        K = np.linalg.solve(S, P[rows]).T
+        self._state += K @ innovation[rows]
+        self._covariance = P - K @ P[rows]
 
-    def _believed(
+    def _estimate_of(
         self, m: Measurement, position: Array, roll: float, pitch: float, yaw: float
-    ) -> Estimate:
-        u, v, w, r, by_surge, by_heave, by_yaw, c, d = self._state.tolist()
+    ) -> MotionEstimate:
+        """The estimate by the filter's state and a pose.
+
+        Args:
+            m: the measurement, for the rates that the filter does not hold.
+            position: in the world (3,) [m].
+            roll: about x [rad].
+            pitch: about y [rad].
+            yaw: about z [rad].
+        """
+        u, v, w, r, by_surge, by_heave, by_yaw, current_x, current_y = self._state.tolist()
         attitude = quaternion_of(roll, pitch, yaw)
-        self._vehicle.current = (c, d, 0.0)
-        jacobian = self._vehicle.derivative(
+        self._vehicle.current = (current_x, current_y, 0.0)
+        rate = self._vehicle.derivative(
             [0.0, 0.0, 0.0, *attitude, u, v, w, *m.rates[:2].tolist(), r], (0.0,) * 6
         )
-        drift = np.array(
-            [jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw]
-        )
         velocity = self._state[:3].copy()
-        current = self._state[CURRENT].copy()
-        world = in_world(velocity, roll, pitch, yaw)
-        pitching = float(m.rates[1]), jacobian[11], self._vehicle.inertia[4]
-        return Estimate(position, roll, pitch, yaw, velocity, r, world, current, *pitching, drift)
+        return MotionEstimate(
+            position=position,
+            roll=roll,
+            pitch=pitch,
+            yaw=yaw,
+            velocity=velocity,
+            yaw_rate=r,
+            world_velocity=in_world(velocity, roll, pitch, yaw),
+            current=self._state[CURRENT].copy(),
+            pitch_rate=float(m.rates[1]),
+            pitch_drift=rate[11],
+            pitch_inertia=self._vehicle.inertia[4],
+            drift=np.array([rate[7] + by_surge, rate[8], rate[9] + by_heave, rate[12] + by_yaw]),
+        )
 
 
 def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
-    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for
-    it, at a speed [m/s] that counts for rudders."""
-    effectiveness = plant_of(layout).effectiveness
-    reach = np.zeros(6)
-    for part, own in zip(layout.actuators, effectiveness, strict=True):
-        reach += part.largest(speed) * np.linalg.norm(own[list(part.KIND.push_rows)], axis=0)
-    return reach
+    """Returns what all actuators give along each axis if each does its best for it.
+
+    Args:
+        layout: the robot.
+        speed: through the water [m/s], which counts for rudders.
+
+    Returns:
+        Forces and torques (6,) [N, N m], each axis alone.
+    """
+    largest = np.zeros(6)
+    for part, B in zip(layout.actuators, plant_of(layout).effectiveness, strict=True):
+        largest += part.largest(speed) * np.linalg.norm(B[list(part.KIND.push_rows)], axis=0)
+    return largest

@@ -17,32 +17,43 @@ from finlab.arrays import Array
 from finlab.axes import wrapped
 from finlab.layout import Layout
 from finlab.swim.control.contract import Measurement, Setpoint, axes_of
-from finlab.swim.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
+from finlab.swim.control.observer import (
+    AXES,
+    CRUISE,
+    MotionEstimate,
+    MotionObserver,
+    strongest_wrench,
+)
 from finlab.swim.vehicle.fossen import complete_body, dynamics_of
 
-BY_FORCES, BY_RUDDERS = (1.0, 0.756, 0.38), (0.75, 0.24, 0.045)
-"""Bandwidths of velocities, heading and path times the delay; a robot that rudders steer has to
-turn before it goes elsewhere."""
-LARGEST = 0.7
+BY_FORCES = (1.0, 0.756, 0.38)
+"""Bandwidths of velocities, heading and path, times the delay."""
+BY_RUDDERS = (0.75, 0.24, 0.045)
+"""The same of a robot that rudders steer: it has to turn before it goes elsewhere."""
+WRENCH_SHARE_MAX = 0.7
 """Share of what all actuators could do for an axis that is asked for at most."""
-WAY = 0.5
-"""Share of the speed that is wanted with which a robot that rudders steer goes on at least,
-whatever its heading."""
-SMOOTH_S = 0.3
+STEERAGE_SHARE = 0.5
+"""Share of the desired speed with which a robot that rudders steer goes on at least, whatever its
+heading."""
+PATH_FILTER_S = 0.3
 """Time over which the distance to the path is averaged [s]: markers jump."""
-FASTEST_TURN, SLOW = 0.6, 0.08
-"""Largest yaw rate that is asked for [rad/s], and velocity through the water [m/s] below which the
-robot turns less and less to where it should go, which changes all the time where it keeps a place,
-and more and more to where the path goes on."""
-FASTEST = 3.0
+TURN_RATE_MAX = 0.6
+"""Largest yaw rate that is asked for [rad/s]."""
+SLOW = 0.08
+"""Velocity through the water [m/s] below which the robot turns less and less to where it should go,
+which changes all the time where it keeps a place, and more and more to where the path goes on."""
+SPEED_MAX = 3.0
 """Fastest that a robot is asked to go [m/s]."""
-STEEPEST, RISE_S = 0.5, 1.0
-"""Sine of the steepest climb that is asked of a robot that dives by its pitch, and the time
-constant with which its slip is known [s]."""
-MOST_BY_SPEED = 8.0
+CLIMB_MAX = 0.5
+"""Sine of the steepest climb that is asked of a robot that dives by its pitch."""
+SLIP_FILTER_S = 1.0
+"""Time constant with which its vertical slip is known [s]."""
+SLIP_MAX = 0.7
+"""Sine of the largest sideslip that the heading makes up for."""
+RUDDER_GAIN_MAX = 8.0
 """Rudders are taken to give at most this much more than at `CRUISE`, as a share of that."""
-BEHIND_S = 0.2
-"""Delay [s] of sensors and of a control period."""
+SENSOR_DELAY_S = 0.2
+"""Delay of sensors and of a control period [s]."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +73,14 @@ class TrackingGains:
     more."""
 
 
-def pace_of(layout: Layout) -> float:
+def inverse_delay(layout: Layout) -> float:
     """Inverse of the delay of a robot's actuators, its sensors and a period [1/s]."""
-    return 1.0 / (layout.delay_s + BEHIND_S)
+    return 1.0 / (layout.delay_s + SENSOR_DELAY_S)
 
 
-def most_of(layout: Layout) -> Array:
+def max_wrench_of(layout: Layout) -> Array:
     """Largest wrench (6,) that a robot is asked for [N, N m]."""
-    return LARGEST * strongest_wrench(layout)
+    return WRENCH_SHARE_MAX * strongest_wrench(layout)
 
 
 def gains_for(layout: Layout) -> TrackingGains:
@@ -79,20 +90,21 @@ def gains_for(layout: Layout) -> TrackingGains:
     Of the inverse of that delay, velocities close at 1.0, the heading 1.3 times slower than they,
     and the path round it twice as slow as the heading; of robots that rudders steer see
     `BY_RUDDERS`."""
-    pace = pace_of(layout)
+    bandwidth = inverse_delay(layout)
     dives = "Ty" in axes_of(layout)
     velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
-    most = most_of(layout)
+    max_wrench = max_wrench_of(layout)
+    # Steady speed ahead under the largest force: d_1 u + d_2 u^2 = Fx.
     body = dynamics_of(complete_body(layout))
-    linear = body.linear[0]
-    quadratic = max(body.quadratic[0], 1e-9)
-    steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)
+    d_1 = body.linear_damping[0]
+    d_2 = max(body.quadratic_damping[0], 1e-9)
+    steady = (math.sqrt(d_1**2 + 4.0 * d_2 * float(max_wrench[0])) - d_1) / (2.0 * d_2)
     return TrackingGains(
-        velocity=velocity * pace,
-        heading=heading * pace,
-        path=path * pace,
-        max_wrench=tuple(most.tolist()),
-        max_speed=min(max(steady, TrackingGains.max_speed), FASTEST),
+        velocity=velocity * bandwidth,
+        heading=heading * bandwidth,
+        path=path * bandwidth,
+        max_wrench=tuple(max_wrench.tolist()),
+        max_speed=min(max(steady, TrackingGains.max_speed), SPEED_MAX),
     )
 
 
@@ -110,122 +122,162 @@ class TrackingController:
         self._sways = "Fy" in self.axes
         self._dives = "Ty" in self.axes
         self._commanded = np.array([axis in self.axes for axis in ("Fx", "Fy", "Fz", "Tz")])
-        self.free: tuple[str, ...] = () if self._sways else ("Fy", "Fz") if self._dives else ("Fy",)
-        self._of_rudders = LARGEST * (strongest_wrench(layout) - strongest_wrench(layout, 0.0))
-        self._most = np.array(self.gains.max_wrench)
+        self.free: tuple[str, ...] = ("Fy",)
+        if self._sways:
+            self.free = ()
+        elif self._dives:
+            self.free = ("Fy", "Fz")
+        self._wrench_of_rudders = WRENCH_SHARE_MAX * (
+            strongest_wrench(layout) - strongest_wrench(layout, 0.0)
+        )
+        self._max_wrench = np.array(self.gains.max_wrench)
         self.reset()
 
     def reset(self) -> None:
         """Forget all that was seen."""
         self._observer = MotionObserver(self.layout, self.period_s)
-        self._passing = 0.0
-        self._rising = 0.0
-        self._away: Array | None = None
-        self._smoothing = 1.0 - math.exp(-self.period_s / SMOOTH_S)
+        self._transient_sway = 0.0
+        self._vertical_slip = 0.0
+        self._path_error: Array | None = None
+        self._path_filter_gain = 1.0 - math.exp(-self.period_s / PATH_FILTER_S)
         self._wrench = np.zeros(6)
-        self._bound = self._most
-        self.estimate: Estimate | None = None
+        self._wrench_bound = self._max_wrench
+        self.estimate: MotionEstimate | None = None
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
-        """Returns the wrench (6,) along the trajectory [N, N m]; `delivered` is that of the fins so
-        far."""
+        """Returns the wrench (6,) along the trajectory: tau = M (nu_d' + k (nu_d - nu) - drift).
+
+        Args:
+            measurement: of now.
+            setpoint: of now.
+            delivered: wrench (6,) of the actuators since the last call [N, N m].
+        """
         g = self.gains
-        now = self.estimate = self._observer.step(measurement, delivered)
-        wanted = self._velocity(now, setpoint)
-        u_wanted, yaw_rate = self._surge_and_turn(now, wanted, setpoint)
-        cy = math.cos(now.yaw)
-        sy = math.sin(now.yaw)
+        estimate = self._observer.step(measurement, delivered)
+        self.estimate = estimate
+        velocity = self._velocity(estimate, setpoint)
+        surge, yaw_rate = self._surge_and_turn(estimate, velocity, setpoint)
+        cy = math.cos(estimate.yaw)
+        sy = math.sin(estimate.yaw)
         ax, ay, az = setpoint.acceleration.tolist()
-        miss = np.array(
+        nu_error = np.array(
             [
-                u_wanted - now.velocity[0],
-                cy * wanted[1] - sy * wanted[0] - now.velocity[1],
-                wanted[2] - now.world_velocity[2],
-                yaw_rate - now.yaw_rate,
+                surge - estimate.velocity[0],
+                cy * velocity[1] - sy * velocity[0] - estimate.velocity[1],
+                velocity[2] - estimate.world_velocity[2],
+                yaw_rate - estimate.yaw_rate,
             ]
         )
-        ahead = np.array([cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0])
-        drift = now.drift.copy()
+        feedforward = np.array([cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0])
+        drift = estimate.drift.copy()
         # Damping in yaw counts at the rate that is wanted: one that the body does not have would
         # spin it.
         rates = np.zeros((2, 4))
-        rates[:, 3] = now.yaw_rate, yaw_rate
-        measured, planned = self._observer.slowed_by(rates)[:, 3]
+        rates[:, 3] = estimate.yaw_rate, yaw_rate
+        measured, planned = self._observer.deceleration(rates)[:, 3]
         drift[3] += measured - planned
+        acceleration = feedforward + g.velocity * nu_error - drift
         result = np.zeros(6)
-        result[AXES] = (
-            self._observer.inertia * (ahead + g.velocity * miss - drift) * self._commanded
-        )
+        result[AXES] = self._observer.inertia * acceleration * self._commanded
         if self._dives:
-            result[4] = now.pitch_inertia * (
-                g.velocity * self._pitch_rate(now, wanted) - now.pitch_drift
-            )
-        slow = max(1.0 - (float(now.velocity[0]) / CRUISE) ** 2, -MOST_BY_SPEED)
-        self._bound = self._most - slow * self._of_rudders
-        self._wrench = result.clip(-self._bound, self._bound)
+            pitch_error = self._pitch_rate_error(estimate, velocity)
+            result[4] = estimate.pitch_inertia * (g.velocity * pitch_error - estimate.pitch_drift)
+        # The force of rudders grows with the square of the speed.
+        missing_share = max(1.0 - (float(estimate.velocity[0]) / CRUISE) ** 2, -RUDDER_GAIN_MAX)
+        self._wrench_bound = self._max_wrench - missing_share * self._wrench_of_rudders
+        self._wrench = result.clip(-self._wrench_bound, self._wrench_bound)
         return self._wrench
 
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
-        """Wrenches (K, 6) that will be asked for at the K setpoints after the first, which is that
-        of now: the last one, and what the path will take more than now."""
+        """Returns the wrenches that will be asked for: the last one, and what the path will take
+        more than now.
+
+        Args:
+            setpoints: K + 1 of them, a period apart, the first that of now.
+
+        Returns:
+            Wrenches (K, 6) at those after the first [N, N m].
+        """
         current = np.zeros(2) if self.estimate is None else self.estimate.current
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot
         # hardly moves through the water, and there the estimated current decides it.
         along = self._observer.wrenches_along(setpoints, current, 2.0 * SLOW)
-        return np.asarray((self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound))
+        expected = self._wrench + along[1:] - along[0]
+        return np.asarray(expected.clip(-self._wrench_bound, self._wrench_bound))
 
-    def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
-        """Velocity over ground (3,) to go with [m/s]."""
-        away = setpoint.position - now.position
-        self._away = (
-            away if self._away is None else self._away + (away - self._away) * self._smoothing
-        )
-        wanted: Array = setpoint.velocity + self.gains.path * self._away
-        speed = math.sqrt(wanted @ wanted)
-        return wanted * min(1.0, self.gains.max_speed / max(speed, 1e-9))
+    def _velocity(self, estimate: MotionEstimate, setpoint: Setpoint) -> Array:
+        """The path loop: the desired velocity over ground (3,) in the world [m/s]."""
+        error = setpoint.position - estimate.position
+        if self._path_error is None:
+            self._path_error = error
+        else:
+            change = error - self._path_error
+            self._path_error = self._path_error + change * self._path_filter_gain
+        velocity: Array = setpoint.velocity + self.gains.path * self._path_error
+        speed = math.sqrt(velocity @ velocity)
+        return velocity * min(1.0, self.gains.max_speed / max(speed, 1e-9))
 
-    def _pitch_rate(self, now: Estimate, wanted: Array) -> float:
-        """How much faster [rad/s] to turn in pitch, nose down, for a vertical speed with the slip
-        that there is, which is taken from the last `RISE_S`."""
-        speed = max(float(now.velocity[0]), SLOW)
-        share = self.period_s / RISE_S
-        self._rising += share * (math.atan(float(now.velocity[2]) / speed) - self._rising)
-        climb = math.asin(min(max(float(wanted[2]) / speed, -STEEPEST), STEEPEST))
-        rate = self.gains.heading * (self._rising - climb - now.pitch)
-        return min(max(rate, -FASTEST_TURN), FASTEST_TURN) - now.pitch_rate
+    def _pitch_rate_error(self, estimate: MotionEstimate, velocity: Array) -> float:
+        """How much faster to turn in pitch, nose down, for a vertical speed [rad/s].
+
+        Counts with the vertical slip that there is, by a filter of `SLIP_FILTER_S`.
+
+        Args:
+            estimate: of now.
+            velocity: desired, over ground in the world (3,) [m/s].
+        """
+        speed = max(float(estimate.velocity[0]), SLOW)
+        slip = math.atan(float(estimate.velocity[2]) / speed)
+        self._vertical_slip += self.period_s / SLIP_FILTER_S * (slip - self._vertical_slip)
+        climb = math.asin(min(max(float(velocity[2]) / speed, -CLIMB_MAX), CLIMB_MAX))
+        rate = self.gains.heading * (self._vertical_slip - climb - estimate.pitch)
+        return min(max(rate, -TURN_RATE_MAX), TURN_RATE_MAX) - estimate.pitch_rate
 
     def _surge_and_turn(
-        self, now: Estimate, wanted: Array, setpoint: Setpoint
+        self, estimate: MotionEstimate, velocity: Array, setpoint: Setpoint
     ) -> tuple[float, float]:
-        """Surge speed over ground [m/s] and yaw rate [rad/s] that bring the robot to a velocity
-        (3,)."""
-        g = self.gains
-        cosine = math.cos(now.yaw)
-        sine = math.sin(now.yaw)
-        c, d = (0.0, 0.0) if self._sways else now.current.tolist()
-        # through the water
-        x = float(wanted[0]) - c
-        y = float(wanted[1]) - d
+        """The heading loop: what surge and yaw bring the robot to a velocity.
+
+        Args:
+            estimate: of now.
+            velocity: desired, over ground in the world (3,) [m/s].
+            setpoint: of now.
+
+        Returns:
+            Surge speed over ground [m/s] and yaw rate [rad/s].
+        """
+        cosine = math.cos(estimate.yaw)
+        sine = math.sin(estimate.yaw)
+        current_x, current_y = (0.0, 0.0) if self._sways else estimate.current.tolist()
+        # Desired velocity through the water, and the path's.
+        x = float(velocity[0]) - current_x
+        y = float(velocity[1]) - current_y
         speed = math.hypot(x, y)
-        vx = float(setpoint.velocity[0]) - c
-        vy = float(setpoint.velocity[1]) - d
+        path_x = float(setpoint.velocity[0]) - current_x
+        path_y = float(setpoint.velocity[1]) - current_y
         ax, ay, _ = setpoint.acceleration.tolist()
-        turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, SLOW**2)
-        forward = float(now.velocity[0]) - (cosine * c + sine * d)
-        sideways = float(now.velocity[1]) - (cosine * d - sine * c)
+        path_speed_squared = path_x * path_x + path_y * path_y
+        path_turn_rate = (path_x * ay - path_y * ax) / max(path_speed_squared, SLOW**2)
+        surge_in_water = float(estimate.velocity[0]) - (cosine * current_x + sine * current_y)
+        sway_in_water = float(estimate.velocity[1]) - (cosine * current_y - sine * current_x)
         # Slip that comes from turning otherwise than the path does: to head against it would ring.
-        self._passing = self._observer.swayed(self._passing, forward, now.yaw_rate - turning)
-        slip = math.asin(min(max((sideways - self._passing) / max(speed, SLOW), -0.7), 0.7))
-        slip = 0.0 if self._sways else slip
-        surge = cosine * float(wanted[0]) + sine * float(wanted[1])
-        if self._dives:  # rudders need way
-            surge = max(surge, WAY * math.hypot(float(wanted[0]), float(wanted[1])))
+        excess_turn_rate = estimate.yaw_rate - path_turn_rate
+        self._transient_sway = self._observer.sway_after(
+            self._transient_sway, surge_in_water, excess_turn_rate
+        )
+        slip_sine = (sway_in_water - self._transient_sway) / max(speed, SLOW)
+        slip = 0.0 if self._sways else math.asin(min(max(slip_sine, -SLIP_MAX), SLIP_MAX))
+        surge = cosine * float(velocity[0]) + sine * float(velocity[1])
+        if self._dives:  # rudders need steerage way
+            surge = max(surge, STEERAGE_SHARE * math.hypot(float(velocity[0]), float(velocity[1])))
         elif speed >= SLOW:
-            surge = max(surge, cosine * c + sine * d)
+            surge = max(surge, cosine * current_x + sine * current_y)
         # At rest it turns to where the path goes on, or stays as it is; a bit off its place it
         # rather backs than turns about.
-        onward = now.yaw if math.isnan(setpoint.onward) else setpoint.onward
-        rest = max(SLOW - speed, 0.0)
-        heading = math.atan2(y + rest * math.sin(onward), x + rest * math.cos(onward)) - slip
-        rate = turning + g.heading * float(wrapped(heading - now.yaw))
-        return surge, min(max(rate, -FASTEST_TURN), FASTEST_TURN)
+        onward = estimate.yaw if math.isnan(setpoint.onward) else setpoint.onward
+        missing_speed = max(SLOW - speed, 0.0)
+        toward_x = x + missing_speed * math.cos(onward)
+        toward_y = y + missing_speed * math.sin(onward)
+        heading = math.atan2(toward_y, toward_x) - slip
+        yaw_rate = path_turn_rate + self.gains.heading * float(wrapped(heading - estimate.yaw))
+        return surge, min(max(yaw_rate, -TURN_RATE_MAX), TURN_RATE_MAX)

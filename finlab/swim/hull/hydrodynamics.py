@@ -27,8 +27,10 @@ VISCOSITY = 1.0e-6
 """Kinematic viscosity of water at 20 degrees [m^2/s]."""
 DESIGN_SPEED = 0.2
 """Speed at which friction is made linear [m/s]: that of a robot with fins at work."""
-BLUNT, DISC = 0.44, 1.17
-"""Drag coefficient of a sphere's pressure, and of a disc across the flow, which nothing exceeds."""
+SPHERE_DRAG = 0.44
+"""Drag coefficient of a sphere's pressure."""
+DISC_DRAG = 1.17
+"""Drag coefficient of a disc across the flow, which nothing exceeds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,18 +93,21 @@ def ellipsoid_added_mass(half: ArrayLike, density: float = WATER) -> Array:
     squares = np.square(half)
     product = math.sqrt(squares.prod())
     volume = 4.0 / 3.0 * math.pi * product
-    thirds = [float(elliprd(squares[k - 2], squares[k - 1], squares[k])) for k in range(3)]
-    shares = 2.0 / 3.0 * product * np.array(thirds)
-    along = shares / (2.0 - shares)
+    R_D = [float(elliprd(squares[k - 2], squares[k - 1], squares[k])) for k in range(3)]
+    alpha = 2.0 / 3.0 * product * np.array(R_D)  # alpha_0, beta_0, gamma_0
+    along = alpha / (2.0 - alpha)
     about = []
     for axis in range(3):
+        # About x: (b^2 - c^2)^2 (gamma_0 - beta_0) / (2 (b^2 - c^2) - (b^2 + c^2)
+        # (gamma_0 - beta_0)) / 5, and so on.
         second, third = np.delete(np.arange(3), axis)
-        gap = squares[second] - squares[third]
-        both = squares[second] + squares[third]
-        twist = shares[third] - shares[second]
+        difference = squares[second] - squares[third]
+        total = squares[second] + squares[third]
+        alpha_difference = alpha[third] - alpha[second]
+        denominator = 2.0 * difference - total * alpha_difference
         # Round about the axis, nothing is pushed aside; the quotient would be zero over zero.
-        below = 2.0 * gap - both * twist
-        about.append(0.0 if abs(gap) < 1e-9 * both else gap**2 * twist / below / 5.0)
+        is_round = abs(difference) < 1e-9 * total
+        about.append(0.0 if is_round else difference**2 * alpha_difference / denominator / 5.0)
     return density * volume * np.append(along, about)
 
 
@@ -117,7 +122,7 @@ def pressure_damping(half: Array, density: float = WATER) -> Array:
     Motion Control, 2nd ed., section 6.4): 1/2 rho C int |x|^3 2 h(x) dx. The round core, which
     turns without pushing water aside, is left out, so that a sphere has none."""
     areas = np.array([np.delete(half, axis).prod() for axis in range(3)])
-    along = np.minimum(DISC, BLUNT * np.sqrt(areas) / half)
+    along = np.minimum(DISC_DRAG, SPHERE_DRAG * np.sqrt(areas) / half)
     about = []
     for axis in range(3):
         far, near = sorted({0, 1, 2} - {axis}, key=lambda k: -half[k])

@@ -65,12 +65,15 @@ def _triangles(mesh: Any, counts: list[int]) -> int:
 
 
 MAX_BYTES = 20_000_000
+"""Largest mesh file."""
 MAX_FACES = 60_000
 """Most triangles of a hull; more would make the page slow and show nothing new, so they are
 simplified."""
-SMALLEST, LARGEST = 0.02, 10.0
-"""Lengths [m] that a hull may have; anything else is a mistaken unit."""
-OPEN = 0.02
+LENGTH_MIN = 0.02
+"""Least length of a hull [m]; anything else is a mistaken unit."""
+LENGTH_MAX = 10.0
+"""Largest [m]."""
+OPEN_SHARE = 0.02
 """Share of edges with one triangle only from which a mesh is a sheet and not a body."""
 
 
@@ -103,7 +106,7 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     vertices = np.asarray(mesh.vertices, dtype=float) * scale
     edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
     loose = int((edges == 1).sum())
-    if len(mesh.faces) == 0 or loose > OPEN * len(edges):
+    if len(mesh.faces) == 0 or loose > OPEN_SHARE * len(edges):
         raise FinlabError(
             f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle "
             "only; "
@@ -112,9 +115,9 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     low = vertices.min(axis=0)
     high = vertices.max(axis=0)
     length = float((high - low).max())
-    if not SMALLEST <= length <= LARGEST:
+    if not LENGTH_MIN <= length <= LENGTH_MAX:
         raise SizeError(
-            f"{name}: would be {length:.3g} m long, expected {SMALLEST:g} to {LARGEST:g} m; "
+            f"{name}: would be {length:.3g} m long, expected {LENGTH_MIN:g} to {LENGTH_MAX:g} m; "
             "choose another unit"
         )
     report = MeshReport(len(mesh.faces), bool(mesh.is_watertight), mended)

@@ -92,6 +92,7 @@ def _profile(shape: str, s: Array) -> Array:
 
 
 COARSE_FACES = 400
+"""Triangles of a coarse surface."""
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "inch": 0.0254}
 """Metres per unit of a mesh file."""
 

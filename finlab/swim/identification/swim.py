@@ -27,7 +27,7 @@ from finlab.fit.columns import MAX_BYTES, command_columns, commands_in, read_col
 from finlab.layout import Fin, Layout
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.fin_motion import FinMotion
-from finlab.swim.vehicle.vehicle import body_rates, body_velocity
+from finlab.swim.vehicle.many_bodies import body_rates, body_velocity
 
 STEP_S = 0.1
 """Spacing of the grid [s]."""

@@ -10,10 +10,25 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-BASE = tuple("strength mounting lean center bias buoyancy lift current".split())  # noqa: SIM905
-BASE += ("inertia", "linear", "quadratic", "delay")
+"""The six axes, as they are called in the labels of unknowns."""
+BASE = (
+    "strength",
+    "mounting",
+    "lean",
+    "center",
+    "bias",
+    "buoyancy",
+    "lift",
+    "current",
+    "inertia",
+    "linear",
+    "quadratic",
+    "delay",
+)
+"""Blocks that every fit looks for."""
 SHAPE = "shape"
-"""What is looked for besides in robots of fins, where it helps: another law of thrust."""
+"""The block that is looked for besides in robots of fins, where it helps: another law of
+thrust."""
 
 SENSORS = {
     "position and heading": (0, 1, 5),
@@ -23,32 +38,37 @@ SENSORS = {
 }
 """What comes from one sensor, and is late together: channels of a swim."""
 
-SAME_SCALE = 0.003
+COMMON_SCALE_DEVIATION = 0.003
 """How far the common scale of all inertia may be off, as a share."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns of one kind: how far each may be off, one standard deviation of what is believed
-    before a swim, and whether the wrench of the actuators depends on them."""
+    """Unknowns of one kind."""
 
     name: str
     labels: tuple[str, ...]
+    """What each of the k unknowns is, in words."""
     unit: str
     scale: Array
-    force: bool
+    """How far each may be off (k,): one standard deviation of what is believed before a swim."""
+    moves_wrench: bool
+    """Whether the wrench of the actuators depends on them."""
 
 
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
-    """All unknowns of actuators of these names and their robot, whose damping may be off by (2,
-    6)."""
+    """Returns all blocks of a robot by name.
+
+    Args:
+        names: of its actuators.
+        damping: how far its linear and quadratic damping may be off (2, 6).
+    """
 
     def block(
-        name: str, labels: Sequence[str], scale: ArrayLike, unit: str, force: bool = True
+        name: str, labels: Sequence[str], scale: ArrayLike, unit: str, moves_wrench: bool = True
     ) -> Block:
-        return Block(
-            name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force
-        )
+        scales = np.broadcast_to(scale, len(labels)).astype(float)
+        return Block(name, tuple(labels), unit, scales, moves_wrench)
 
     shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
     blocks = (
@@ -78,7 +98,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
         block(SHAPE, [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
     )
-    return {one.name: one for one in blocks}
+    return {each.name: each for each in blocks}
 
 
 class Unknowns:
@@ -86,38 +106,57 @@ class Unknowns:
     +- 1."""
 
     def __init__(self, blocks: dict[str, Block], chosen: Sequence[str]) -> None:
+        """Lays blocks one after the other.
+
+        Args:
+            blocks: all blocks by name, as `blocks_of` makes them.
+            chosen: names of those that are looked for.
+        """
         self.blocks = [blocks[name] for name in chosen]
-        ends = np.cumsum([0, *(len(block.labels) for block in self.blocks)]).tolist()
-        places = zip(self.blocks, ends, ends[1:], strict=False)
-        self._where = {block.name: slice(begin, end) for block, begin, end in places}
-        self.size: int = ends[-1]
+        self._slices: dict[str, slice] = {}
+        labels: list[str] = []
+        units: list[str] = []
+        moves_wrench: list[bool] = []
+        for block in self.blocks:
+            begin = len(labels)
+            labels += block.labels
+            units += [block.unit] * len(block.labels)
+            moves_wrench += [block.moves_wrench] * len(block.labels)
+            self._slices[block.name] = slice(begin, len(labels))
+        self.size = len(labels)
         self.scale = np.concatenate([block.scale for block in self.blocks])
-        """(size,)."""
-        self.labels = tuple(label for block in self.blocks for label in block.labels)
-        self.units = tuple(block.unit for block in self.blocks for _ in block.labels)
-        self.force = np.array([block.force for block in self.blocks for _ in block.labels])
+        """One standard deviation of what is believed before a swim, in own units (size,)."""
+        self.labels = tuple(labels)
+        """What each unknown is, in words."""
+        self.units = tuple(units)
+        self.moves_wrench = np.array(moves_wrench)
         """Whether the wrench of the actuators depends on each (size,)."""
 
     @cached_property
-    def believed(self) -> Array:
+    def prior_information(self) -> Array:
         """Inverse covariance (size, size) of what is believed before a swim: each is 0 +- 1, and
         the common scale of all inertia is as the layout says. Motion cannot tell it, so nothing
         else must move it."""
-        place = self._where["inertia"]
-        gauge = np.zeros(self.size)
-        gauge[place] = self.scale[place] / (place.stop - place.start) / SAME_SCALE
-        return np.eye(self.size) + np.outer(gauge, gauge)
+        inertia = self._slices["inertia"]
+        mean_weight = np.zeros(self.size)
+        n_axes = inertia.stop - inertia.start
+        mean_weight[inertia] = self.scale[inertia] / n_axes / COMMON_SCALE_DEVIATION
+        return np.eye(self.size) + np.outer(mean_weight, mean_weight)
 
-    def part(self, name: str, vector: Array) -> Array | None:
-        """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where
-        it is not looked for."""
-        return self.of(name, vector) if name in self._where else None
+    def optional_block(self, name: str, vector: Array) -> Array | None:
+        """As `block`; None where the block is not looked for."""
+        return self.block(name, vector) if name in self._slices else None
 
-    def of(self, name: str, vector: Array) -> Array:
-        """The unknowns (..., k) of a block that every fit looks for, as `part` gives them."""
-        where = self._where[name]
-        return np.asarray(vector[..., where] * self.scale[where])
+    def block(self, name: str, vector: Array) -> Array:
+        """Returns the unknowns (..., k) of one block in its own units.
 
-    def place(self, name: str) -> slice:
+        Args:
+            name: of the block.
+            vector: all unknowns (..., size), in scales.
+        """
+        columns = self._slices[name]
+        return np.asarray(vector[..., columns] * self.scale[columns])
+
+    def slice_of(self, name: str) -> slice:
         """Where a block stands in a vector (size,)."""
-        return self._where[name]
+        return self._slices[name]

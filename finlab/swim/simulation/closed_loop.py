@@ -38,7 +38,7 @@ from finlab.swim.vehicle.fin_motion import FinMotion
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
 
-AHEAD = 10
+LOOKAHEAD_TICKS = 10
 """Ticks whose wrenches the allocator is given in advance."""
 
 
@@ -135,21 +135,23 @@ class ClosedLoop:
         n = self.layout.n
         self.broken: dict[str, Fault] = {}
         """What is true: the actuators that are not whole now, by name."""
-        self._told: dict[str, Fault] = {}
-        self._held = np.full(n, np.nan)
+        self._announced_faults: dict[str, Fault] = {}
+        self._stuck_at = np.full(n, np.nan)
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
-        self._setpoints: deque[Setpoint] = deque()  # of this tick and the next ones
+        self._setpoints: deque[Setpoint] = deque()
+        """Of this tick and the next ones."""
         self._command: Array | None = None
-        self._answered: Allocation | None = None  # what it came from, before a monitor's pushes
+        # What the command came from, before a monitor's pushes.
+        self._allocation_before: Allocation | None = None
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
         self._plant = plant_of(layout)
         self._flow: Array | None = None
-        self._believed = ActuatorMotion(layout)
-        self._gave = NO_WRENCH
+        self._believed_motion = ActuatorMotion(layout)
+        self._wrench_before = NO_WRENCH
         start, heading = self.task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
@@ -170,7 +172,7 @@ class ClosedLoop:
     @property
     def controllable(self) -> bool:
         """Whether the working actuators can give what the controller commands, in small."""
-        return self._complete().controllable
+        return self._current_completion().controllable
 
     @property
     def log(self) -> RunLog:
@@ -194,14 +196,14 @@ class ClosedLoop:
     @property
     def told(self) -> tuple[str, ...]:
         """Names of the actuators that were announced as broken."""
-        return tuple(self._told)
+        return tuple(self._announced_faults)
 
     @property
     def damage(self) -> Damage:
         """What the allocator is given: what was announced, or what the monitor has found."""
         if self.verdict is not None:
             return self.verdict.damage
-        return damage_of(self.layout, self._told, self._held)
+        return damage_of(self.layout, self._announced_faults, self._stuck_at)
 
     def fail(
         self,
@@ -226,17 +228,17 @@ class ClosedLoop:
         index = self.layout.index(name)
         if kind == "lost":
             self.layout.without([*(other for other in self.lost if other != name), name])
-        self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
-        if kind == "stuck" and index in self.motion.of_fins:
-            self.fin_motion.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
+        self._stuck_at[index] = self.motion.direction[index] if kind == "stuck" else np.nan
+        if kind == "stuck" and index in self.motion.fin_indices:
+            self.fin_motion.rate[2, np.searchsorted(self.motion.fin_indices, index)] = 0.0
         tells = self.announced if announced is None else announced
-        for known in (self.broken, self._told) if tells else (self.broken,):
+        for known in (self.broken, self._announced_faults) if tells else (self.broken,):
             known.pop(name, None)
             if kind != "whole":
                 known[name] = fault
         if tells and self.monitor is not None:
             strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
-            self.verdict = self.monitor.tell(name, strength, self._held[index])
+            self.verdict = self.monitor.tell(name, strength, self._stuck_at[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
         """An actuator works again as it should; a `LayoutError` where there is none of that
@@ -249,27 +251,29 @@ class ClosedLoop:
         while self._pending and self._pending[0].time_s <= time + 1e-9:
             event = self._pending.pop(0)
             self.fail(event.name, event.kind, event.share)
-        now = self._sensors.measure(time, self.state)
+        measurement = self._sensors.measure(time, self.state)
         if self.monitor is not None:
-            self.verdict = self.monitor.step(now, self._command)
+            self.verdict = self.monitor.step(measurement, self._command)
         if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
-            self._flow = np.concatenate([now.velocity, now.rates])
+            self._flow = np.concatenate([measurement.velocity, measurement.rates])
         setpoint = self.task.setpoint(time)
-        complete = self._complete()
-        wanted = complete(self.controller.wrench(now, setpoint, self._given()))
-        answer = self.allocator.allocate(
-            wanted,
+        completion = self._current_completion()
+        delivered = self._delivered()
+        wrench = completion(self.controller.wrench(measurement, setpoint, delivered))
+        allocation = self.allocator.allocate(
+            wrench,
             damage=self.damage,
             flow=self._flow,
-            previous=self._answered,
-            reference=self._reference(time, complete),
+            previous=self._allocation_before,
+            reference=self._reference(time, completion),
             policy=self.policy,
             seed=self.seed,
         )
-        self._answered, command = answer, self._sent(answer.command)
+        self._allocation_before = allocation
+        command = self._for_weak(allocation.command)
         if self.monitor is not None:
             command = self.monitor.probed(command)
-        tick = self._move(now, setpoint, wanted, command, answer.solve_ms)
+        tick = self._simulate(measurement, setpoint, wrench, command, allocation.solve_ms)
         self._command = command
         self._ticks.append(tick)
         learned = None if self.learner is None else self.learner.step(tick.measured, tick.command)
@@ -281,7 +285,9 @@ class ClosedLoop:
         """From now on allocator and monitor take the robot for this one."""
         self.allocator = self.allocator.on(layout)
         self._plant = plant_of(layout)
-        self._told = {name: fault for name, fault in self._told.items() if fault.kind != "torn"}
+        self._announced_faults = {
+            name: fault for name, fault in self._announced_faults.items() if fault.kind != "torn"
+        }
         if self.monitor is not None:
             self.monitor.adopt(layout)
         self._completion.clear()
@@ -292,33 +298,33 @@ class ClosedLoop:
             self.step()
         return self.log
 
-    def _reference(self, time: float, complete: Completion) -> Array | None:
+    def _reference(self, time: float, completion: Completion) -> Array | None:
         """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can
         tell."""
         if self._foresighted is None:
             return None
-        while len(self._setpoints) <= AHEAD:
+        while len(self._setpoints) <= LOOKAHEAD_TICKS:
             # What comes after the end is not swum: a path that ends under way is swum to its end.
             after = min(time + len(self._setpoints) * self.period_s, self.task.duration_s)
             self._setpoints.append(self.task.setpoint(after))
         expected = self._foresighted.ahead(self._setpoints)
         self._setpoints.popleft()
-        return complete(expected)
+        return completion(expected)
 
-    def _given(self) -> Array:
+    def _delivered(self) -> Array:
         """Wrench (6,) over the last period, if the actuators that are not taken for lost do what
         they were commanded [N, N m]."""
         if self._command is None:
             return NO_WRENCH
-        believed = self._believed
+        believed = self._believed_motion
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         force[list(self.layout.indices(self.damage.lost))] = 0.0
-        before = self._gave
-        self._gave = self._plant.wrench_of(force, flow=self._flow)
-        return 0.5 * (before + self._gave)
+        before = self._wrench_before
+        self._wrench_before = self._plant.wrench_of(force, flow=self._flow)
+        return 0.5 * (before + self._wrench_before)
 
-    def _complete(self) -> Completion:
+    def _current_completion(self) -> Completion:
         """What completes the controller's wrench for the actuators that work now."""
         lost = tuple(self.damage.lost)
         if lost not in self._completion:
@@ -333,7 +339,7 @@ class ClosedLoop:
         lost = self.lost
         return np.array([name not in lost for name in self.layout.names])
 
-    def _sent(self, command: Array) -> Array:
+    def _for_weak(self, command: Array) -> Array:
         """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
         if not self.damage.weak:
             return command
@@ -343,24 +349,41 @@ class ClosedLoop:
             result[index, self.layout.actuators[index].KIND.force_number or 0] /= share
         return result
 
-    def _moved(self, command: Array) -> Array:
+    def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
         turn."""
         result = command.copy()
         result[~self._alive()] = np.nan
-        return result if np.isnan(self._held).all() else self.motion.turned_to(result, self._held)
+        return (
+            result
+            if np.isnan(self._stuck_at).all()
+            else self.motion.turned_to(result, self._stuck_at)
+        )
 
-    def _move(
-        self, now: Measurement, setpoint: Setpoint, wanted: Array, command: Array, solve_ms: float
+    def _simulate(
+        self,
+        measurement: Measurement,
+        setpoint: Setpoint,
+        wrench: Array,
+        command: Array,
+        solve_ms: float,
     ) -> Tick:
-        """Actuators and body over one period with a constant command."""
+        """Moves actuators and body over one period.
+
+        Args:
+            measurement: that the controller was given.
+            setpoint: that the controller was given.
+            wrench: that the allocator was asked for (6,) [N, N m].
+            command: of the actuators over the period (n, 3).
+            solve_ms: time of the allocation [ms].
+        """
         time = self.time
         before = self.state
         n = self.layout.n
         n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
-        moved = self._moved(sent)
+        for_drives = self._for_drives(sent)
         share = np.ones(n)
         for fault in self.broken.values():
             if fault.kind == "torn":
@@ -369,13 +392,13 @@ class ClosedLoop:
         power = np.zeros((2, n))
         for k in range(n_steps):
             water = self.vehicle.velocity_in_water(self.state)
-            push = self._forces.step(moved, dt, water, share)
-            wrenches = self._forces.wrenches(push.force, water)
+            output = self._forces.step(for_drives, dt, water, share)
+            wrenches = self._forces.wrenches(output.force, water)
             self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.sample(time + (k + 1) * dt, self.state)
             mean += wrenches
-            power += push.power
+            power += output.power
         mean = mean / n_steps
         power = power / n_steps
         beliefs = (np.full(n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
@@ -385,10 +408,10 @@ class ClosedLoop:
             quaternion=before[3:7].copy(),
             motion=before[7:].copy(),
             flow=np.array(self.vehicle.current),
-            measured=now.as_array(),
+            measured=measurement.as_array(),
             reference=setpoint.position,
             reference_surge=setpoint.surge,
-            asked=wanted,
+            asked=wrench,
             allocated=self._plant.wrench(command, flow=self._flow),
             delivered=mean.sum(axis=0),
             command=sent,

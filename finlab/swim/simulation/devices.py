@@ -47,7 +47,8 @@ class Sensor:
         return Sensor(self.rate_hz, none, none)
 
 
-NAMES = ("marker", "pressure", "dvl", "imu")
+SENSORS = ("marker", "pressure", "dvl", "imu")
+"""Sensors of a robot, fields of `SensorSettings`."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class SensorSettings:
     """Roll, pitch [rad] and angular rates [rad/s]."""
 
     def __post_init__(self) -> None:
-        for name in NAMES:
+        for name in SENSORS:
             sensor: Sensor = getattr(self, name)
             values = (sensor.rate_hz, sensor.delay_s, sensor.dropout, *sensor.noise, *sensor.bias)
             from_0 = all(math.isfinite(value) and value >= 0.0 for value in values)
@@ -79,7 +80,7 @@ class SensorSettings:
 
     def each(self, change: Callable[[Sensor], Sensor]) -> "SensorSettings":
         """The same, each sensor changed."""
-        return SensorSettings(*(change(getattr(self, name)) for name in NAMES))
+        return SensorSettings(*(change(getattr(self, name)) for name in SENSORS))
 
     def later(self, seconds: float) -> "SensorSettings":
         """The same sensors, each so much later [s]."""
@@ -92,8 +93,8 @@ NOISE_ALONE = SensorSettings().each(lambda sensor: replace(sensor.perfect(), noi
 """The usual sensors with noise, but with no bias, delay or losses."""
 
 
-class Channel:
-    """One sensor at work."""
+class SensorChannel:
+    """One sensor at work: samples at its rate, held until the next one arrives."""
 
     def __init__(self, sensor: Sensor, rng: np.random.Generator) -> None:
         """Takes the sensor, and where its noise comes from."""
@@ -102,14 +103,13 @@ class Channel:
         # Another stream than the noise's, so that a run has the same noise with and without the
         # rest.
         self._rng = rng
-        self._fate = rng.spawn(1)[0]
+        self._loss_rng = rng.spawn(1)[0]
         self._noise = np.array(sensor.noise)
-        self.bias: Array = np.array(sensor.bias) * self._fate.standard_normal(len(sensor.bias))
+        self.bias: Array = np.array(sensor.bias) * self._loss_rng.standard_normal(len(sensor.bias))
         """What each value is off for the whole run."""
-        self._due = 0.0
-        self._waiting: deque[tuple[float, float, Array]] = (
-            deque()
-        )  # when it arrives, when it was taken
+        self._next_time = 0.0
+        # When a sample arrives, when it was taken, and its values.
+        self._in_transit: deque[tuple[float, float, Array]] = deque()
         self._first = True
         self._newest = self.bias
         self.taken = 0.0
@@ -117,16 +117,16 @@ class Channel:
 
     def is_due(self, time: float) -> bool:
         """Whether it samples now."""
-        return time >= self._due - 1e-9
+        return time >= self._next_time - 1e-9
 
     def take(self, time: float, true: list[float]) -> None:
-        """Sample what is true now."""
-        self._due = max(self._due + self._period, time)
+        """Samples the true values at a time [s]."""
+        self._next_time = max(self._next_time + self._period, time)
         sample = true + self.bias + self._noise * self._rng.standard_normal(len(true))
-        lost = self._sensor.dropout > 0.0 and self._fate.random() < self._sensor.dropout
+        lost = self._sensor.dropout > 0.0 and self._loss_rng.random() < self._sensor.dropout
         # The robot has waited at rest for its first samples.
         if self._first or not lost:
-            self._waiting.append(
+            self._in_transit.append(
                 (time if self._first else time + self._sensor.delay_s, time, sample)
             )
         self._first = False
@@ -134,8 +134,8 @@ class Channel:
     def value(self, time: float) -> Array:
         """The newest sample that has arrived; the same array as before where there is no new
         one."""
-        while self._waiting and self._waiting[0][0] <= time + 1e-9:
-            _, self.taken, self._newest = self._waiting.popleft()
+        while self._in_transit and self._in_transit[0][0] <= time + 1e-9:
+            _, self.taken, self._newest = self._in_transit.popleft()
         return self._newest
 
 
@@ -144,7 +144,7 @@ class Sensors:
 
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         """Draws the biases of this run."""
-        self._channels = [Channel(getattr(settings, name), rng) for name in NAMES]
+        self._channels = [SensorChannel(getattr(settings, name), rng) for name in SENSORS]
 
     def measure(self, time: float, state: Array) -> Measurement:
         """The newest samples at `time` [s] for a state (13,); to be called in order of time."""
@@ -184,7 +184,7 @@ STEP_S = 0.02
 """Longest step that resolves the forces [s]."""
 
 
-class Push(NamedTuple):
+class ActuatorOutput(NamedTuple):
     """What n actuators do in a step."""
 
     force: Array
@@ -202,8 +202,8 @@ class ActuatorForce:
         """Takes the true robot and how its fins move."""
         self.motion = ActuatorMotion(layout, fins)
         self._beat = fins
-        of_fins = self.motion.of_fins
-        of_others = self.motion.of_others
+        of_fins = self.motion.fin_indices
+        of_others = self.motion.other_indices
         self._plant = plant_of(layout)
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
@@ -213,7 +213,7 @@ class ActuatorForce:
             others = tuple(layout.actuators[i] for i in of_others)
             self._others = plant_of(replace(layout, actuators=others))
 
-    def step(self, command: Array, dt: float, water: Array, share: Array) -> Push:
+    def step(self, command: Array, dt: float, water: Array, share: Array) -> ActuatorOutput:
         """Follows a command (n, 3) for `dt` [s].
 
         Args:
@@ -228,16 +228,16 @@ class ActuatorForce:
         fin_watts = np.zeros((2, 0))
         others = np.zeros((0, 3))
         watts = np.zeros((2, 0))
-        if len(motion.of_fins):
-            fins = self.of_fins(dt) * share[motion.of_fins, None]
+        if len(motion.fin_indices):
+            fins = self.of_fins(dt) * share[motion.fin_indices, None]
             fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))
-        if len(motion.of_others):
-            mean = 0.5 * (motion.others.before + motion.others.value)
-            works = share[motion.of_others] * motion.pushes[motion.of_others]
+        if len(motion.other_indices):
+            mean = 0.5 * (motion.others.value_before + motion.others.value)
+            works = share[motion.other_indices] * motion.pushes[motion.other_indices]
             others = self._others.force(mean, flow=water) * works[:, None]
-            spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
+            spent = self._others.power(mean, flow=water) * motion.pushes[motion.other_indices]
             watts = np.array([0.0 * spent, spent])
-        return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
+        return ActuatorOutput(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
 
     def wrenches(self, force: Array, water: Array) -> Array:
         """Returns the wrench (n, 6) [N, N m] of each actuator's force (n, 3) [N], with an equal

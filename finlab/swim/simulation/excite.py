@@ -35,7 +35,7 @@ LONGEST_S = 300.0
 """Longest swim [s]."""
 SHORTEST_S = 30.0
 """Shortest one [s]: once through the slowest sine."""
-SHARE = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
+EXCITATION_SHARES = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
 """Amplitude of the excitation on each axis, as a share of what all actuators together could give at
 most."""
 PERIODS_S = (
@@ -57,20 +57,25 @@ gives."""
 BOUNDS = (1.5, 0.5, 0.35)
 """Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has
 faded."""
-MOST_USED = 3.0
+BOUNDS_FACTOR_MAX = 3.0
 """Times these bounds at which the swim is given up."""
-REACHED = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
+AXIS_BOUNDS = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
 """Bounds of each axis [m, rad]; that of yaw is no more than a wish."""
-SHAKEN_TO = 0.5
+EXCURSION_SHARE = 0.5
 """Share of them to which the sines of an axis take the robot at most."""
-HOLDS = 0.3
+HOLDING_SHARE = 0.3
 """Share of what all actuators could give that holds the robot at a bound, where a loop may be so
 fast."""
-SLOWEST, FASTEST = (
-    np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4]),
-    np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0]),
-)
-"""Of the loops that hold place and attitude [rad/s]."""
+BANDWIDTH_MIN = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4])
+"""Slowest loops that hold each axis [rad/s]."""
+BANDWIDTH_MAX = np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0])
+"""Fastest ones [rad/s]."""
+DAMPING_FACTOR = 1.6
+"""Damping over inertia and bandwidth: a damping ratio of 0.8."""
+DAMPING_MIN = np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
+"""Least damping of each axis, over its inertia [1/s]."""
+AMPLITUDE_WEIGHT = 0.05
+"""Of a fin's drawn amplitude beside its force, where a command is chosen."""
 DEPTH_M = 1.5
 """Where the robot is held [m]."""
 PERIOD_S = 0.1
@@ -86,32 +91,48 @@ class ExcitingController:
     period_s = PERIOD_S
 
     def __init__(self, layout: Layout, seed: int = 0) -> None:
+        """Tunes the loops for a robot.
+
+        Args:
+            layout: the robot.
+            seed: of the sines' phases.
+        """
         # Each axis as far as all actuators could push it, were they all aimed at it.
-        most = np.abs(layout_effectiveness(layout) * largest_forces(layout))
-        most = (
-            np.add.reduceat(most**2, np.unique(_owners(layout), return_index=True)[1], axis=1)
-            ** 0.5
-        )
-        most = most.sum(axis=1)
+        by_column = np.abs(layout_effectiveness(layout) * largest_forces(layout))
+        first_columns = np.unique(_owners(layout), return_index=True)[1]
+        by_actuator = np.add.reduceat(by_column**2, first_columns, axis=1) ** 0.5
+        max_wrench = by_actuator.sum(axis=1)
         rng = np.random.default_rng(seed)
         self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
         dynamics = dynamics_of(complete_body(layout))
         inertia = np.array(dynamics.inertia)
-        pace = np.clip(np.sqrt(HOLDS * most / (inertia * REACHED)), SLOWEST, FASTEST)
-        # Damping of about 0.8.
-        least = np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
-        self._stiff = inertia * pace**2
-        self._damp = inertia * np.maximum(1.6 * pace, least)
-        swing = 2.0 * math.pi / np.array(PERIODS_S).T
-        damp = 1j * swing * (self._damp + np.array(dynamics.linear))
-        moved = 1.0 / np.abs(self._stiff - inertia * swing**2 + damp)
-        self._size = np.minimum(np.array(SHARE) * most, SHAKEN_TO * REACHED / moved.mean(axis=0))
+        # K = M omega_0^2 and D = 2 zeta M omega_0 hold each axis.
+        omega_0 = np.sqrt(HOLDING_SHARE * max_wrench / (inertia * AXIS_BOUNDS))
+        omega_0 = np.clip(omega_0, BANDWIDTH_MIN, BANDWIDTH_MAX)
+        self._stiffness = inertia * omega_0**2
+        self._damping = inertia * np.maximum(DAMPING_FACTOR * omega_0, DAMPING_MIN)
+        # Motion per wrench at the sines' frequencies: 1 / |K - M omega^2 + i omega D|.
+        omega = 2.0 * math.pi / np.array(PERIODS_S).T
+        damping = 1j * omega * (self._damping + np.array(dynamics.linear_damping))
+        compliance = 1.0 / np.abs(self._stiffness - inertia * omega**2 + damping)
+        by_strength = np.array(EXCITATION_SHARES) * max_wrench
+        by_excursion = EXCURSION_SHARE * AXIS_BOUNDS / compliance.mean(axis=0)
+        self._amplitude = np.minimum(by_strength, by_excursion)
 
     def reset(self) -> None:
         """Nothing is remembered."""
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, delivered: Array) -> Array:
-        """Returns the wrench (6,) [N, N m]."""
+        """Returns the wrench (6,) that holds the place and shakes the robot [N, N m].
+
+        Args:
+            measurement: of now.
+            setpoint: the place.
+            delivered: not used.
+
+        Raises:
+            FinlabError: the robot left its bounds.
+        """
         away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
         c = math.cos(measurement.yaw)
         s = math.sin(measurement.yaw)
@@ -119,25 +140,25 @@ class ExcitingController:
             [c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0]
         )
         error[3:] = wrapped(-np.array([measurement.roll, measurement.pitch, measurement.yaw]))
-        speed = np.concatenate([measurement.velocity, measurement.rates])
+        nu = np.concatenate([measurement.velocity, measurement.rates])
         tilt = max(abs(measurement.roll), abs(measurement.pitch))
-        used = max(
-            math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2]
-        )
-        if used > MOST_USED:
+        distance = math.hypot(away[0], away[1])
+        bounds_factor = max(distance / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
+        if bounds_factor > BOUNDS_FACTOR_MAX:
             raise FinlabError(
                 f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
                 f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, "
                 f"tilted by {math.degrees(tilt):.0f} deg; check its body, "
                 "above all center_of_buoyancy_m and buoyancy_n"
             )
-        shaken = min(1.0, max(0.0, 2.0 - 2.0 * used)) * self.excitation(measurement.time)
-        return np.asarray(self._stiff * error - self._damp * speed + shaken)
+        fade = min(1.0, max(0.0, 2.0 - 2.0 * bounds_factor))
+        excitation = fade * self.excitation(measurement.time)
+        return np.asarray(self._stiffness * error - self._damping * nu + excitation)
 
     def excitation(self, time: float) -> Array:
         """The sum of sines (6,) at a time [s], at most the amplitude of each axis."""
         angle = 2 * math.pi * time / np.array(PERIODS_S) + self._phase
-        return np.asarray(self._size * np.sin(angle).mean(axis=1))
+        return np.asarray(self._amplitude * np.sin(angle).mean(axis=1))
 
 
 @dataclass(frozen=True)
@@ -161,21 +182,21 @@ class Exciting(Method):
         super().__init__(layout, settings, scale, weights)
         self._rng = np.random.default_rng(self.settings.seed)
         self._owner = _owners(layout)
-        self._most = largest_forces(layout)
-        # Each gives its share of what it can.
-        share = self._most / self._most.max()
-        columns = layout_effectiveness(layout) * share
-        self._to_force = share[:, None] * np.linalg.pinv(columns, rcond=1e-6)
-        _, values, right = np.linalg.svd(columns)
-        rank = int((values > 1e-6 * values[0]).sum())
-        self._inner = right[rank:] * self._most
-        self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
-        self._calls = 0
+        self._max_force = largest_forces(layout)
+        # Each gives its share of what it can: the weighted pseudoinverse, and the null space N.
+        weight = self._max_force / self._max_force.max()
+        B = layout_effectiveness(layout) * weight
+        self._force_by_wrench = weight[:, None] * np.linalg.pinv(B, rcond=1e-6)
+        _, singular_values, V_T = np.linalg.svd(B)
+        rank = int((singular_values > 1e-6 * singular_values[0]).sum())
+        self._null_space = V_T[rank:] * self._max_force
+        self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._null_space), 2))
+        self._tick = 0
         self._is_fin = layout.is_fin
         self._direction: Array | None = None
         if layout.n_fins:
             self._plant = plant_of(layout.fins_alone)
-            self._largest = self._most[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
+            self._largest = self._max_force[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
             self._grid = self._plant.grid((13, 41, 1))
             self._amplitude = self._plant.upper[:, 0]
 
@@ -185,24 +206,25 @@ class Exciting(Method):
 
     def _command(self, target: Array) -> Array:
         """The next command (n, 3); each call is a tick of the controller."""
-        time = self._calls * PERIOD_S
-        k = np.arange(len(self._inner))
+        time = self._tick * PERIOD_S
+        k = np.arange(len(self._null_space))
         swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
         swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
-        force = self._to_force @ target + (INNER_SHARE * swing @ self._inner if len(k) else 0.0)
+        force = self._force_by_wrench @ target
+        force = force + (INNER_SHARE * swing @ self._null_space if len(k) else 0.0)
         command = np.zeros((self.layout.n, 3))
         for i, part in enumerate(self.layout.actuators):
             command[i] = part.pushing(force[self._owner == i])
         command = self.plant.feasible(command)
         if self._is_fin.any():
-            own = force[np.isin(self._owner, np.flatnonzero(self._is_fin))].reshape(-1, 2)
-            command[self._is_fin] = self._beat(own)
-        self._calls += 1
+            of_fins = force[np.isin(self._owner, np.flatnonzero(self._is_fin))].reshape(-1, 2)
+            command[self._is_fin] = self._fin_commands(of_fins)
+        self._tick += 1
         return command
 
-    def _beat(self, force: Array) -> Array:
+    def _fin_commands(self, force: Array) -> Array:
         """Commands (n, 3) of the fins for forces (n, 2) [N] along zero and shaft x zero."""
-        if self._calls % round(REDRAW_S / PERIOD_S) == 0:
+        if self._tick % round(REDRAW_S / PERIOD_S) == 0:
             share = self._rng.uniform(0.2, 1.0, self._plant.n_fins)
             lower = self._plant.lower[:, 0]
             upper = self._plant.upper[:, 0]
@@ -210,20 +232,22 @@ class Exciting(Method):
         size = np.hypot(*force.T)
         direction = np.arctan2(force[:, 1], force[:, 0])
         if self._direction is not None:
-            most = TURN_RAD_S * PERIOD_S
+            max_turn = TURN_RAD_S * PERIOD_S
             turn = wrapped(direction - self._direction)
-            # What is not yet turned gives only its part along the force; across and against it,
-            # nothing.
-            direction = self._direction + np.clip(turn, -most, most)
-            size = size * np.maximum(np.cos(turn - np.clip(turn, -most, most)), 0.0)
+            turned = np.clip(turn, -max_turn, max_turn)
+            direction = self._direction + turned
+            # A fin that is still turning gives only its part along the force; across and against
+            # it, nothing.
+            size = size * np.maximum(np.cos(turn - turned), 0.0)
         self._direction = direction
-        tried = self._grid.copy()
-        tried[..., 2] = direction
-        tried = self._plant.feasible(tried)
-        miss = np.abs(np.linalg.norm(self._plant.forces(tried), axis=-1) - size) / self._largest
-        other = np.abs(tried[..., 0] - self._amplitude) / self._plant.upper[:, 0]
-        best = np.argmin(miss + 0.05 * other, axis=0)
-        return np.asarray(tried[best, np.arange(self._plant.n_fins)])
+        grid = self._grid.copy()
+        grid[..., 2] = direction
+        grid = self._plant.feasible(grid)
+        force_size = np.linalg.norm(self._plant.forces(grid), axis=-1)
+        force_error = np.abs(force_size - size) / self._largest
+        amplitude_error = np.abs(grid[..., 0] - self._amplitude) / self._plant.upper[:, 0]
+        best = np.argmin(force_error + AMPLITUDE_WEIGHT * amplitude_error, axis=0)
+        return np.asarray(grid[best, np.arange(self._plant.n_fins)])
 
 
 def _owners(layout: Layout) -> NDArray[np.intp]:

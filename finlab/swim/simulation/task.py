@@ -20,13 +20,16 @@ STEP_S = 0.05
 SLOPE_S = (0.2, 1.0)
 """Least and most time on both sides from which a trajectory's velocity and acceleration are taken
 [s]."""
-RESTING = 0.005
+RESTING_SPEED = 0.005
 """Horizontal speed [m/s] below which a trajectory counts as resting."""
 SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
+"""Largest trajectory file."""
 MAX_SCALE = 1000.0
-Place = tuple[Array | float, Array | float, Array | float]
+"""Largest factor of a path."""
+PathPoints = tuple[Array | float, Array | float, Array | float]
+"""x, y and z of points of a path [m], each (N,) or one number for all."""
 COLUMNS = ("t", "x", "y", "z")
 """Columns of a trajectory file: time [s], position in the world [m]."""
 
@@ -35,9 +38,17 @@ class Trajectory:
     """Positions at times, with straight lines between them."""
 
     def __init__(self, name: str, time: Array, position: Array) -> None:
-        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m]. Raises
-        DataError: fewer than two samples, less than a second, times that do not rise from 0, or
-        values that are not finite."""
+        """Takes the samples of a path.
+
+        Args:
+            name: of the trajectory.
+            time: rising times (N,) from 0 [s].
+            position: at these, in the world (N, 3) [m].
+
+        Raises:
+            DataError: fewer than two samples, less than a second, times that do not rise from 0, or
+                values that are not finite.
+        """
         time = np.asarray(time, np.float64)
         position = np.asarray(position, np.float64)
         if len(time) < 2 or position.shape != (len(time), 3):
@@ -63,7 +74,7 @@ class Trajectory:
         # Over less than the samples' spacing the acceleration would be a row of spikes.
         self._slope_s = float(np.clip(np.median(np.diff(time)), *SLOPE_S))
         along = np.diff(position[:, :2], axis=0)
-        self._moves = np.flatnonzero(np.hypot(*along.T) > RESTING * np.diff(time))
+        self._moves = np.flatnonzero(np.hypot(*along.T) > RESTING_SPEED * np.diff(time))
         self._headings = np.arctan2(along[self._moves, 1], along[self._moves, 0])
 
     def position(self, time: float | Array) -> Array:
@@ -75,15 +86,15 @@ class Trajectory:
         # A path may end under way: what would stop it there within a moment is no part of it.
         dt = self._slope_s
         middle = min(time, self.duration_s - dt)
-        here, behind, between, ahead = self.position(
-            np.array([time, middle - dt, middle, middle + dt])
-        )
+        times = np.array([time, middle - dt, middle, middle + dt])
+        position, behind, between, ahead = self.position(times)
         if time > self.duration_s:
-            return Setpoint(here, 0.0, onward=self._onward(time))
+            return Setpoint(position, 0.0, onward=self._onward(time))
+        # Central differences.
         velocity = (ahead - behind) / (2 * dt)
-        speed = math.sqrt(velocity @ velocity)
         acceleration = (ahead - 2 * between + behind) / dt**2
-        return Setpoint(here, speed, velocity, acceleration, self._onward(time))
+        speed = math.sqrt(velocity @ velocity)
+        return Setpoint(position, speed, velocity, acceleration, self._onward(time))
 
     def _onward(self, time: float) -> float:
         """Heading [rad] of the first piece from `time` [s] on that does not rest; else that of the
@@ -96,20 +107,26 @@ class Trajectory:
 
     def start(self) -> tuple[Array, float]:
         """The first position, and the heading of the first horizontal metre or of what there is."""
-        away = np.hypot(*(self.samples[:, :2] - self.samples[0, :2]).T)
-        first = int(np.argmax(away > min(0.05, 0.5 * float(away.max()))))
+        distance = np.hypot(*(self.samples[:, :2] - self.samples[0, :2]).T)
+        first = int(np.argmax(distance > min(0.05, 0.5 * float(distance.max()))))
         dx, dy = self.samples[first, :2] - self.samples[0, :2]
         return self.samples[0].copy(), math.atan2(dy, dx)
 
 
-def _eased(name: str, duration_s: float, at: Callable[[Array], Place]) -> Trajectory:
-    """The path through places by the shares that are done of it: from rest to a steady speed within
-    `RAMP_S`."""
+def _eased(name: str, duration_s: float, path: Callable[[Array], PathPoints]) -> Trajectory:
+    """A trajectory along a path, from rest to a steady speed within `RAMP_S`.
+
+    Args:
+        name: of the trajectory.
+        duration_s: how long it takes [s].
+        path: from shares of the path, 0 to 1, to its points.
+    """
     time = np.arange(0.0, duration_s + STEP_S / 2, STEP_S)
     ramp = np.clip(time / RAMP_S, 0.0, 1.0)
     # Integral of a smoothstep from 0 to 1, then straight on.
-    done = np.where(time < RAMP_S, RAMP_S * (ramp**3 - 0.5 * ramp**4), time - 0.5 * RAMP_S)
-    return Trajectory(name, time, np.stack(np.broadcast_arrays(*at(done / done[-1])), axis=-1))
+    arc = np.where(time < RAMP_S, RAMP_S * (ramp**3 - 0.5 * ramp**4), time - 0.5 * RAMP_S)
+    points = np.broadcast_arrays(*path(arc / arc[-1]))
+    return Trajectory(name, time, np.stack(points, axis=-1))
 
 
 def circle(duration_s: float = 60.0) -> Trajectory:
@@ -117,14 +134,14 @@ def circle(duration_s: float = 60.0) -> Trajectory:
     return _eased(
         "circle",
         duration_s,
-        lambda at: (1.2 * np.sin(TURN * at), 1.2 * (1.0 - np.cos(TURN * at)), -1.0),
+        lambda share: (1.2 * np.sin(TURN * share), 1.2 * (1.0 - np.cos(TURN * share)), -1.0),
     )
 
 
 def lissajous(duration_s: float = 90.0) -> Trajectory:
     """An eight of 3 m by 1.5 m whose depth swings by 0.25 m about 1 m twice in a round."""
 
-    def eight(share: Array) -> Place:
+    def eight(share: Array) -> PathPoints:
         twice = 2.0 * TURN * share
         return (
             1.5 * np.sin(TURN * share),
@@ -155,14 +172,18 @@ def square(duration_s: float = 90.0) -> Trajectory:
 def dive(duration_s: float = 60.0) -> Trajectory:
     """Straight ahead for 6 m, down from 1 m to 2 m and up again, at slopes of up to 28 degrees."""
     return _eased(
-        "dive", duration_s, lambda at: (6.0 * at, 0.0, -1.0 - 0.5 * (1.0 - np.cos(TURN * at)))
+        "dive",
+        duration_s,
+        lambda share: (6.0 * share, 0.0, -1.0 - 0.5 * (1.0 - np.cos(TURN * share))),
     )
 
 
 def straight(duration_s: float = 60.0, speed: float = 0.15) -> Trajectory:
     """Straight ahead at 1 m depth, from rest to a speed [m/s]."""
-    far = speed * (duration_s - 0.5 * RAMP_S)
-    return _eased(f"straight at {speed:g} m/s", duration_s, lambda at: (far * at, 0.0, -1.0))
+    length = speed * (duration_s - 0.5 * RAMP_S)
+    return _eased(
+        f"straight at {speed:g} m/s", duration_s, lambda share: (length * share, 0.0, -1.0)
+    )
 
 
 def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station") -> Trajectory:

@@ -66,7 +66,7 @@ def perturbed(
         quadratic_damping=_scaled(body.quadratic_damping, damping),
         added_mass=_scaled(body.added_mass, added_mass),
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
-        buoyancy_n=buoyancy * Vehicle(body).lift,
+        buoyancy_n=buoyancy * Vehicle(body).buoyancy,
     )
     swum = replace(layout, body=changed)
     if askew == 0.0 and not any(center):

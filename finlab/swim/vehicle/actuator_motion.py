@@ -1,4 +1,8 @@
-"""Actuators that follow their commands: for simulation, observer and monitor."""
+"""Actuators that follow their commands, each as fast as its lag and rates allow.
+
+Whoever has to know what the actuators do uses it: the simulated robot (`simulation/devices.py`),
+the closed loop's account of the wrench that was given, the fault monitor, and the fit of a robot.
+"""
 
 from collections.abc import Sequence
 
@@ -10,27 +14,33 @@ from finlab.axes import TURN, is_full_turn
 from finlab.layout import Actuator, Layout
 from finlab.swim.vehicle.fin_motion import FinLag
 
-AT_ONCE, UNLIMITED = 1e-9, 1e12
-"""Time constant [s] and rate [per s] of what follows at once."""
+NO_LAG_S = 1e-9
+"""Time constant [s] of what follows at once: no division by 0."""
+UNLIMITED_RATE = 1e12
+"""Rate [per s] of what follows at once: no infinity less infinity."""
 
 
-class FirstOrder:
-    """m actuators that are no fins; commands (m, 3) are those of the layout."""
+class FirstOrderLag:
+    """m actuators that are no fins: lags of first order with a largest rate.
+
+    Commands (m, 3) are those of the layout. Far from its command a value changes at its largest
+    rate, and from an error of rate times time constant on it decays exponentially.
+    """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
         """Starts at rest: no force, angles as near to 0 as their arcs allow."""
         m = len(actuators)
         self._rate = np.minimum(
-            np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED
+            np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED_RATE
         )
-        self._time_constant = np.full((m, 3), AT_ONCE)
+        self._time_constant = np.full((m, 3), NO_LAG_S)
         self._circles = np.zeros((m, 3), bool)
         self._angles = np.zeros((m, 3), bool)
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
             self._time_constant[i, each.KIND.lagging_number] = getattr(
-                each, "time_constant", AT_ONCE
+                each, "time_constant", NO_LAG_S
             )
             if not each.KIND.sticks_at_angle:
                 continue
@@ -40,36 +50,50 @@ class FirstOrder:
             self._circles[i, 0] = is_full_turn(high - low)
             self.value[i, 0] = min(max(0.0, low), high)
         self._corner = self._rate * self._time_constant
-        self.before = self.value
+        self.value_before = self.value
         """The same before the last step."""
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (m, 3) for `dt` [s]; one whose row is NaN stops at once and does not
-        turn."""
-        self.before = value = self.value
+        """Follows a command over a step.
+
+        Args:
+            command: (m, 3); an actuator whose row is NaN stops at once and does not turn.
+            dt: length of the step [s].
+        """
+        value = self.value
         error = command - value
         error = np.where(self._circles, error - TURN * np.rint(error / TURN), error)
         size = np.abs(error)
-        run = np.minimum(np.maximum(size - self._corner, 0.0) / self._rate, dt)
-        left = (size - run * self._rate) * np.exp((run - dt) / self._time_constant)
+        # At the largest rate down to the corner, then exponentially for what is left of dt.
+        time_at_rate = np.minimum(np.maximum(size - self._corner, 0.0) / self._rate, dt)
+        size_at_corner = size - time_at_rate * self._rate
+        size_after = size_at_corner * np.exp((time_at_rate - dt) / self._time_constant)
+        followed = value + np.sign(error) * (size - size_after)
         stopped = np.where(self._angles, value, 0.0)
-        self.value = np.where(np.isnan(command), stopped, value + np.sign(error) * (size - left))
+        self.value_before = value
+        self.value = np.where(np.isnan(command), stopped, followed)
 
 
 class ActuatorMotion:
     """What the actuators of one layout do if they follow as they should; commands are (n, 3)."""
 
     def __init__(self, layout: Layout, fins: FinLag | None = None) -> None:
-        """Starts at rest; `fins` follows the fins, by default without what happens within the
-        beat."""
-        self.of_fins, self.of_others = np.flatnonzero(layout.is_fin), np.flatnonzero(~layout.is_fin)
-        """Places of the fins and of the others."""
+        """Starts at rest.
+
+        Args:
+            layout: the robot.
+            fins: follows the fins; by default without what happens within the beat.
+        """
+        self.fin_indices = np.flatnonzero(layout.is_fin)
+        """Which actuators are fins."""
+        self.other_indices = np.flatnonzero(~layout.is_fin)
+        """Which are not."""
         self.fins = FinLag(layout) if fins is None else fins
-        self.others = FirstOrder([layout.actuators[i] for i in self.of_others])
-        self._held = np.array([part.KIND.stuck_number for part in layout.actuators])
-        self._places = np.arange(layout.n)
+        self.others = FirstOrderLag([layout.actuators[i] for i in self.other_indices])
+        self._held_columns = np.array([part.KIND.stuck_number for part in layout.actuators])
+        self._indices = np.arange(layout.n)
         self._working = np.ones(layout.n, bool)
-        widths = (layout.upper - layout.lower)[self._places, self._held]
+        widths = (layout.upper - layout.lower)[self._indices, self._held_columns]
         self.angles: NDArray[np.bool_] = np.array(
             [part.KIND.sticks_at_angle for part in layout.actuators]
         )
@@ -78,21 +102,31 @@ class ActuatorMotion:
         """Which actuators (n,) may come to any direction."""
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (n, 3) for `dt` [s]; an actuator whose row is NaN stops at once."""
-        if not len(self.of_others):
+        """Follows a command over a step.
+
+        Args:
+            command: (n, 3); an actuator whose row is NaN stops at once.
+            dt: length of the step [s].
+        """
+        if not len(self.other_indices):
             return self.fins.step(command, dt)
         self._working = np.isfinite(command[:, 0])
-        if len(self.of_fins):
-            self.fins.step(command[self.of_fins], dt)
-        self.others.step(command[self.of_others], dt)
+        if len(self.fin_indices):
+            self.fins.step(command[self.fin_indices], dt)
+        self.others.step(command[self.other_indices], dt)
 
     def joined(self, of_fins: Array, of_others: Array) -> Array:
-        """Values (n, ...) of all actuators, of those of the fins and of the others."""
-        if not len(self.of_others):
+        """Returns the values (n, ...) of all actuators.
+
+        Args:
+            of_fins: those of the fins (n_fins, ...).
+            of_others: those of the others (n - n_fins, ...).
+        """
+        if not len(self.other_indices):
             return of_fins
-        result = np.empty((len(self._places), *of_others.shape[1:]))
-        result[self.of_fins] = of_fins
-        result[self.of_others] = of_others
+        result = np.empty((len(self._indices), *of_others.shape[1:]))
+        result[self.fin_indices] = of_fins
+        result[self.other_indices] = of_others
         return result
 
     @property
@@ -105,25 +139,31 @@ class ActuatorMotion:
         """Which actuators (n,) may give a force: fins that beat, whatever the law says of others,
         and all others but those that have stopped."""
         result = self._working.copy()
-        result[self.of_fins] = self.fins.value[0] * self.fins.value[1] > 0.0
+        result[self.fin_indices] = self.fins.value[0] * self.fins.value[1] > 0.0
         return result
 
     @property
     def direction(self) -> Array:
         """Where each actuator (n,) would stay if it stuck: a fin's zero direction, another one's
         angle [rad], or a force [N]."""
-        others = self.others.value[np.arange(len(self.of_others)), self._held[self.of_others]]
-        return self.joined(self.fins.value[2], others)
+        rows = np.arange(len(self.other_indices))
+        of_others = self.others.value[rows, self._held_columns[self.other_indices]]
+        return self.joined(self.fins.value[2], of_others)
 
     def held_part(self, command: Array) -> Array:
         """The parts (..., n) of commands (..., n, 3) that stay where an actuator sticks."""
-        part: Array = command[..., self._places, self._held]
+        part: Array = command[..., self._indices, self._held_columns]
         return part
 
     def turned_to(self, command: Array, direction: Array) -> Array:
-        """Commands (..., n, 3) whose held parts are those of `direction` (..., n) where it is not
-        NaN."""
+        """Returns commands of actuators that stick.
+
+        Args:
+            command: (..., n, 3).
+            direction: (..., n) the held part of each, as `direction` gives it; NaN where it does
+                not stick.
+        """
         result = command.copy()
-        kept = np.where(np.isnan(direction), self.held_part(result), direction)
-        result[..., self._places, self._held] = kept
+        held = np.where(np.isnan(direction), self.held_part(result), direction)
+        result[..., self._indices, self._held_columns] = held
         return result

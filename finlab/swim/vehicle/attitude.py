@@ -14,7 +14,13 @@ from finlab.arrays import Array
 
 
 def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """The attitude (w, x, y, z) after turns about z, then y, then x [rad]."""
+    """Returns the attitude (w, x, y, z) after turns about z, then y, then x.
+
+    Args:
+        roll: about x [rad].
+        pitch: about y [rad], positive nose down.
+        yaw: about z [rad].
+    """
     cr = math.cos(0.5 * roll)
     sr = math.sin(0.5 * roll)
     cp = math.cos(0.5 * pitch)
@@ -58,31 +64,38 @@ def rotation_of_angles(angles: Array) -> tuple[Array, ...]:
     """The rotations of roll, pitch and yaw (3, ...) [rad]."""
     cr, cp, cy = np.cos(angles)
     sr, sp, sy = np.sin(angles)
-    first = cy * cp, sy * cp, -sp
-    second = cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr
-    third = cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr
-    return (*first, *second, *third)
+    x_axis = (cy * cp, sy * cp, -sp)
+    y_axis = (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
+    z_axis = (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)
+    return (*x_axis, *y_axis, *z_axis)
 
 
 def tilt_of(rotation: tuple[float, ...]) -> tuple[float, float]:
     """Roll and pitch of a rotation [rad]."""
-    _, _, down, _, _, across, _, _, along = rotation
-    return math.atan2(across, along), math.asin(min(max(-down, -1.0), 1.0))
+    _, _, r31, _, _, r32, _, _, r33 = rotation
+    return math.atan2(r32, r33), math.asin(min(max(-r31, -1.0), 1.0))
 
 
 def to_body(rotation: tuple[Any, ...], x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """A vector in the world as the body sees it."""
+    """Returns a vector (x, y, z) of the world in the body frame."""
     r11, r21, r31, r12, r22, r32, r13, r23, r33 = rotation
-    return r11 * x + r21 * y + r31 * z, r12 * x + r22 * y + r32 * z, r13 * x + r23 * y + r33 * z
+    return (r11 * x + r21 * y + r31 * z, r12 * x + r22 * y + r32 * z, r13 * x + r23 * y + r33 * z)
 
 
 def to_world(rotation: tuple[Any, ...], u: Any, v: Any, w: Any) -> tuple[Any, Any, Any]:
-    """A vector in the body frame as the world sees it."""
+    """Returns a vector (u, v, w) of the body frame in the world."""
     r11, r21, r31, r12, r22, r32, r13, r23, r33 = rotation
-    return r11 * u + r12 * v + r13 * w, r21 * u + r22 * v + r23 * w, r31 * u + r32 * v + r33 * w
+    return (r11 * u + r12 * v + r13 * w, r21 * u + r22 * v + r23 * w, r31 * u + r32 * v + r33 * w)
 
 
 def in_world(velocity: Array, roll: float, pitch: float, yaw: float) -> Array:
-    """A velocity in the body frame, the first three of an array, in the world (3,) [m/s]."""
+    """Returns a velocity in the world (3,) [m/s].
+
+    Args:
+        velocity: in the body frame, the first three numbers of an array [m/s].
+        roll: about x [rad].
+        pitch: about y [rad], positive nose down.
+        yaw: about z [rad].
+    """
     rotation = rotation_of_quaternion(*quaternion_of(roll, pitch, yaw))
     return np.array(to_world(rotation, *velocity[:3].tolist()))

@@ -16,38 +16,54 @@ from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn
 from finlab.layout import Layout
 
+TURN_SHARE_MIN = 0.1
+"""Share of its speed that a servo turns its fin with, however fast that flaps."""
+
+COPPER_LOSS = 0.5
+"""Heat in the windings of a fin's motor [W/(N m)^2]: `copper_loss` of a robot that swims in
+simulation. Our choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings
+take 730 W/(N m)^2 at its own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its
+fin turns twice a second."""
+
 
 class LagStep(NamedTuple):
-    """The exact step of critically damped filters towards aims that stay: for an error e = x - aim,
-    e <- kept e + carried x' and x' <- driven e + slowed x'."""
+    """The exact step of critically damped filters, x'' = -2 p x' - p^2 e, towards constant targets.
 
-    kept: Array
-    """Share of the error that is left."""
-    carried: Array
-    """What the rate adds to it [s]."""
-    driven: Array
-    """What the error adds to the rate [1/s]."""
-    slowed: Array
-    """Share of the rate that is left."""
+    With the error e = x - target, the double pole p and the length h of the step, its transition
+    matrix is
+
+        (e, x') <- exp(-p h) [[1 + p h, h], [-p^2 h, 1 - p h]] (e, x')
+    """
+
+    error_by_error: Array
+    error_by_rate: Array
+    """[s]."""
+    rate_by_error: Array
+    """[1/s]."""
+    rate_by_rate: Array
 
     @classmethod
     def of(cls, pole: Array, dt: float) -> "LagStep":
-        """The step over `dt` [s] of filters with double poles [rad/s], of any shape."""
+        """Returns the step of filters.
+
+        Args:
+            pole: p [rad/s], of any shape.
+            dt: h, length of the step [s].
+        """
         decay = np.exp(-pole * dt)
         return cls(
-            (1.0 + pole * dt) * decay,
-            dt * decay,
-            -(pole**2) * dt * decay,
-            (1.0 - pole * dt) * decay,
+            error_by_error=(1.0 + pole * dt) * decay,
+            error_by_rate=dt * decay,
+            rate_by_error=-(pole**2) * dt * decay,
+            rate_by_rate=(1.0 - pole * dt) * decay,
         )
 
-    def follow(self, value: Array, rate: Array, aim: Array) -> tuple[Array, Array]:
-        """Values and rates after the step."""
-        error = value - aim
-        return (
-            aim + self.kept * error + self.carried * rate,
-            self.driven * error + self.slowed * rate,
-        )
+    def follow(self, value: Array, rate: Array, target: Array) -> tuple[Array, Array]:
+        """Returns values and rates after the step, all arguments of the poles' shape."""
+        error = value - target
+        value_after = target + self.error_by_error * error + self.error_by_rate * rate
+        rate_after = self.rate_by_error * error + self.rate_by_rate * rate
+        return value_after, rate_after
 
 
 class FinLag:
@@ -60,7 +76,7 @@ class FinLag:
         lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
         self._turns_fully = is_full_turn(upper - lower)
         self._poles = np.ascontiguousarray(layout.servo_poles.reshape(-1, 3).T)
-        self._fastest_swing = layout.speed_limit / TURN
+        self._max_swing = layout.speed_limit / TURN  # largest A f [rad/s]
         self.value = np.zeros((3, layout.n_fins))
         """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
         (3, n)."""
@@ -76,25 +92,32 @@ class FinLag:
         return self.value.T.copy()
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs
-        still."""
+        """Follows a command over a step.
+
+        Args:
+            command: (n, 3) [rad, Hz, rad]; a fin whose row is NaN stops at once and hangs still.
+            dt: length of the step [s].
+        """
         self._follow(command, dt)
 
     def _follow(self, command: Array, dt: float) -> NDArray[np.bool_] | None:
         """Takes the step; returns which fins (n,) hang still, or None where all follow."""
         if dt != self._dt:
-            self._dt, self._lag = dt, LagStep.of(self._poles, dt)
+            self._dt = dt
+            self._lag = LagStep.of(self._poles, dt)
         before = self.value
-        aim = command.T.copy()
-        lost = np.isnan(aim[0])
+        target = command.T.copy()
+        lost = np.isnan(target[0])
         some_lost = bool(lost.any())
         if some_lost:
-            aim[:, lost] = before[:, lost]
-        np.minimum(aim[0], self._fastest_swing / np.maximum(aim[1], 1e-9), out=aim[0])
-        turn = aim[2] - before[2]
-        aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.rint(turn / TURN), turn)
-        value, rate = self._lag.follow(before, self.rate, aim)
-        np.minimum(value[0], self._fastest_swing / np.maximum(value[1], 1e-9), out=value[0])
+            target[:, lost] = before[:, lost]
+        # A f is bounded by the servo's speed, before the filter and behind it.
+        np.minimum(target[0], self._max_swing / np.maximum(target[1], 1e-9), out=target[0])
+        turn = target[2] - before[2]
+        shorter_turn = turn - TURN * np.rint(turn / TURN)
+        target[2] = before[2] + np.where(self._turns_fully, shorter_turn, turn)
+        value, rate = self._lag.follow(before, self.rate, target)
+        np.minimum(value[0], self._max_swing / np.maximum(value[1], 1e-9), out=value[0])
         if some_lost:
             value[:2, lost] = 0.0
             value[2, lost] = before[2, lost]
@@ -102,16 +125,6 @@ class FinLag:
         self.value = value
         self.rate = rate
         return lost if some_lost else None
-
-
-CREEP = 0.1
-"""Share of its speed that a servo turns its fin with, however fast that flaps."""
-
-COPPER_LOSS = 0.5
-"""Heat in the windings of a fin's motor [W/(N m)^2]: `copper_loss` of a robot that swims in
-simulation. Our choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings
-take 730 W/(N m)^2 at its own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its
-fin turns twice a second."""
 
 
 class FinMotion(FinLag):
@@ -122,9 +135,9 @@ class FinMotion(FinLag):
         """Starts at rest, as `FinLag`."""
         super().__init__(layout)
         self._speed_limit = layout.speed_limit
-        self._creep = CREEP * self._speed_limit
+        self._min_turn_speed = TURN_SHARE_MIN * self._speed_limit
         self._before = self.value
-        self._change = np.zeros((3, layout.n_fins))
+        self._acceleration = np.zeros((3, layout.n_fins))
         self.phase = np.zeros(layout.n_fins)
         """Phase of the flapping [rad]."""
 
@@ -136,14 +149,15 @@ class FinMotion(FinLag):
         value = self.value
         rate = self.rate
         # What flapping leaves of the servo's speed is there to turn the fin.
-        spare = np.maximum(self._speed_limit - value[0] * (TURN * value[1]), self._creep)
-        turned = np.minimum(np.maximum(value[2] - before[2], -spare * dt), spare * dt)
-        value[2] = before[2] + turned
-        rate[2] = np.minimum(np.maximum(rate[2], -spare), spare)
+        swing = value[0] * (TURN * value[1])
+        turn_speed = np.maximum(self._speed_limit - swing, self._min_turn_speed)
+        turn = np.minimum(np.maximum(value[2] - before[2], -turn_speed * dt), turn_speed * dt)
+        value[2] = before[2] + turn
+        rate[2] = np.minimum(np.maximum(rate[2], -turn_speed), turn_speed)
         if lost is not None:
             before = np.where(lost, value, before)
         self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
-        self._change = (rate - rate_before) / dt
+        self._acceleration = (rate - rate_before) / dt
         self._before = before
 
     @property
@@ -158,19 +172,20 @@ class FinMotion(FinLag):
         return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
 
     def speed_and_acceleration(self) -> tuple[Array, Array]:
-        """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change
-        their aim as means over the last step."""
+        """Returns the fins' angular speeds (n,) [rad/s] and accelerations (n,) [rad/s^2]; those by
+        changes of the command are means over the last step."""
+        # theta = A sin(phase) + phi, phase' = omega: differentiated twice
+        amplitude, frequency, _ = self.value
+        amplitude_rate, frequency_rate, phi_rate = self.rate
+        amplitude_acceleration, _, phi_acceleration = self._acceleration
+        omega = TURN * frequency
+        swing = amplitude * omega
         sine = np.sin(self.phase)
         cosine = np.cos(self.phase)
-        swing = TURN * self.value[1]
-        fast = self.value[0] * swing
-        growth = self.rate[0]
-        speed = self.rate[2] + growth * sine + fast * cosine
-        acceleration = (
-            self._change[2]
-            + (self._change[0] - fast * swing) * sine
-            + (2.0 * growth * swing + (TURN * self.value[0]) * self.rate[1]) * cosine
-        )
+        speed = phi_rate + amplitude_rate * sine + swing * cosine
+        by_sine = amplitude_acceleration - swing * omega
+        by_cosine = 2.0 * amplitude_rate * omega + (TURN * amplitude) * frequency_rate
+        acceleration = phi_acceleration + by_sine * sine + by_cosine * cosine
         return speed, acceleration
 
 
@@ -189,9 +204,14 @@ class FinPower(NamedTuple):
 def fin_power(
     speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS
 ) -> FinPower:
-    """The power of fins with angular speeds (..., n) [rad/s] and accelerations (..., n) [rad/s^2];
-    the torque is that of a rigid plate in still water, and `copper_loss` the heat in its motor
-    [W/(N m)^2]."""
+    """Returns the power of fins; the torque is that of a rigid plate in still water.
+
+    Args:
+        speed: angular speeds omega (..., n) [rad/s].
+        acceleration: angular accelerations alpha (..., n) [rad/s^2].
+        blade: inertia and drag of the fins, each (n,).
+        copper_loss: heat in a motor's windings [W/(N m)^2].
+    """
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
     mechanical = np.maximum(torque * speed, 0.0)
     inertial = np.abs(blade.own_inertia * acceleration * speed)

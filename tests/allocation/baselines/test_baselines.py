@@ -13,11 +13,11 @@ from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.physics.objective import yardstick
-from finlab.research.networks.trained import Normalization
+from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot, normalized_error
 
-NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+NORMALIZATION = WrenchNormalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 EXACT = ("analytic", "sqp", "ipopt")
 ALL = (*EXACT, "qp")
 THRUST = 4.737410112522892

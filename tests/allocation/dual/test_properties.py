@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
-from finlab.allocation.modes import force_sizes, mode_signature, same_signature
 from finlab.layout import Layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot, normalized_error
+from webapp.tasks.modes import force_sizes, mode_signature, same_signature
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""

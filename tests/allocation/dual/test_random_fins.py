@@ -16,7 +16,7 @@ from finlab.physics.objective import Name, cost_meter
 from finlab.research.evaluation.splits import make_split
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
-from tests.random_fins import KINDS, random_robot
+from tests.random_fins import KINDS, random_robot_of_fins
 
 Array = NDArray[np.float64]
 LAWS = KINDS[:3]
@@ -49,7 +49,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
     method = AnyRobot()
     for seed in range(4):
-        layout = random_robot(
+        layout = random_robot_of_fins(
             np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7)
         )
         batch = method.allocate_batch(layout, reachable(layout, 12, seed))
@@ -64,7 +64,7 @@ def test_no_more_than_brute_force_finds() -> None:
     method = AnyRobot()
     ratio = []
     for seed in range(2):
-        layout = random_robot(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
+        layout = random_robot_of_fins(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
         for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
             answer = method.allocate(layout, target)
             if answer.err_norm < 1e-5:

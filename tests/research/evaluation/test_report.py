@@ -18,7 +18,7 @@ import pytest
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.research.evaluation import report_page
-from finlab.research.evaluation.document import FORMATS, Column, Table, to_markdown, to_text
+from finlab.research.evaluation.document import FORMATS, Column, ReportTable, to_markdown, to_text
 from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.research.evaluation.plots import candidates_picture, fins_picture, temperature_picture
 from finlab.research.evaluation.report_page import PAGE, TABLES, make_report
@@ -151,7 +151,7 @@ BLOCKS = (
     "# A title & more",
     "One **line**.",
     "## First section",
-    Table(COLUMNS, ROWS),
+    ReportTable(COLUMNS, ROWS),
     "- one\n- two",
 )
 

@@ -11,7 +11,13 @@ from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.errors import DataError
 from finlab.layout import Limits
 from finlab.physics import plant_of
-from finlab.research.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
+from finlab.research.evaluation.splits import (
+    NEAR_ANGLE,
+    NEAR_POSITION,
+    SPLITS,
+    SplitCase,
+    make_split,
+)
 
 N = 60
 FINS = {"ood-fins": (6, 8), "many-fins": (9, 12)}
@@ -29,11 +35,11 @@ QUICK = [split for split in SPLITS if split != "tables" and split not in ROBOTS]
 
 
 @cache
-def _cases(split: str) -> list[Case]:
+def _cases(split: str) -> list[SplitCase]:
     return make_split(split, N, 2, 1234)
 
 
-def _outside(case: Case) -> bool:
+def _outside(case: SplitCase) -> bool:
     return any((np.abs(fin.position) > (0.3, 0.3, 0.1)).any() for fin in case.layout.fins)
 
 

@@ -7,8 +7,8 @@ from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
 from finlab.research.mdn.answers import (
-    Answers,
     EffortRobot,
+    RefinedAnswers,
     Steps,
     effort_robot,
     follow,
@@ -72,7 +72,7 @@ def test_where_none_is_exact_the_cheapest_of_the_nearest_is_first() -> None:
     robot = robot_of(4)
     error = np.array([[0.1, 0.10003, 0.3], [0.0, 0.0, 1e-3]])
     effort = np.array([[3.0, 2.0, 1.0], [2.0, 1.99, 1.0]])
-    given = Answers(
+    given = RefinedAnswers(
         np.zeros((2, 3, 4, 3)), np.zeros((2, 3, 6)), error, effort, np.arange(6).reshape(2, 3)
     )
     assert ranked(robot, given).origin.tolist() == [[1, 0, 2], [4, 3, 5]]

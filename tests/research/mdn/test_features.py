@@ -14,7 +14,14 @@ from finlab.physics import plant_of
 from finlab.physics.objective import effort_of_shares
 from finlab.research.mdn.answers import effort_robot
 from finlab.research.mdn.descent import EffortProblem, realize, wrench
-from finlab.research.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
+from finlab.research.mdn.features import (
+    SHARES,
+    VECTORS,
+    RobotView,
+    features,
+    features_of,
+    robot_view,
+)
 from finlab.research.mdn.network import NODE_SIZE, PAIR_SIZE, ForceMixture, ForceNetworkConfig
 from finlab.research.networks.checkpoint import read_checkpoint
 from finlab.research.random_layouts import random_layout
@@ -58,7 +65,7 @@ def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout
 
 def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.ndarray]:
     """What is seen of a target (6,) [N, N m]."""
-    found = see(robot_view(problem_of(layout, std)), target[None] / std)
+    found = features_of(robot_view(problem_of(layout, std)), target[None] / std)
     return [found.nodes[0], found.pairs[0]]
 
 
@@ -139,7 +146,7 @@ def test_documented_features_of_a_hand_made_fin() -> None:
     problem = problem_of(layout)
     top = problem.fins.maximum[0]
     target = 0.25 * top * problem.effectiveness[1]  # a quarter of its force, straight up
-    found = see(robot_view(problem), target[None])
+    found = features_of(robot_view(problem), target[None])
     node = found.nodes[0, 0]
     assert node.shape == (NODE_SIZE,) and found.frame[0, 0] == pytest.approx(1j, abs=1e-4)
     np.testing.assert_allclose(node[:3], [0.5, 0.2, np.log(0.251) / 7.0], atol=1e-3)
@@ -159,7 +166,7 @@ def test_documented_features_of_a_hand_made_fin() -> None:
 
 
 def test_no_target_is_no_trouble(layout: Layout) -> None:
-    found = see(robot_view(problem_of(layout)), np.zeros((2, 6)))
+    found = features_of(robot_view(problem_of(layout)), np.zeros((2, 6)))
     assert np.isfinite(found.nodes).all() and np.isfinite(found.pairs).all()
     np.testing.assert_array_equal(found.frame, 1.0)
 

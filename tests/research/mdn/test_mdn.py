@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort
 from finlab.research.mdn.answers import follow
-from finlab.research.mdn.features import see, shares
-from finlab.research.mdn.method import STEPS, Mdn
+from finlab.research.mdn.features import features_of, shares
+from finlab.research.mdn.method import STEPS, Mdn, MdnSettings
 from finlab.research.networks.checkpoint import read_checkpoint
 from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot
@@ -72,7 +71,7 @@ def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
 def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:
     """Of the mixture's components, for `TARGET`."""
     method, target = method_of(robot, layout)
-    return np.asarray(method.mixture(see(method.robot.view, target)).complex_parts()[0][0])
+    return np.asarray(method.mixture(features_of(method.robot.view, target)).complex_parts()[0][0])
 
 
 def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a: Layout) -> None:

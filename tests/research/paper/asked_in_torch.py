@@ -4,7 +4,7 @@ import torch
 
 from finlab.layout import Layout
 from finlab.research.networks.trained import TrainedWeights
-from finlab.research.paper.training.samples import ROBOT, Batch
+from finlab.research.paper.training.samples import ROBOT, SampleBatch
 from finlab.research.paper.training.train import surrogate_of
 
 
@@ -13,6 +13,8 @@ def wrench_in_torch(weights: TrainedWeights, layout: Layout, command: torch.Tens
     rows, n, _ = command.shape
     parts = [torch.tensor(getattr(layout, name), dtype=command.dtype) for name in ROBOT[:-1]]
     parts = [part.expand(rows, *part.shape) for part in parts]
-    batch = Batch(*parts, torch.ones(rows, n, dtype=torch.bool), command, torch.empty(rows, 6))
+    batch = SampleBatch(
+        *parts, torch.ones(rows, n, dtype=torch.bool), command, torch.empty(rows, 6)
+    )
     wrench: torch.Tensor = surrogate_of(weights, dtype=command.dtype)(command, batch)
     return wrench

@@ -16,8 +16,8 @@ from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort
 from finlab.research.networks.trained import (
-    Normalization,
     TrainedWeights,
+    WrenchNormalization,
     sizes_for_file,
     to_command,
     to_normalized,
@@ -42,7 +42,9 @@ def checkpoint() -> TrainedWeights:
         name="tiny",
         surrogate_sizes={"kind": "mlp", "hidden": [32]},
         surrogate=arrays_of(first_weights(surrogate.shapes(), 1)),
-        normalization=Normalization(np.full(6, 0.01), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])),
+        normalization=WrenchNormalization(
+            np.full(6, 0.01), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+        ),
         fin_model={"type": "drag"},
         network_sizes=sizes_for_file(sizes),
         network=arrays_of(first_weights(sizes.shapes(), 0)),

@@ -7,7 +7,7 @@ import torch
 from finlab.errors import CheckpointError
 from finlab.layout import Layout, Limits
 from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.research.networks.trained import Normalization, TrainedWeights
+from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
 from finlab.research.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from finlab.research.random_layouts import random_layout
 from tests.research.paper.asked_in_torch import wrench_in_torch
@@ -30,7 +30,7 @@ def untrained(*hidden: int) -> TrainedWeights:
     config = SurrogateConfig(hidden)
     state = {name: rng.normal(0.0, 0.2, shape) for name, shape in config.shapes().items()}
     state = {name: values.astype(np.float32) for name, values in state.items()}
-    normalization = Normalization(np.zeros(6), np.ones(6))
+    normalization = WrenchNormalization(np.zeros(6), np.ones(6))
     return TrainedWeights(
         "random",
         normalization,

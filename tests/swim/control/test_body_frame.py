@@ -63,7 +63,7 @@ def wrench_at(controller: control.WaypointController, x: float, y: float, z: flo
 def test_the_printed_law_of_a_waypoint_at_rest() -> None:
     controller = control.WaypointController(load_layout("A"))
     k_d, k_z, k_psi = controller.gains
-    most = controller.most
+    most = controller.max_wrench
     ahead = wrench_at(controller, 0.3, 0.1, -1.1)
     e = math.atan2(0.1, 0.3)
     expected = [k_d * math.hypot(0.3, 0.1) * math.cos(e), 0.0, -0.1 * k_z, 0.0, 0.0, k_psi * e]
@@ -82,25 +82,27 @@ def test_the_yaw_rate_is_damped_and_bounded() -> None:
     np.testing.assert_allclose(wrench, [0, 0, 0, 0, 0, -0.2 * controller.yaw_damping], atol=1e-9)
     spun = AT_REST._replace(rates=np.array([0.0, 0.0, -99.0]))
     wrench = controller.wrench(spun, control.Setpoint(np.array([50.0, 0.0, 50.0]), 9.0), NO_WRENCH)
-    bounds = controller.surge.most, controller.depth.most, controller.max_yaw
+    bounds = controller.surge.max_force, controller.depth.max_force, controller.max_yaw
     np.testing.assert_allclose(wrench[[0, 2, 5]], bounds)
 
 
 def test_a_bounded_force_does_not_wind_up_the_integral() -> None:
-    pid = Pid(2.0, 1.0, 0.0, most=3.0)
+    pid = Pid(2.0, 1.0, 0.0, max_force=3.0)
     held = [pid.step(5.0) for _ in range(600)]  # as of a robot that is held fast for a minute
-    assert held == [3.0] * 600 and abs(pid.summed) < 3.0
-    assert pid.step(-0.1) < 3.0 and pid.summed < 3.0
+    assert held == [3.0] * 600 and abs(pid.integral_force) < 3.0
+    assert pid.step(-0.1) < 3.0 and pid.integral_force < 3.0
 
 
 def test_an_integral_makes_up_for_a_force_that_stays() -> None:
-    pid = Pid(2.0, 1.0, 3.0, most=5.0)
+    pid = Pid(2.0, 1.0, 3.0, max_force=5.0)
     height = 0.0
     climb = 0.0
     for _ in range(600):
         climb += 0.1 * (pid.step(-height) - 1.5 - climb)
         height += 0.1 * climb
-    assert height == pytest.approx(0.0, abs=1e-3) and pid.summed == pytest.approx(1.5, abs=0.01)
+    assert height == pytest.approx(0.0, abs=1e-3) and pid.integral_force == pytest.approx(
+        1.5, abs=0.01
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in control.CONTROLLERS if name != "tracking"])

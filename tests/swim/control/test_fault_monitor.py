@@ -161,7 +161,7 @@ def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:
 def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     monitor = FaultMonitor(layout_a)
     nowhere = np.full(4, np.nan)
-    beliefs = monitor._beliefs
+    beliefs = monitor._hypotheses
     before = beliefs._probability.copy(), beliefs.doubt
     beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
     for sure in (True, False, True):
@@ -169,9 +169,9 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
         beliefs.doubt = before[1]
         if sure:
             beliefs.probability[2, 0] = beliefs.doubt = 0.99
-        monitor._judge(nowhere)
+        monitor._decide(nowhere)
         assert monitor.verdict().damage == Damage()
-    monitor._judge(nowhere)
+    monitor._decide(nowhere)
     assert monitor.verdict().damage.lost == (layout_a.names[2],), "the second in a row decides"
 
 

@@ -54,16 +54,17 @@ def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) ->
     ahead = np.tile([0.5, 1.5, 0.0], (4, 1))
     for _ in range(20):
         step = model.step(z, 0.0, ahead, free, free)
-    assert step.noise is None and not model.unsure.any()
+    assert step.turn_about_covariance is None and not model.is_turning_about.any()
     about = ahead.copy()
     about[1, 2] = 3.1
     step = model.step(z, 0.0, about, free, free)
-    assert model.unsure.tolist() == [False, True, False, False]
-    assert step.noise is not None
+    assert model.is_turning_about.tolist() == [False, True, False, False]
+    assert step.turn_about_covariance is not None
     wrench, _ = model._wrenches(about, free, free, z[:6])
     np.testing.assert_array_less(
-        np.abs(0.1 * wrench[1] / model.inertia), np.sqrt(np.diag(step.noise)) + 1e-12
+        np.abs(0.1 * wrench[1] / model.inertia),
+        np.sqrt(np.diag(step.turn_about_covariance)) + 1e-12,
     )
     for _ in range(15):
         step = model.step(z, 0.0, about, free, free)
-    assert step.noise is None and not model.unsure.any()
+    assert step.turn_about_covariance is None and not model.is_turning_about.any()

@@ -8,7 +8,7 @@ import pytest
 from finlab import load_layout
 from finlab.layout import Layout
 from finlab.swim.control import Measurement, MotionObserver
-from finlab.swim.control.observer import Estimate
+from finlab.swim.control.observer import MotionEstimate
 from finlab.swim.simulation import make_trajectory
 from finlab.swim.simulation.truth import perturbed
 from finlab.swim.vehicle.attitude import euler, quaternion_of
@@ -31,7 +31,7 @@ def watched(
     truth: Layout | None = None,
     current: tuple[float, float, float] = (0.0, 0.0, 0.0),
     said: list[float] | None = None,
-) -> tuple[Estimate, np.ndarray]:
+) -> tuple[MotionEstimate, np.ndarray]:
     """What an observer believes at the end of a swim under a constant wrench, and what is true."""
     vehicle = Vehicle(complete_body(truth or robot))
     vehicle.current = current
@@ -82,7 +82,7 @@ def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
     observer = MotionObserver(robot, 0.01)
     sway = 0.0
     for _ in range(1000):
-        sway = observer.swayed(sway, 0.1, 0.5)
+        sway = observer.sway_after(sway, 0.1, 0.5)
     assert sway < 0.0
     assert 100.7 * sway - 260.0 * sway**2 == pytest.approx(-59.0 * 0.1 * 0.5, rel=0.02)
 

@@ -8,7 +8,7 @@ import pytest
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor, MonitorSettings
-from finlab.swim.control.probe import FORCE_N, Probe
+from finlab.swim.control.probe import PROBE_FORCE_N, Probe
 
 LEAST = MonitorSettings().least_push
 NONE = np.zeros(4, dtype=bool)
@@ -43,7 +43,7 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
     told = FaultMonitor(layout_a, settings=settings)
     told.tell(layout_a.names[2], 0.0)
     found = FaultMonitor(layout_a, settings=settings)
-    found._lost[2] = True
+    found._is_lost[2] = True
     beats = [np.isfinite(found.probed(command)[2, 0]) for _ in range(90)]
     assert beats == [30 <= k % 60 < 50 or k >= 60 and k < 80 for k in range(1, 91)]
     assert all(np.isnan(told.probed(command)[2, 0]) for _ in range(90))
@@ -52,7 +52,7 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
     ):  # ten ticks into a probe: it is turned and swings up as fast as the servos may
         probed = found.probed(command)
     push = forces(layout_a, probed)[2]
-    assert push[1] == pytest.approx(FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
+    assert push[1] == pytest.approx(PROBE_FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
 
 
 def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None:
@@ -61,7 +61,7 @@ def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None
     settings = replace(MonitorSettings(), probe_every_s=3.0)
     monitor = FaultMonitor(layout_a, settings=settings)
     rng = np.random.default_rng(0)
-    monitor._lost[2] = True
+    monitor._is_lost[2] = True
     command = np.tile([0.3, 0.2, 0.0], (4, 1))
     most = 0.1 * layout_a.rates
     before = None

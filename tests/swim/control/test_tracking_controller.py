@@ -10,7 +10,7 @@ from finlab import load_layout
 from finlab.layout import Layout, Servo
 from finlab.research.evaluation.method_specs import load_method_spec
 from finlab.swim.control import Controller, Measurement, Setpoint, TrackingController, gains_for
-from finlab.swim.control.tracking_controller import BEHIND_S
+from finlab.swim.control.tracking_controller import SENSOR_DELAY_S
 from finlab.swim.simulation import ClosedLoop, make_trajectory
 from finlab.swim.simulation.truth import perturbed
 from tests.any_robot import AnyRobot
@@ -35,7 +35,7 @@ def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
     fast = gains_for(robot)
     halved = gains_for(slow)
     for name in ("velocity", "heading", "path"):
-        late = (2.0 / 1.75 + BEHIND_S) / (2.0 / 3.5 + BEHIND_S)
+        late = (2.0 / 1.75 + SENSOR_DELAY_S) / (2.0 / 3.5 + SENSOR_DELAY_S)
         assert getattr(halved, name) == pytest.approx(getattr(fast, name) / late)
     assert halved.max_wrench == fast.max_wrench
 

@@ -12,7 +12,8 @@ from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec
 from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor
-from finlab.swim.identification.fitted_robot import OnlineFit, leaned
+from finlab.swim.identification.fitted_robot import with_lean
+from finlab.swim.identification.online_fit import OnlineFit
 from finlab.swim.simulation import ClosedLoop, Fault, make_trajectory
 from tests.exhaustive import sampled
 
@@ -22,7 +23,7 @@ def test_a_minute_of_swimming_divides_the_true_miss_by_three(name: str) -> None:
     """Actuators lean by 5 degrees, one this way and the next that way, and give 0.8 of their
     force."""
     layout = load_layout(name)
-    truth = leaned(layout, np.radians(5.0 * (-1.0) ** np.arange(layout.n)))
+    truth = with_lean(layout, np.radians(5.0 * (-1.0) ** np.arange(layout.n)))
     plant = plant_of(truth)
     rng = np.random.default_rng(3)
     command = layout.lower + (layout.upper - layout.lower) * rng.random((60, layout.n, 3))

@@ -26,8 +26,8 @@ TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
 
 def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
     """Strength of each fin over what the layout said, and its standard error."""
-    found = fit.found("strength")
-    error = fit.found_error("strength")
+    found = fit.estimate("strength")
+    error = fit.standard_error("strength")
     pairs = zip(np.exp(found).tolist(), (np.exp(found) * error).tolist(), strict=True)
     return dict(zip(fit.model.layout.names, pairs, strict=True))
 
@@ -57,13 +57,13 @@ def fit(drawn: Layout, truth: Layout) -> RobotFit:
 def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
     for name, (found, error) in strengths(fit).items():
         assert found == pytest.approx(STRENGTH[name], abs=max(4.0 * error, 0.02)) and error < 0.05
-    turned = fit.found("mounting")
-    error = fit.found_error("mounting")
+    turned = fit.estimate("mounting")
+    error = fit.standard_error("mounting")
     np.testing.assert_array_less(
         np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01)
     )
-    center = fit.found("center")
-    error = fit.found_error("center")
+    center = fit.estimate("center")
+    error = fit.standard_error("center")
     np.testing.assert_allclose(center, CENTER, atol=0.004)
     assert (error < 0.004).all()
 
@@ -105,8 +105,8 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     late[1:, [0, 1, 5]] = measured[:-1, [0, 1, 5]]
     made = Swim("late", replay(drawn, command)[2:], late[2:])
     found = fit_robot(drawn, [made], other_law=False)
-    delay = found.found("delay")
-    error = found.found_error("delay")
+    delay = found.estimate("delay")
+    error = found.standard_error("delay")
     # The made-up swims themselves take forces from the ends of steps of 0.02 s.
     np.testing.assert_array_less(
         np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02)
@@ -123,7 +123,7 @@ def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
     whole[:, :, [0, 2]] = motion
     found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured))], other_law=False)
     assert any("front_left" in doubt for doubt in found.doubts())
-    assert "strength of front_left, logarithm" in found.untold()
+    assert "strength of front_left, logarithm" in found.undetermined()
     assert summary(found)[0].startswith("not to be trusted")
 
 

@@ -9,7 +9,7 @@ from finlab import Allocator, load_layout
 from finlab.cli import main
 from finlab.layout import Layout
 from finlab.swim.control import FaultMonitor
-from finlab.swim.identification.fitted_robot import OnlineFit
+from finlab.swim.identification.online_fit import OnlineFit
 from finlab.swim.identification.robot_fit import RobotFit, fit_robot
 from finlab.swim.identification.robot_model import opposed_in
 from finlab.swim.identification.swim import read_swim
@@ -46,7 +46,7 @@ def test_a_reversed_motor_is_named_and_the_rest_is_fitted(
     found = fitted(wrong, path)
     assert good.opposed == () and found.opposed == (right.names[motor],)
     assert found.explained > good.explained - 0.03
-    np.testing.assert_allclose(np.exp(found.found("strength")), 1.0, atol=0.15)
+    np.testing.assert_allclose(np.exp(found.estimate("strength")), 1.0, atol=0.15)
 
 
 def test_the_command_line_names_it_and_writes_the_corrected_layout(

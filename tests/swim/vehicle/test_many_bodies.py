@@ -6,14 +6,8 @@ import numpy as np
 
 from finlab.swim.vehicle.attitude import euler, quaternion_of
 from finlab.swim.vehicle.fossen import GRAVITY, Dynamics, dynamics_of, ucat_body
-from finlab.swim.vehicle.vehicle import (
-    Bodies,
-    Vehicle,
-    body_rates,
-    body_velocity,
-    derivative,
-    integrate,
-)
+from finlab.swim.vehicle.many_bodies import Bodies, body_rates, body_velocity, derivative, integrate
+from finlab.swim.vehicle.vehicle import Vehicle
 
 CURRENT = (0.07, -0.04)
 
@@ -46,17 +40,17 @@ def test_derivatives_agree_with_the_vehicle() -> None:
     rng = np.random.default_rng(0)
     state = rng.uniform(-0.6, 0.6, (12, 30))
     wrench = rng.uniform(-3.0, 3.0, (6, 30))
-    pace = derivative(state, wrench, *bodies(30))
+    rate = np.array(derivative(state, wrench, *bodies(30)))
     for k in range(30):
         angles = state[3:6, k]
         full = np.concatenate([state[:3, k], quaternion(angles), state[6:, k]])
         np.testing.assert_allclose(euler(full[3:7]), angles, atol=1e-12)
         exact = np.array(of_vehicle().derivative(full.tolist(), wrench[:, k].tolist()))
         np.testing.assert_allclose(
-            pace[[0, 1, 2, *range(6, 12)], k], exact[[0, 1, 2, *range(7, 13)]], atol=1e-9
+            rate[[0, 1, 2, *range(6, 12)], k], exact[[0, 1, 2, *range(7, 13)]], atol=1e-9
         )
         ahead = (euler(full[3:7] + 1e-6 * exact[3:7]) - euler(full[3:7] - 1e-6 * exact[3:7])) / 2e-6
-        np.testing.assert_allclose(pace[3:6, k], ahead, atol=1e-6)
+        np.testing.assert_allclose(rate[3:6, k], ahead, atol=1e-6)
 
 
 def test_integration_follows_the_vehicle() -> None:
@@ -78,6 +72,6 @@ def test_integration_follows_the_vehicle() -> None:
 def test_rates_and_velocities_from_the_pose() -> None:
     rng = np.random.default_rng(2)
     state = rng.uniform(-0.5, 0.5, (12, 20))
-    pace = derivative(state, np.zeros((6, 20)), *bodies(20))
-    np.testing.assert_allclose(body_rates(state[3:6].T, pace[3:6].T), state[9:].T, atol=1e-12)
-    np.testing.assert_allclose(body_velocity(state[3:6].T, pace[:3].T), state[6:9].T, atol=1e-12)
+    rate = np.array(derivative(state, np.zeros((6, 20)), *bodies(20)))
+    np.testing.assert_allclose(body_rates(state[3:6].T, rate[3:6].T), state[9:].T, atol=1e-12)
+    np.testing.assert_allclose(body_velocity(state[3:6].T, rate[:3].T), state[6:9].T, atol=1e-12)

@@ -66,7 +66,7 @@ def energy_of(vehicle: Vehicle, state: np.ndarray) -> float:
     return (
         kinetic
         + vehicle.weight * z
-        - vehicle.lift * (z + float(np.dot(up, vehicle.dynamics.center)))
+        - vehicle.buoyancy * (z + float(np.dot(up, vehicle.dynamics.center_of_buoyancy)))
     )
 
 

@@ -13,7 +13,7 @@ from finlab.research.evaluation.experiment import Experiment, check_names, paper
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.plots import candidates_picture
 from finlab.research.evaluation.scoring import joined, mean_interval, paper_sigma, score
-from finlab.research.evaluation.splits import Case, make_split
+from finlab.research.evaluation.splits import SplitCase, make_split
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
@@ -24,7 +24,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the
 refined ones, so no refinement follows the mean."""
-TIMED_CALLS = 5  # single calls whose mean time a row shows, after one that is not counted
+TIMED_CALLS = 5
+"""Single calls whose mean time a row shows, after one that is not counted."""
 
 
 def run(
@@ -90,7 +91,9 @@ def run(
     return rows
 
 
-def candidate_points(method: MethodSpec, case: Case, seed: int) -> dict[str, list[list[float]]]:
+def candidate_points(
+    method: MethodSpec, case: SplitCase, seed: int
+) -> dict[str, list[list[float]]]:
     """Normalized error by the surrogate and effort of the candidates for the first target of a
     case, `raw` as they were drawn and `refined`."""
     target = case.targets[0]

@@ -29,7 +29,7 @@ LOST_M = 1.0
 """A robot that is ever farther than this from its reference has lost it."""
 
 
-class Swim(NamedTuple):
+class SwimCase(NamedTuple):
     """One robot along one path, allocated by a method, steered by a controller, with or without
     losses."""
 
@@ -45,16 +45,17 @@ class Swim(NamedTuple):
     """Of the noise."""
 
 
-Case = tuple[Any, ...]  # what a row is of
+SwimKey = tuple[Any, ...]
+"""What a row is of."""
 
 
 def repeated(
     methods: Mapping[str, MethodSpec],
-    cases: Sequence[tuple[Case, Swim]],
+    cases: Sequence[tuple[SwimKey, SwimCase]],
     seeds: Sequence[int],
     what: str,
     row_of: Callable[[RunLog], Row],
-) -> list[tuple[Case, list[Row]]]:
+) -> list[tuple[SwimKey, list[Row]]]:
     """Each case with what `row_of` makes of its swim with each seed, on the cluster where there is
     one."""
     swims = [swim._replace(seed=seed) for _, swim in cases for seed in seeds]
@@ -62,7 +63,7 @@ def repeated(
     return [(case, list(islice(rows, len(seeds)))) for case, _ in cases]
 
 
-def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: Swim) -> Row:
+def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: SwimCase) -> Row:
     allocator = methods[swim.method].on(swim.layout)
     law = make_controller(swim.controller, swim.layout)
     lost = [(name, swim.lost_s) for name in swim.lost]
@@ -133,7 +134,7 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-def mean_rows(keys: Sequence[str], done: Iterable[tuple[Case, Sequence[Row]]]) -> list[Row]:
+def mean_rows(keys: Sequence[str], done: Iterable[tuple[SwimKey, Sequence[Row]]]) -> list[Row]:
     """One row for each case, a value for each key, of the rows of its runs."""
     return [
         {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 
 from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
@@ -13,7 +13,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     ERRORS,
     LOST_M,
     POWER,
-    Swim,
+    SwimCase,
     follow_row,
     mean_rows,
     repeated,
@@ -23,11 +23,12 @@ from finlab.swim.control import steers
 from finlab.swim.simulation import make_trajectory
 
 HEALTHY = "healthy"
-ALLOWED = 1.15  # growth of the error over the healthy robot's that one lost fin should not exceed
+ALLOWED = 1.15
+"""Growth of the error over the healthy robot's that one lost fin should not exceed."""
 
 
 @dataclass(frozen=True)
-class Fault:
+class LossCase:
     """Names of fins that are lost, when [s], and whether the others still give surge, heave and yaw
     independently."""
 
@@ -42,7 +43,7 @@ class Fault:
         return f"{' + '.join(self.fins)} lost{when}" if self.fins else HEALTHY
 
 
-def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
+def loss_cases(layout: Layout, half_way_s: float) -> list[LossCase]:
     """The healthy robot, each fin and each pair lost from the start, and each fin at a time [s];
     never all."""
     names = layout.names
@@ -51,7 +52,7 @@ def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
         ((name,), half_way_s) for name in names
     ]
     return [
-        Fault(tuple(fins), time, steers(layout, tuple(fins)))
+        LossCase(tuple(fins), time, steers(layout, tuple(fins)))
         for fins, time in lost
         if len(fins) < len(names)
     ]
@@ -80,22 +81,23 @@ def run(
     """
     robot = in_worker(load_layout, layout)
     path = in_worker(make_trajectory, trajectory)
-    faults = all_faults(robot, path.duration_s / 2)
+    losses = loss_cases(robot, path.duration_s / 2)
     specs = load_method_specs(methods, checkpoint)
-    cases = [
-        ((fault.label, name), Swim(robot, path, name, controller, fault.fins, fault.time_s))
-        for fault, name in product(faults, specs)
-        if fault.controllable
-    ]
+    cases = []
+    for loss in losses:
+        if not loss.controllable:
+            continue
+        for name in specs:
+            swim = SwimCase(robot, path, name, controller, loss.fins, loss.time_s)
+            cases.append(((loss.label, name), swim))
     done = repeated(specs, cases, range(seed, seed + runs), "faults", follow_row)
     rows = mean_rows(("fault", "method"), done)
     healthy = {row["method"]: row["ate"] for row in rows if row["fault"] == HEALTHY}
     for row, (_, errors_of) in zip(rows, done, strict=True):
         row["over_healthy"] = row["ate"] / healthy[row["method"]]
         row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
-    return rows + [
-        {"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable
-    ]
+    not_swum = [loss.label for loss in losses if not loss.controllable]
+    return rows + [{"fault": label, "kept": "not swum"} for label in not_swum]
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

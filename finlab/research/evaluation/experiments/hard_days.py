@@ -26,8 +26,10 @@ from finlab.swim.simulation import (
     perturbed,
 )
 
-TWO = ("A", "C")  # those that swim most of the days: a symmetric one and one that is not
-CURRENT = (0.05, -0.05, 0.0)  # 7 cm/s across the path [m/s]
+TWO = ("A", "C")
+"""Those that swim most of the days: a symmetric one and one that is not."""
+CURRENT = (0.05, -0.05, 0.0)
+"""7 cm/s across the path [m/s]."""
 
 HEAVY = ("bluerov2_heavy",)
 OTHER_HEAVY = Body(
@@ -46,7 +48,7 @@ BUILT_OFF = {"askew": math.radians(5.0), "center": (-0.016, 0.012, 0.0)}
 off."""
 
 
-class Case(NamedTuple):
+class HardDaySwim(NamedTuple):
     """One swim of a day: the name of a layout, and those of the fins that are weak or lost."""
 
     layout: str
@@ -88,11 +90,11 @@ class HardDay:
         """The trajectory that is followed, in the world frame."""
         return make_trajectory(self.trajectory, self.duration_s, self.scale)
 
-    def cases(self) -> list[Case]:
+    def cases(self) -> list[HardDaySwim]:
         """Every swim of one seed: each layout, with each fin or pair that is weak or lost."""
         affected = 1 if self.weak is not None else self.lost
         return [
-            Case(name, fins)
+            HardDaySwim(name, fins)
             for name in self.layouts
             for fins in combinations(load_layout(name).names, affected)
         ]
@@ -120,12 +122,12 @@ class HardDay:
         own = {"body": self.body or robot.body, "interaction": self.jets or robot.interaction}
         return perturbed(replace(robot, **own), **self.truth)  # type: ignore[arg-type]
 
-    def is_hopeless(self, case: Case) -> bool:
+    def is_hopeless(self, case: HardDaySwim) -> bool:
         """Whether what is left of the robot cannot give independently what the controller
         commands."""
         return self.lost > 0 and not steers(load_layout(case.layout), case.fins)
 
-    def swim(self, case: Case, method: MethodSpec, seed: int) -> ClosedLoop:
+    def swim(self, case: HardDaySwim, method: MethodSpec, seed: int) -> ClosedLoop:
         """A swim of `cases()`, ready to start; the seed is of noise, biases and mixed fins."""
         robot = self.robot(case.layout, seed)
         path = self.path()

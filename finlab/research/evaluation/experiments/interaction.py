@@ -26,7 +26,7 @@ from finlab.physics.objective import yardstick
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, progress
 from finlab.research.evaluation.method_specs import own_function
-from finlab.research.interaction.drawn_samples import Judge, drawn, with_jets
+from finlab.research.interaction.random_samples import WrenchOracle, random_samples, with_jets
 from finlab.research.random_layouts import random_jet_robot, random_shaft_fin
 
 GROUPS = {
@@ -65,21 +65,21 @@ def run(
         own: samples of each robot that a ridge regression is given.
         seed: of all draws.
     """
-    judge = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
+    oracle = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
     with tempfile.TemporaryDirectory() as folder:
-        models = _models(judge, layouts, steps, network, own, seed, Path(folder))
+        models = _models(oracle, layouts, steps, network, own, seed, Path(folder))
         for group, (count, kinds) in GROUPS.items():
             cases = []
             for k in range(robots):
                 rng = np.random.default_rng([32_000, seed, k])
                 layout = random_jet_robot(rng, f"robot_{k + 1}", count, kinds)
-                wrench = judge(layout, Plant(layout).sample(rng, (targets,)))
+                wrench = oracle(layout, Plant(layout).sample(rng, (targets,)))
                 command = Plant(layout).sample(rng, (max(own, default=0) + 1 or 1,))
                 noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
-                measured = judge(layout, command) + noise * rng.normal(size=(len(command), 6))
+                measured = oracle(layout, command) + noise * rng.normal(size=(len(command), 6))
                 cases.append((layout, wrench, Samples(layout, command, measured)))
             for name, model in models.items():
-                yield {"robots": group, "model": name} | _row(judge, model, cases, name)
+                yield {"robots": group, "model": name} | _row(oracle, model, cases, name)
 
 
 Model = Callable[[Samples], Interaction | None]
@@ -87,7 +87,7 @@ Model = Callable[[Samples], Interaction | None]
 
 
 def _models(
-    judge: Judge,
+    oracle: WrenchOracle,
     layouts: int,
     steps: int,
     network: str | None,
@@ -98,7 +98,7 @@ def _models(
     from finlab.research.interaction.surrogate_form import trained_surrogate
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
-    samples = drawn(judge, layouts, 20, seed, 0.02, (4, 8))
+    samples = random_samples(oracle, layouts, 20, seed, 0.02, (4, 8))
     if network is None:
         train(samples, folder, recipe(steps), seed)
     file = network or str(folder / WEIGHTS_FILE)
@@ -120,7 +120,9 @@ def _some(samples: Samples, count: int) -> Samples:
     return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
 
 
-def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str) -> Row:
+def _row(
+    oracle: WrenchOracle, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str
+) -> Row:
     each = list[tuple[float, float, float]]()
     for layout, wrenches, samples in progress(cases, "robot", name):
         scale = yardstick(layout)
@@ -131,9 +133,9 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
         command = method.solve(wrenches, policy=CLOSEST).command
         if name == "oracle":
             command = np.array(
-                [_exact(judge, method, w, u) for w, u in zip(wrenches, command, strict=True)]
+                [_exact(oracle, method, w, u) for w, u in zip(wrenches, command, strict=True)]
             )
-        missed = (judge(layout, command) - wrenches) / scale
+        missed = (oracle(layout, command) - wrenches) / scale
         force = body_force(method.plant.force(command), layout.frames)
         deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
         watts = method.plant.power(command).sum(axis=1)
@@ -152,7 +154,7 @@ def _row(judge: Judge, model: Model, cases: list[tuple[Layout, Array, Samples]],
     }
 
 
-def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
+def _exact(oracle: WrenchOracle, method: Dual, wrench: Array, command: Array) -> Array:
     """A command near to another one (n, 3) that gives a wrench (6,) by the plant: least Newton
     steps."""
     plant = method.plant
@@ -162,7 +164,7 @@ def _exact(judge: Judge, method: Dual, wrench: Array, command: Array) -> Array:
     for _ in range(ROUNDS):
         steps = 1e-4 * np.eye(command.size).reshape(-1, *command.shape) * width
         given = (
-            judge(method.layout, np.concatenate([command[None], command + steps])) / method.scale
+            oracle(method.layout, np.concatenate([command[None], command + steps])) / method.scale
         )
         error = float(np.linalg.norm(given[0] - wrench / method.scale))
         if error < least:

@@ -27,15 +27,22 @@ from finlab.research.evaluation.method_specs import (
 )
 from finlab.research.random_layouts import random_layout, random_robot, random_thruster
 
-DOMAIN = 0xF1257  # leads the seed of every robot
-REFERENCE = "dual"  # the method that the others are compared with, where it takes part
-LAYOUTS = 5  # robots of each kind whose calls are timed
-TARGETS = 40  # directions of wrenches on each of them
-WARM_UP = 2  # first calls on each robot that are not counted; a robot keeps its layout for long
-FAR = 1e3  # how many times a wrench lies beyond its robot's reach for certain
-TICK, AT = 0.05, 0.6
-"""From tick to tick a target goes by this share of the way to the next direction, at this share of
-reach."""
+DOMAIN = 0xF1257
+"""Leads the seed of every robot."""
+REFERENCE = "dual"
+"""The method that the others are compared with, where it takes part."""
+LAYOUTS = 5
+"""Robots of each kind whose calls are timed."""
+TARGETS = 40
+"""Directions of wrenches on each of them."""
+WARM_UP = 2
+"""First calls on each robot that are not counted; a robot keeps its layout for long."""
+FAR = 1e3
+"""How many times a wrench lies beyond its robot's reach for certain."""
+DIRECTION_STEP = 0.05
+"""Share of the way to the next direction by which a target moves from tick to tick."""
+REACH_SHARE = 0.6
+"""Size of targets that wander, as a share of reach."""
 _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
 
 
@@ -169,9 +176,10 @@ def call_times(
 
 def _wandering(rim: Array, tick: int) -> Array:
     """The target (6,) at a tick: on the straight way from one direction to the next."""
-    place, rest = divmod(TICK * tick, 1.0)
-    first, then = (rim[(int(place) + i) % len(rim)] for i in range(2))
-    return np.asarray(AT * ((1.0 - rest) * first + rest * then))
+    corner, fraction = divmod(DIRECTION_STEP * tick, 1.0)
+    begin = rim[int(corner) % len(rim)]
+    end = rim[(int(corner) + 1) % len(rim)]
+    return np.asarray(REACH_SHARE * ((1.0 - fraction) * begin + fraction * end))
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
@@ -205,8 +213,8 @@ experiment = Experiment(
         "robot gives "
         "in the direction of the target; beyond it, methods answer with the nearest wrench. Next "
         "tick: "
-        f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` "
-        "and `mdn` "
+        f"targets wander at {REACH_SHARE:g} of reach, and the command before is known, whose rates "
+        "`dual` and `mdn` "
         "alone keep to. Power: where both deliver."
     ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},

@@ -12,7 +12,7 @@ from finlab.layout import load_layout
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, check_names
 from finlab.research.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row
-from finlab.research.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
+from finlab.research.evaluation.experiments.hard_days import HARD_DAYS, HardDay, HardDaySwim
 from finlab.research.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.research.executor import map_parts
 from finlab.swim.control.contract import LEVER_M
@@ -55,7 +55,8 @@ FIGURES = (
     "turn",
 )
 """All figures of a swim."""
-LARGEST = ("turn", "peak_w")  # those of which a row has the largest of its swims, not the mean
+LARGEST = ("turn", "peak_w")
+"""Those of which a row has the largest of its swims, not the mean."""
 
 
 def run(
@@ -104,7 +105,9 @@ def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
     return rows
 
 
-def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case, int]) -> Row:
+def _swim(
+    day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, HardDaySwim, int]
+) -> Row:
     name, case, seed = part
     loop = day.swim(case, methods[name], seed)
     start = time.process_time()

@@ -15,7 +15,8 @@ from finlab.research.evaluation.scoring import mean_interval, paper_sigma
 from finlab.research.evaluation.splits import make_split
 from finlab.research.paper.pipeline import PaperSettings
 
-PAPER_TEMPERATURE = 0.02  # the paper's choice
+PAPER_TEMPERATURE = 0.02
+"""The paper's choice."""
 TEMPERATURES = (0.001, 0.01, PAPER_TEMPERATURE, 0.05, 0.1, 0.5, 1.0, 10.0)
 
 

@@ -34,12 +34,18 @@ ROBOTS = ("bluerov2_heavy", "even", "surveyed", "random")
 """BlueROV2 Heavy, whose rear thrusters sit 1 cm further out than those in front; the same without;
 BlueROV2 with thrusters a little out of place, so that the axis that nothing drives is driven badly;
 random ones."""
-FRONT = 0.14  # how far the front thrusters are ahead [m]
-SURVEYED = 0.005  # by how much places differ from the drawing [m]
-FAR = 1e3  # times a target, surely out of reach
-DELIVERED = 1e-3  # missing wrench over the wrench scale up to which a target counts as delivered
-ALIKE = 1e-5  # missing wrench over the wrench scale up to which two are alike
-DOMAIN = 0x7A05  # leads the seed of the draws
+FRONT = 0.14
+"""How far the front thrusters are ahead [m]."""
+SURVEYED = 0.005
+"""By how much places differ from the drawing [m]."""
+FAR = 1e3
+"""Times a target, surely out of reach."""
+DELIVERED = 1e-3
+"""Missing wrench over the wrench scale up to which a target counts as delivered."""
+ALIKE = 1e-5
+"""Missing wrench over the wrench scale up to which two are alike."""
+DOMAIN = 0x7A05
+"""Leads the seed of the draws."""
 
 
 def run(

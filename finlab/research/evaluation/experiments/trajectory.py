@@ -15,17 +15,17 @@ from finlab.research.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
     POWER,
-    Case,
-    Swim,
+    SwimCase,
+    SwimKey,
     follow_row,
     mean_rows,
     repeated,
     with_losses,
 )
 from finlab.research.evaluation.method_specs import load_method_specs
-from finlab.research.evaluation.plots import paths_picture
 from finlab.swim.control import CONTROLLERS
 from finlab.swim.simulation import RunLog, make_trajectory
+from finlab.swim.simulation.swim_pictures import paths_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,13 +66,13 @@ def run(
     specs = load_method_specs(methods, checkpoint)
     able, needed = with_losses(layouts, lost)
     cases = [
-        ((robot.name, count, law, name), Swim(robot, path, name, law, fins))
+        ((robot.name, count, law, name), SwimCase(robot, path, name, law, fins))
         for (robot, count, fins), law, name in product(able, controllers, specs)
     ]
     row_of = _with_path if paths else follow_row
     done = repeated(specs, cases, range(seed, seed + runs), "trajectory", row_of)
     keys = ("layout", "lost", "controller", "method")
-    every = dict[Case, list[Row]]()
+    every = dict[SwimKey, list[Row]]()
     rows = mean_rows(keys, done)
     for row, (case, errors) in zip(rows, done, strict=True):
         row |= {"path": errors[0]["path"]} if paths else {}

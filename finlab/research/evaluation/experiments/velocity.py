@@ -55,12 +55,12 @@ def run(
     paths = [(speed, straight(duration, speed)) for speed in SPEEDS]
     able, _ = closed_loop.with_losses(layouts, lost)
     cases = [
-        ((robot.name, count, speed, law, name), closed_loop.Swim(robot, path, name, law, fins))
+        ((robot.name, count, speed, law, name), closed_loop.SwimCase(robot, path, name, law, fins))
         for (robot, count, fins), (speed, path), law, name in product(
             able, paths, controllers, specs
         )
     ]
-    done: dict[closed_loop.Case, list[Row]] = {}
+    done: dict[closed_loop.SwimKey, list[Row]] = {}
     for case, errors in closed_loop.repeated(
         specs, cases, range(seed, seed + runs), "velocity", _row
     ):

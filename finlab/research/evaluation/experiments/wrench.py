@@ -26,7 +26,7 @@ from finlab.research.evaluation.scoring import (
     run_method,
     share_interval,
 )
-from finlab.research.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
+from finlab.research.evaluation.splits import SPLITS, SplitCase, make_case, make_split, own_sigma
 from finlab.research.executor import map_parts
 
 SUCCESS_LEVELS = (
@@ -34,7 +34,8 @@ SUCCESS_LEVELS = (
     0.5,
     1.0,
 )  # levels t of `success_t`, the share of targets with `err_norm <= t`
-OWN_DOMAIN = 0x0711  # leads the seed of the draws on a user's own layout
+OWN_DOMAIN = 0x0711
+"""Leads the seed of the draws on a user's own layout."""
 HARD = (
     "id",
     "ood",
@@ -102,7 +103,7 @@ def run(
 
 
 def _scores(
-    methods: Mapping[str, MethodSpec], subsample: int, numbered: tuple[int, Callable[[], Case]]
+    methods: Mapping[str, MethodSpec], subsample: int, numbered: tuple[int, Callable[[], SplitCase]]
 ) -> dict[str, Columns]:
     """Scores of each method on a case; it is made where it is answered, tables of fins included."""
     number = numbered[0]
@@ -143,7 +144,7 @@ def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
 
 def _cases(
     layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
-) -> dict[str, list[Callable[[], Case]]]:
+) -> dict[str, list[Callable[[], SplitCase]]]:
     if layout is None:
         names = list(SPLITS) if split == ("all",) else split
         for name in names:
@@ -161,14 +162,14 @@ def _cases(
     return {f"layout {robot.name}": [partial(own_case, robot, lost, targets, seed)]}
 
 
-def own_case(layout: Layout, lost: tuple[str, ...], n_targets: int, seed: int) -> Case:
+def own_case(layout: Layout, lost: tuple[str, ...], n_targets: int, seed: int) -> SplitCase:
     """A user's own layout as a case: wrenches of uniform commands of the actuators that work, and
     errors over the robot's own wrenches. A smaller number of targets gives the first of a larger
     one."""
     plant = plant_of(layout.without(lost))
     target_seed, sigma_seed = np.random.SeedSequence((OWN_DOMAIN, seed)).spawn(2)
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
-    return Case(layout, targets, lost, own_sigma(plant, np.random.default_rng(sigma_seed)))
+    return SplitCase(layout, targets, lost, own_sigma(plant, np.random.default_rng(sigma_seed)))
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

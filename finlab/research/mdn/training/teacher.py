@@ -1,5 +1,8 @@
-"""The teacher: descents from many random forces, the ways they find to deliver a target, and their
-files."""
+"""The teacher: descents from many random forces, the local minima of the effort that they find for
+each target, and their files.
+
+In files and batches the forces of minima are called `way`.
+"""
 
 import io
 from dataclasses import dataclass
@@ -14,23 +17,23 @@ from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant
-from finlab.research.mdn.answers import LAST, EffortRobot, distinct, effort_robot
+from finlab.research.mdn.answers import DUPLICATE_SCORE, EffortRobot, distinct, effort_robot
 from finlab.research.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.research.mdn.features import VECTORS, features
-from finlab.research.random_layouts import FIN_COUNTS, random_fin_robot, random_kinds
+from finlab.research.random_layouts import FIN_COUNTS, random_fin_kinds, random_fin_robot
 from finlab.whole_file import write_whole
 
 STARTS = 32
 """Random forces from which each target is tried."""
 STEPS = 35
 """Quadratic problems solved from every start."""
-MODES = 8
-"""Most ways that are distinguished."""
-APART = 0.08
-"""Mean difference over the fins, in roots of shares, from which two answers are two ways."""
-DEAREST = 1.2
-"""Cost over the cheapest one's up to which an answer is worth telling."""
-EXACT = 0.01
+MINIMA_MAX = 8
+"""Most local minima that are kept for a target."""
+DISTINCT = 0.08
+"""Mean difference over the fins, in roots of shares, from which two answers are two minima."""
+COST_RATIO_MAX = 1.2
+"""Cost over the cheapest one's up to which a minimum is kept."""
+RESIDUAL_MAX = 0.01
 """Largest residual beside the target or, for small ones, a hundredth of what all fins can give."""
 
 
@@ -51,35 +54,42 @@ class AnswerSettings:
     third."""
 
 
-class Ways(NamedTuple):
-    """Up to L ways to deliver each of N targets with n fins, cheapest first."""
+class Minima(NamedTuple):
+    """Up to L local minima of the effort for each of N targets with n fins, cheapest first."""
 
     force: AnyArray
     """Planar forces (N, L, n) [N], complex."""
     cost: Array
-    """Their costs (N, L); infinite where there are no more ways."""
+    """Their costs (N, L); infinite where there are no more minima."""
 
 
-def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
-    """What descents from `STARTS` random forces find for normalized targets (N, 6): up to `MODES`
-    ways each."""
+def local_minima(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Minima:
+    """Returns what descents from `STARTS` random forces find for each target.
+
+    Args:
+        rng: source of the random forces.
+        problem: the robot.
+        target: normalized targets (N, 6).
+    """
     rows = len(target)
     maximum = problem.fins.maximum
     n = len(maximum)
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
-    each = np.repeat(target, STARTS, axis=0)
-    *_, reached = descend(problem, each, start, STEPS)
-    _, cost = realize(problem, reached)
+    targets = np.repeat(target, STARTS, axis=0)
+    *_, end = descend(problem, targets, start, STEPS)
+    _, cost = realize(problem, end)
     strength = np.linalg.norm(np.repeat(maximum, 2)[:, None] * problem.effectiveness)
-    allowed = EXACT * np.minimum(np.linalg.norm(each, axis=1) + 1e-2 * strength, strength)
-    missed = np.linalg.norm(each - wrench(problem, reached.force), axis=1)
-    cost = np.where(missed <= allowed, cost, np.inf).reshape(rows, STARTS)
-    force = reached.force.reshape(rows, STARTS, n)
-    cost = np.where(cost > DEAREST * cost.min(1, keepdims=True), np.inf, cost)
-    chosen, rank = distinct(cost, root_share(force, maximum), MODES, APART)
-    return Ways(force[np.arange(rows)[:, None], chosen], np.where(rank < LAST, rank, np.inf))
+    allowed = RESIDUAL_MAX * np.minimum(np.linalg.norm(targets, axis=1) + 1e-2 * strength, strength)
+    residual = np.linalg.norm(targets - wrench(problem, end.force), axis=1)
+    cost = np.where(residual <= allowed, cost, np.inf).reshape(rows, STARTS)
+    force = end.force.reshape(rows, STARTS, n)
+    cost = np.where(cost > COST_RATIO_MAX * cost.min(1, keepdims=True), np.inf, cost)
+    chosen, rank = distinct(cost, root_share(force, maximum), MINIMA_MAX, DISTINCT)
+    return Minima(
+        force[np.arange(rows)[:, None], chosen], np.where(rank < DUPLICATE_SCORE, rank, np.inf)
+    )
 
 
 def root_share(force: AnyArray, largest: Array) -> AnyArray:
@@ -89,23 +99,23 @@ def root_share(force: AnyArray, largest: Array) -> AnyArray:
     return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
 
 
-def shares_of_ways(ways: Ways, sharpness: float) -> Array:
-    """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness
+def minimum_weights(minima: Minima, sharpness: float) -> Array:
+    """Weights (N, L) of the minima, zero where there are none: exp(-(cost - best) / (sharpness
     best))."""
-    best = ways.cost[:, :1]
+    best = minima.cost[:, :1]
     with np.errstate(invalid="ignore"):
-        weight = np.exp(-(ways.cost / np.maximum(best, 1e-12) - 1.0) / sharpness)
-    weight = np.where(np.isfinite(ways.cost), weight, 0.0)
+        weight = np.exp(-(minima.cost / np.maximum(best, 1e-12) - 1.0) / sharpness)
+    weight = np.where(np.isfinite(minima.cost), weight, 0.0)
     return np.asarray(weight / np.maximum(weight.sum(1, keepdims=True), 1e-12))
 
 
 DATA_SEED = 130_000
 """Leads the seed of every file; no evaluation's seed begins like this."""
-LEAST_WEIGHT = 1e-3
-"""Weight below which a way is not learned from."""
-IDS = slice(17, 19)
+WEIGHT_MIN = 1e-3
+"""Weight below which a minimum is not learned from."""
+IDENTITY_COLUMNS = slice(17, 19)
 """Where among the static features the numbers are that tell equal fins apart."""
-MIRRORED = [place + 1 for place in VECTORS]
+MIRRORED_COLUMNS = [column + 1 for column in VECTORS]
 """Vertical parts of the vectors among the static features."""
 
 
@@ -115,7 +125,7 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     if path.exists():
         return path
     rng = np.random.default_rng([DATA_SEED, seed, number])
-    kinds = random_kinds(rng, settings.fins)
+    kinds = random_fin_kinds(rng, settings.fins)
     counts = np.array(list(FIN_COUNTS))
     often = np.array(list(FIN_COUNTS.values()), float)
     groups: dict[int, list[dict[str, Array]]] = {}
@@ -138,16 +148,16 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
 def _answers(
     rng: np.random.Generator, robot: EffortRobot, settings: AnswerSettings
 ) -> dict[str, Array]:
-    """One robot, its targets and the ways to deliver them, as the network sees them."""
+    """One robot, its targets and their minima, as features."""
     target = random_targets(rng, robot, settings.targets)
     view = robot.view
-    ways = ways_to_deliver(rng, robot.forces, target)
+    minima = local_minima(rng, robot.forces, target)
     return {
         "static": view.static.astype(np.float32),
         "blocks": view.blocks.astype(np.complex64),
         "asked": (target @ view.solver).astype(np.complex64),
-        "way": root_share(ways.force, view.largest).astype(np.complex64),
-        "weight": shares_of_ways(ways, settings.sharpness).astype(np.float32),
+        "way": root_share(minima.force, view.largest).astype(np.complex64),
+        "weight": minimum_weights(minima, settings.sharpness).astype(np.float32),
     }
 
 
@@ -162,8 +172,8 @@ def read_answers(path: Path) -> dict[int, dict[str, Array]]:
     return groups
 
 
-class Batch(NamedTuple):
-    """B targets, each on a robot of n fins, with up to L ways to deliver it."""
+class TeacherBatch(NamedTuple):
+    """B targets, each on a robot of n fins, with up to L minima of the effort."""
 
     nodes: Tensor
     """(B, n, 26)."""
@@ -172,11 +182,11 @@ class Batch(NamedTuple):
     way: Tensor
     """Forces as roots of shares, in the frames of the features (B, L, n, 2)."""
     weight: Tensor
-    """Of the ways (B, L); they add up to 1."""
+    """Of the minima (B, L); they add up to 1."""
 
 
-class Answers:
-    """All robots, targets and ways of some files, in memory; batches are drawn from them."""
+class TeacherData:
+    """All robots, targets and minima of some files, in memory; batches are drawn from them."""
 
     def __init__(self, paths: list[Path]) -> None:
         parts: dict[int, list[dict[str, AnyArray]]] = {}
@@ -194,7 +204,7 @@ class Answers:
         """Number of targets."""
         return sum(len(group["asked"]) for group in self._groups.values())
 
-    def draw(self, rng: np.random.Generator, size: int) -> Batch:
+    def draw(self, rng: np.random.Generator, size: int) -> TeacherBatch:
         """A random batch; robots are seen as they are or as their mirror image, with fins in any
         order."""
         counts = np.array([len(group["asked"]) for group in self._groups.values()])
@@ -204,18 +214,27 @@ class Answers:
         robot = group["robot"][row]
         static = group["static"][robot]
         a, b = np.moveaxis(group["blocks"][robot], 1, 0)
-        wanted, way, weight = (group[name][row] for name in ("asked", "way", "weight"))
+        p = group["asked"][row]
+        way = group["way"][row]
+        weight = group["weight"][row]
         order = rng.random((size, n)).argsort(axis=1)
-        static[..., IDS] = np.take_along_axis(static[..., IDS], order[..., None], axis=1)
+        identity = static[..., IDENTITY_COLUMNS]
+        static[..., IDENTITY_COLUMNS] = np.take_along_axis(identity, order[..., None], axis=1)
         mirrored = rng.random(size) < 0.5
-        a, b, wanted, way = (_mirrored(values, mirrored) for values in (a, b, wanted, way))
-        static[:, :, MIRRORED] *= np.where(mirrored, -1.0, 1.0)[:, None, None].astype(np.float32)
-        seen = features(wanted, static, a, b)
-        way = way * seen.frame.conj()[:, None]
+        a = _mirrored(a, mirrored)
+        b = _mirrored(b, mirrored)
+        p = _mirrored(p, mirrored)
+        way = _mirrored(way, mirrored)
+        sign = np.where(mirrored, -1.0, 1.0)[:, None, None].astype(np.float32)
+        static[:, :, MIRRORED_COLUMNS] *= sign
+        inputs = features(p, static, a, b)
+        way = way * inputs.frame.conj()[:, None]
         parts = np.stack([way.real, way.imag], axis=-1)
-        weight = np.where(weight < LEAST_WEIGHT, 0.0, weight)
-        arrays = (seen.nodes, seen.pairs, parts, weight / weight.sum(1, keepdims=True))
-        return Batch(*(torch.from_numpy(np.asarray(part, dtype=np.float32)) for part in arrays))
+        weight = np.where(weight < WEIGHT_MIN, 0.0, weight)
+        arrays = (inputs.nodes, inputs.pairs, parts, weight / weight.sum(1, keepdims=True))
+        return TeacherBatch(
+            *(torch.from_numpy(np.asarray(part, dtype=np.float32)) for part in arrays)
+        )
 
 
 def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:

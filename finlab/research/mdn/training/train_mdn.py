@@ -21,7 +21,12 @@ from torch import Tensor
 from finlab.errors import DataError
 from finlab.research.executor import cores, map_parts
 from finlab.research.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.research.mdn.training.teacher import Answers, AnswerSettings, Batch, write_answers
+from finlab.research.mdn.training.teacher import (
+    AnswerSettings,
+    TeacherBatch,
+    TeacherData,
+    write_answers,
+)
 from finlab.research.networks.checkpoint import (
     read_checkpoint,
     read_normalization,
@@ -144,8 +149,8 @@ def make_terms(
     net: Callable[..., ForceMixture], files: list[Path], training: MdnTraining, seed: int
 ) -> Terms:
     """The loss terms of a step, and of the held-out first file: functions of step and seed."""
-    held_out = Answers(files[:1])
-    learned = Answers(files[1:])
+    held_out = TeacherData(files[:1])
+    learned = TeacherData(files[1:])
     rows = [
         held_out.draw(np.random.default_rng([TRAIN_SEED, k]), training.batch_size)
         for k in range(HELD_OUT)
@@ -168,7 +173,7 @@ def make_terms(
 
 
 def losses(
-    net: Callable[..., ForceMixture], batch: Batch, temper: float, spread: float
+    net: Callable[..., ForceMixture], batch: TeacherBatch, temper: float, spread: float
 ) -> dict[str, Tensor]:
     """The loss and its parts, means over a batch; per fin, so that robots of many fins count no
     more.

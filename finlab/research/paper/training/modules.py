@@ -15,7 +15,7 @@ from finlab.research.networks import layers
 from finlab.research.networks.trained import to_command, to_normalized
 from finlab.research.paper.network import Mixture, raw_features
 from finlab.research.paper.surrogate import FORCE_UNIT, SurrogateConfig
-from finlab.research.paper.training.samples import Batch
+from finlab.research.paper.training.samples import SampleBatch
 from finlab.research.training.loop import Weights, first_weights
 
 FIRST_WEIGHT = 2.0
@@ -23,7 +23,7 @@ FIRST_WEIGHT = 2.0
 must be learned, and wide first weights start nearer to that."""
 
 
-def features(batch: Batch) -> Tensor:
+def features(batch: SampleBatch) -> Tensor:
     """Node features x_i (B, n, 10) of a batch's robots, scaled as `raw_features` says."""
     x: Tensor = raw_features(batch.position, batch.mounting_angle, batch.lower, batch.upper)
     return x
@@ -40,10 +40,20 @@ def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) 
     return weights
 
 
-def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch: Batch) -> Tensor:
-    """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots by the physics surrogate
-    (Eq. 4): F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine
-    correction from the pooled descriptor of the layout."""
+def surrogate_wrench(
+    config: SurrogateConfig, w: Weights, command: Tensor, batch: SampleBatch
+) -> Tensor:
+    """Returns wrenches (B, 6) by the physics surrogate [N, N m] (Eq. 4).
+
+    F_i = f([x_i, u_i]), tau_i = r_i x F_i, w = sum [F_i; tau_i], then the affine correction from
+    the pooled descriptor of the layout.
+
+    Args:
+        config: sizes of the surrogate.
+        w: its weights.
+        command: (B, n, 3) [rad, Hz, rad].
+        batch: the robots.
+    """
     x = features(batch)
     mask = batch.mask
     inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
@@ -51,27 +61,27 @@ def surrogate_wrench(config: SurrogateConfig, w: Weights, command: Tensor, batch
     hidden = layers.linear(w, first, inputs[mask])
     for name in others:
         hidden = layers.linear(w, name, functional.silu(hidden))
-    own = hidden.to(command.dtype) * FORCE_UNIT
-    force = own.new_zeros(command.shape).masked_scatter(mask[..., None], own)
+    of_fins = hidden.to(command.dtype) * FORCE_UNIT  # of all fins that are no padding
+    force = of_fins.new_zeros(command.shape).masked_scatter(mask[..., None], of_fins)
     torque = torch.linalg.cross(batch.position, force)
     wrench = torch.cat([force, torque], -1).sum(1)
-    seen = torch.tanh(layers.linear(w, "descriptor.0", x))
-    described = (seen * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
-    scale, bias = layers.linear(w, "affine", described).to(command.dtype).chunk(2, -1)
-    answer: Tensor = wrench * (1.0 + scale) + bias
-    return answer
+    described = torch.tanh(layers.linear(w, "descriptor.0", x))
+    descriptor = (described * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
+    scale, bias = layers.linear(w, "affine", descriptor).to(command.dtype).chunk(2, -1)
+    corrected: Tensor = wrench * (1.0 + scale) + bias
+    return corrected
 
 
-WrenchOf = Callable[[Tensor, Batch], Tensor]
+WrenchOf = Callable[[Tensor, SampleBatch], Tensor]
 """Wrenches (B, 6) of commands (B, n, 3) of a batch's robots."""
 
 
-def physics(surrogate: WrenchOf, batch: Batch, std: Tensor) -> Tensor:
+def physics(surrogate: WrenchOf, batch: SampleBatch, std: Tensor) -> Tensor:
     """L_phys (Eq. 5): squared error of the normalized wrench of the recorded commands."""
     return ((surrogate(batch.command, batch) - batch.wrench) / std).square().sum(-1)
 
 
-def imitation(mixture: Mixture, batch: Batch) -> Tensor:
+def imitation(mixture: Mixture, batch: SampleBatch) -> Tensor:
     """L_imit = -log p(u* | G) (B,) of the recorded commands (Eq. 7), the sum over fins."""
     recorded = to_normalized(batch.command, batch.lower, batch.upper)
     likelihood: Tensor = mixture.log_prob(recorded[:, None])[:, 0]
@@ -79,7 +89,11 @@ def imitation(mixture: Mixture, batch: Batch) -> Tensor:
 
 
 def guidance(
-    mixture: Mixture, surrogate: WrenchOf, batch: Batch, std: Tensor, noise: tuple[Tensor, Tensor]
+    mixture: Mixture,
+    surrogate: WrenchOf,
+    batch: SampleBatch,
+    std: Tensor,
+    noise: tuple[Tensor, Tensor],
 ) -> Tensor:
     """L_guide (Eq. 6): squared normalized error of one sample of the mixture, by the surrogate.
 

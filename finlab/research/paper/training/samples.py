@@ -25,7 +25,7 @@ from finlab.files.guarded import decoded, read_file
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import Plant
 from finlab.research.executor import cores, map_parts
-from finlab.research.networks.trained import Normalization
+from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import TRAINING_FINS, random_layout
 from finlab.research.training.loop import seeded_generator
 from finlab.whole_file import make_folder, sweep_parts, write_whole
@@ -44,7 +44,7 @@ VERSION = 1
 ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
 """Arrays of a part that each layout has once."""
 FIELDS = (*ROBOT, "command", "wrench")
-"""All arrays of a part, layouts first; see `Batch`."""
+"""All arrays of a part, layouts first; see `SampleBatch`."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def generate(folder: Path, settings: DataSettings) -> None:
     sums = [(wrench.sum(0), (wrench**2).sum(0)) for wrench in rows]
     total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
     deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
-    _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
+    _write_about(folder, settings, WrenchNormalization(total[0], np.maximum(deviation, LEAST_STD)))
 
 
 def drawn_part(settings: DataSettings, number: int) -> bytes:
@@ -170,7 +170,9 @@ def about(folder: Path) -> dict[str, Any]:
     return about
 
 
-def _write_about(folder: Path, settings: DataSettings, normalization: Normalization | None) -> None:
+def _write_about(
+    folder: Path, settings: DataSettings, normalization: WrenchNormalization | None
+) -> None:
     values = normalization and {
         name: part.tolist() for name, part in normalization._asdict().items()
     }
@@ -183,7 +185,7 @@ def _write_about(folder: Path, settings: DataSettings, normalization: Normalizat
     write_whole(folder / DATA_FILE, json.dumps(about, indent=2) + "\n", DataError)
 
 
-class Batch(NamedTuple):
+class SampleBatch(NamedTuple):
     """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all
     zeros."""
 
@@ -203,7 +205,7 @@ class Batch(NamedTuple):
     """(B, 6) that the command causes [N, N m]."""
 
 
-class DataSet:
+class SampleSet:
     """A data set in the memory of a device, and its batches."""
 
     def __init__(self, folder: Path, device: torch.device) -> None:
@@ -215,7 +217,7 @@ class DataSet:
             self.layouts, self.commands = (
                 int(self.settings[name]) for name in ("layouts", "commands")
             )
-            self.normalization = Normalization.parse(said["normalization"])
+            self.normalization = WrenchNormalization.parse(said["normalization"])
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
                 f"{folder}: an unfinished data set; run `finlab data generate` again"
@@ -230,7 +232,7 @@ class DataSet:
         self._epoch = -1
         self._order = torch.empty(0)
 
-    def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
+    def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> SampleBatch:
         """Some rows of batch number `step` of `size` samples, a function of step and seed: random
         commands of one layout (paper, surrogate pretraining), a new one in each step, or of all,
         reordered in each epoch. Raises DataError: there are fewer samples than a batch has."""
@@ -258,15 +260,15 @@ class DataSet:
             command = chosen % self.commands
         *robots, commands, wrench = self._parts
         mixed = commands[layout, command], wrench[layout, command]
-        return Batch._make([*(part[layout] for part in robots), *mixed])
+        return SampleBatch._make([*(part[layout] for part in robots), *mixed])
 
 
 @lru_cache(maxsize=1)
-def fresh_batch(settings: DataSettings) -> Batch:
+def fresh_batch(settings: DataSettings) -> SampleBatch:
     """All samples of a data set, in memory alone."""
     robots = [samples_of(settings, k) for k in range(settings.layouts)]
     times = [len(robot["wrench"]) for robot in robots]
     joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
     once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
     flat = {name: np.concatenate(joined[name]) for name in FIELDS[5:]}
-    return Batch(*(torch.from_numpy(part) for part in (once | flat).values()))
+    return SampleBatch(*(torch.from_numpy(part) for part in (once | flat).values()))

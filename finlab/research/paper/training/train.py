@@ -23,9 +23,9 @@ from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
 from finlab.research.paper.training.samples import (
     N_FINS,
-    Batch,
-    DataSet,
     DataSettings,
+    SampleBatch,
+    SampleSet,
     fresh_batch,
     generate,
 )
@@ -34,12 +34,12 @@ from finlab.research.training.loop import Terms, Training, Weights, first_weight
 
 NOISE_SEED = 1_000_000
 """Added to the seed of the noise, so that it is unrelated to the order of the data."""
-JUDGES = DataSettings(layouts=500, commands=20, seed=7_000)
+HELD_OUT = DataSettings(layouts=500, commands=20, seed=7_000)
 """Samples that no training sees, from which the error of a surrogate is measured."""
 
 
 @dataclass(frozen=True)
-class Options:
+class TrainingOptions:
     """What both trainings have to know, beside the recipe."""
 
     preset: str
@@ -55,19 +55,30 @@ class Options:
     resume: bool = False
     """Whether to go on from the state in `output`."""
     device: str | None = None
+    """cpu, cuda, or None for the best there is."""
 
 
-class Bench:
+class BatchSource:
     """A data set in the memory of this process's device, and its share of every batch."""
 
-    def __init__(self, place: Workplace, samples: DataSet, settings: PaperLoop, seed: int) -> None:
+    def __init__(
+        self, place: Workplace, samples: SampleSet, settings: PaperLoop, seed: int
+    ) -> None:
+        """Takes a data set.
+
+        Args:
+            place: this process among those that train.
+            samples: the data set.
+            settings: of the loop.
+            seed: of the order of the data and of the noise.
+        """
         self.place = place
         self.samples = samples
         self.settings = settings
         self.seed = seed
         self.rows = place.share(settings.batch_size)
 
-    def batch(self, step: int) -> Batch:
+    def batch(self, step: int) -> SampleBatch:
         """The share of batch number `step`."""
         settings = self.settings
         return self.samples.batch(
@@ -81,9 +92,8 @@ class Bench:
         shape = (self.settings.batch_size, N_FINS, 1)
         generator = seeded_generator(NOISE_SEED + self.seed, step, device)
         uniform = torch.rand(shape, generator=generator, device=device)
-        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[
-            self.rows
-        ]
+        normal = torch.randn((*shape, 3), generator=generator, device=device)
+        return uniform[self.rows], normal[self.rows]
 
     def tensors(self, *values: Any) -> list[Tensor]:
         """Arrays on the device."""
@@ -92,24 +102,24 @@ class Bench:
         ]
 
 
-def train_surrogate(options: Options) -> TrainedWeights:
+def train_surrogate(options: TrainingOptions) -> TrainedWeights:
     """Train a preset's surrogate and write a checkpoint folder without an allocator network. Raises
     DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written;
     CommandError: there is no such device."""
     made = recipe(options.preset)
 
-    def terms_of(weights: Weights, bench: Bench) -> Terms:
-        (std,) = bench.tensors(bench.samples.normalization.std)
+    def terms_of(weights: Weights, source: BatchSource) -> Terms:
+        (std,) = source.tensors(source.samples.normalization.std)
         wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
 
         def terms(step: int) -> dict[str, Tensor]:
-            batch = bench.batch(step)
-            with bench.place.autocast():
+            batch = source.batch(step)
+            with source.place.autocast():
                 return {"loss": modules.physics(wrench, batch, std).mean()}
 
         return terms
 
-    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
         trained = TrainedWeights(
             name="",
             normalization=samples.normalization,
@@ -117,7 +127,9 @@ def train_surrogate(options: Options) -> TrainedWeights:
             surrogate=state,
             fin_model=samples.settings["fin_model"],
         )
-        batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(trained.fin_model)))
+        batch = fresh_batch(
+            replace(HELD_OUT, fin_model=FinModelSpec.from_values(trained.fin_model))
+        )
         std = torch.tensor(trained.normalization.std, dtype=torch.float32)
         error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
         return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
@@ -126,7 +138,7 @@ def train_surrogate(options: Options) -> TrainedWeights:
     return _train("surrogate", options, made.surrogate_training, begin, terms_of, checkpoint)
 
 
-def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
+def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights:
     """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole
     checkpoint folder.
 
@@ -141,23 +153,23 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
     if options.data is None and (surrogate / "data").is_dir():
         options = replace(options, data=surrogate / "data")
 
-    def terms_of(weights: Weights, bench: Bench) -> Terms:
-        if bench.samples.settings["fin_model"] != base.fin_model:
+    def terms_of(weights: Weights, source: BatchSource) -> Terms:
+        if source.samples.settings["fin_model"] != base.fin_model:
             raise DataError(
                 f"{options.data}: its wrenches are of another fin model than the surrogate's"
             )
-        mean, std = bench.tensors(*base.normalization)
-        frozen = surrogate_of(base, device=bench.place.device)
-        ramp = replace(settings, steps=bench.settings.steps)
+        mean, std = source.tensors(*base.normalization)
+        frozen = surrogate_of(base, device=source.place.device)
+        ramp = replace(settings, steps=source.settings.steps)
 
         def terms(step: int) -> dict[str, Tensor]:
-            batch = bench.batch(step)
-            with bench.place.autocast():
-                wanted = (batch.wrench - mean) / std
-                hidden = network.encoded(weights, modules.features(batch), wanted, batch.mask)
+            batch = source.batch(step)
+            with source.place.autocast():
+                target = (batch.wrench - mean) / std
+                hidden = network.encoded(weights, modules.features(batch), target, batch.mask)
             mixture = network.mixture(weights, hidden.float())
-            with bench.place.autocast():
-                guide = modules.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
+            with source.place.autocast():
+                guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
             imitate = modules.imitation(mixture, batch).mean()
             entropy = modules.negative_entropy(mixture, batch.mask).mean()
             loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
@@ -165,7 +177,7 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
         return terms
 
-    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
         return replace(base, network_sizes=sizes_for_file(network), network=state)
 
     begin = partial(first_weights, network.shapes())
@@ -174,11 +186,11 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
 
 def _train(
     verb: str,
-    options: Options,
+    options: TrainingOptions,
     settings: PaperLoop,
     begin: Callable[[int, torch.device], Weights],
-    terms_of: Callable[[Weights, Bench], Terms],
-    checkpoint: Callable[[DataSet, State], TrainedWeights],
+    terms_of: Callable[[Weights, BatchSource], Terms],
+    checkpoint: Callable[[SampleSet, State], TrainedWeights],
     surrogate: str = "",
 ) -> TrainedWeights:
     """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
@@ -188,7 +200,7 @@ def _train(
         if options.data is None and place.rank == 0:
             generate(output / "data", recipe(options.preset).data)
         place.wait()
-        samples = DataSet(options.data or output / "data", place.device)
+        samples = SampleSet(options.data or output / "data", place.device)
         weights = begin(options.seed, place.device)
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
@@ -202,8 +214,8 @@ def _train(
         training = Training(weights, settings, output, identity, place)
         if options.resume:
             training.resume()
-        bench = Bench(place, samples, settings, options.seed)
-        training.run(terms_of(weights, bench), save)
+        source = BatchSource(place, samples, settings, options.seed)
+        training.run(terms_of(weights, source), save)
         return read_checkpoint(output)
 
 

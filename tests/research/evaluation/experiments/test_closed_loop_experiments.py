@@ -20,7 +20,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     depth_error,
     relative_error,
 )
-from finlab.research.evaluation.experiments.faults import all_faults
+from finlab.research.evaluation.experiments.faults import loss_cases
 from tests.terminal import refused
 
 
@@ -56,7 +56,7 @@ def test_trajectory(line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_faults(layout_a: Layout, line: str) -> None:
-    faults = all_faults(layout_a, 4.0)
+    faults = loss_cases(layout_a, 4.0)
     assert len(faults) == 1 + 4 + 6 + 4
     hopeless = [fault.label for fault in faults if not fault.controllable]
     assert len(hopeless) == 2

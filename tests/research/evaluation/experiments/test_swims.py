@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from finlab.research.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
+from finlab.research.evaluation.experiments.hard_days import HARD_DAYS, HardDay, HardDaySwim
 from finlab.research.evaluation.experiments.swims import DAYS, day_rows, swim_figures
 from finlab.swim.simulation import RunLog
 from finlab.swim.vehicle.fossen import complete_body
@@ -27,19 +27,19 @@ def test_every_day_can_be_swum(day: HardDay, analytic: AnyRobot) -> None:
 
 
 def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
-    damped = DAYS["damping-double"].swim(Case("A", ()), analytic, 0)
-    plain = DAYS["nominal"].swim(Case("A", ()), analytic, 0)
+    damped = DAYS["damping-double"].swim(HardDaySwim("A", ()), analytic, 0)
+    plain = DAYS["nominal"].swim(HardDaySwim("A", ()), analytic, 0)
     assert damped.layout == plain.layout
     motion = np.zeros(13)
     motion[[3, 7]] = 1.0, 0.2
     braking = [loop.vehicle.derivative(motion, [0.0] * 6)[7] for loop in (damped, plain)]
     assert braking[0] == pytest.approx(2.0 * braking[1], rel=0.05) and braking[1] < 0.0
-    torn = DAYS["weak"].swim(Case("A", ("front_left",)), analytic, 0)
+    torn = DAYS["weak"].swim(HardDaySwim("A", ("front_left",)), analytic, 0)
     assert torn.broken["front_left"].share == 0.7 and not torn.told and not torn.damage.partly
 
 
 def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
-    high = DAYS["parameters-high"].swim(Case("B", ()), analytic, 0)
+    high = DAYS["parameters-high"].swim(HardDaySwim("B", ()), analytic, 0)
     drawn = high.layout
     true = high.vehicle
     assert drawn == DAYS["nominal"].robot("B", 0)

@@ -10,26 +10,26 @@ from finlab.physics.objective import yardstick
 from finlab.research.mdn.answers import EffortRobot, effort_robot
 from finlab.research.mdn.descent import realize, wrench
 from finlab.research.mdn.training import teacher
-from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_robot, random_kinds
+from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_kinds, random_fin_robot
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
-def told() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
+def told() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
     rng = np.random.default_rng(6)
-    layout = random_fin_robot(rng, random_kinds(rng, 2), 6)
+    layout = random_fin_robot(rng, random_fin_kinds(rng, 2), 6)
     robot = effort_robot(Plant(layout), STD)
     target = teacher.random_targets(rng, robot, 12)
-    return robot, target, teacher.ways_to_deliver(rng, robot.forces, target)
+    return robot, target, teacher.local_minima(rng, robot.forces, target)
 
 
 @pytest.fixture(scope="module")
-def effort() -> tuple[EffortRobot, np.ndarray, teacher.Ways]:
+def effort() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
     return told()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
-    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
+    effort: tuple[EffortRobot, np.ndarray, teacher.Minima],
 ) -> None:
     robot, target, ways = effort
     known = np.isfinite(ways.cost)
@@ -42,7 +42,7 @@ def test_ways_deliver_the_target_at_the_cost_that_is_told(
 
 
 def test_ways_differ_and_the_cheapest_comes_first(
-    effort: tuple[EffortRobot, np.ndarray, teacher.Ways],
+    effort: tuple[EffortRobot, np.ndarray, teacher.Minima],
 ) -> None:
     robot, _, ways = effort
     root = teacher.root_share(ways.force, robot.forces.fins.maximum)
@@ -51,14 +51,16 @@ def test_ways_differ_and_the_cheapest_comes_first(
         found = np.flatnonzero(np.isfinite(cost))
         if not len(found):
             continue
-        assert (np.diff(cost[found]) >= 0).all() and cost[found[-1]] <= teacher.DEAREST * cost[0]
+        assert (np.diff(cost[found]) >= 0).all() and cost[
+            found[-1]
+        ] <= teacher.COST_RATIO_MAX * cost[0]
         for k in found[1:]:
-            assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= teacher.APART
+            assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= teacher.DISTINCT
 
 
 def test_weights_fall_with_the_cost() -> None:
     cost = np.array([[1.0, 1.03, 1.06, np.inf], [2.0, np.inf, np.inf, np.inf], [np.inf] * 4])
-    weight = teacher.shares_of_ways(teacher.Ways(np.zeros((3, 4, 1), complex), cost), 0.03)
+    weight = teacher.minimum_weights(teacher.Minima(np.zeros((3, 4, 1), complex), cost), 0.03)
     np.testing.assert_allclose(weight[0, 1] / weight[0, 0], np.exp(-1.0))
     np.testing.assert_allclose(weight[0, 2] / weight[0, 0], np.exp(-2.0))
     np.testing.assert_allclose(weight.sum(1), [1.0, 1.0, 0.0])
@@ -72,7 +74,7 @@ def test_roots_of_shares_keep_the_direction() -> None:
 @pytest.fixture(scope="module")
 def robots() -> list[Layout]:
     rng = np.random.default_rng(1)
-    kinds = random_kinds(rng, 3)
+    kinds = random_fin_kinds(rng, 3)
     return [random_fin_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]
 
 
@@ -101,5 +103,5 @@ def test_targets_are_within_reach_of_fins_that_turn_fully(robots: list[Layout]) 
         assert target.shape == (24, 6) and np.isfinite(target).all()
         if not robot.forces.fins.turns_fully:
             continue
-        ways = teacher.ways_to_deliver(rng, robot.forces, target[:18])  # the last quarter are axes
+        ways = teacher.local_minima(rng, robot.forces, target[:18])  # the last quarter are axes
         assert np.isfinite(ways.cost[:, 0]).mean() > 0.8

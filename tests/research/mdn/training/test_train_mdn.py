@@ -13,7 +13,7 @@ import torch
 
 from finlab.research.mdn.network import ForceNetworkConfig
 from finlab.research.mdn.training import train_mdn as mdn_training
-from finlab.research.mdn.training.teacher import Answers, read_answers, write_answers
+from finlab.research.mdn.training.teacher import TeacherData, read_answers, write_answers
 from finlab.research.mdn.training.train_mdn import RECIPES, losses, train_mdn
 from finlab.research.networks.checkpoint import read_checkpoint, write_checkpoint
 from finlab.research.networks.trained import TrainedWeights
@@ -40,7 +40,7 @@ def test_a_file_of_answers_depends_on_its_seed_and_number(shard: Path, tmp_path:
 
 
 def test_batches_say_what_a_robot_and_its_mirror_image_are_asked_for(shard: Path) -> None:
-    answers = Answers([shard])
+    answers = TeacherData([shard])
     known = sum(
         int((group["weight"].sum(-1) > 0.5).sum()) for group in read_answers(shard).values()
     )
@@ -58,7 +58,7 @@ def test_batches_say_what_a_robot_and_its_mirror_image_are_asked_for(shard: Path
 
 
 def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -> None:
-    answers = Answers([shard])
+    answers = TeacherData([shard])
     batch = answers.draw(np.random.default_rng(0), 32)
     network = partial(SMOKE.network, first_weights(SMOKE.network.shapes(), 0))
     found = losses(network, batch, 1.0, 0.0)

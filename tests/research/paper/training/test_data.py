@@ -13,8 +13,8 @@ from finlab.layout import Fin, Layout
 from finlab.physics import Plant
 from finlab.research.paper.training import samples as parts_of
 from finlab.research.paper.training.samples import (
-    DataSet,
     DataSettings,
+    SampleSet,
     drawn_part,
     generate,
     part_file,
@@ -73,13 +73,13 @@ def test_samples_are_what_the_paper_draws(folder: Path) -> None:
 def test_normalization_is_that_of_all_samples(folder: Path) -> None:
     (whole,) = (np.load(path) for path in folder.glob("*.npz"))
     wrench = whole["wrench"].reshape(-1, 6).astype(float)
-    found = DataSet(folder, CPU).normalization
+    found = SampleSet(folder, CPU).normalization
     np.testing.assert_allclose(found.mean, wrench.mean(0), atol=1e-9)
     np.testing.assert_allclose(found.std, wrench.std(0), rtol=1e-9)
 
 
 def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> None:
-    samples = DataSet(folder, CPU)
+    samples = SampleSet(folder, CPU)
     size = 100
     epochs = [
         torch.cat([samples.batch(12 * epoch + k, size, 1, False, ALL).wrench for k in range(12)])
@@ -88,14 +88,14 @@ def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> 
     assert not torch.equal(*epochs)
     first, second = (np.unique(epoch.numpy(), axis=0) for epoch in epochs)
     assert len(first) == 1200 and np.array_equal(first, second)
-    again = DataSet(folder, CPU).batch(7, size, 1, False, ALL)  # whatever was asked before
+    again = SampleSet(folder, CPU).batch(7, size, 1, False, ALL)  # whatever was asked before
     assert torch.equal(again.wrench, epochs[0][700:800])
     halves = [samples.batch(7, size, 1, False, slice(k, k + 50)).wrench for k in (0, 50)]
     assert torch.equal(torch.cat(halves), again.wrench)
 
 
 def test_a_step_of_one_layout_has_random_commands_of_it(folder: Path) -> None:
-    samples = DataSet(folder, CPU)
+    samples = SampleSet(folder, CPU)
     seen = []
     for step in range(30):
         batch = samples.batch(step, 16, 1, True, ALL)
@@ -108,12 +108,12 @@ def test_refuses_in_one_sentence_what_does_not_fit(folder: Path, tmp_path: Path)
     with pytest.raises(DataError, match="drawn otherwise"):
         generate(folder, replace(SETTINGS, seed=4))
     with pytest.raises(DataError, match="data.json: "):
-        DataSet(tmp_path, CPU)
+        SampleSet(tmp_path, CPU)
     about = json.loads((folder / "data.json").read_text())
     (tmp_path / "data.json").write_text(json.dumps(about | {"normalization": None}))
     with pytest.raises(DataError, match="unfinished"):
-        DataSet(tmp_path, CPU)
+        SampleSet(tmp_path, CPU)
     (tmp_path / "data.json").write_text(json.dumps(about))
     (tmp_path / "part-00000.npz").write_bytes(b"nothing")
     with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
-        DataSet(tmp_path, CPU)
+        SampleSet(tmp_path, CPU)

@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from finlab.layout import Layout
-from finlab.research.networks.trained import Normalization, TrainedWeights
+from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
 from finlab.research.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.research.paper.surrogate import LayoutSurrogate, SurrogateConfig
 from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import RECIPES
-from finlab.research.paper.training.samples import N_FINS, Batch, DataSettings, fresh_batch
+from finlab.research.paper.training.samples import N_FINS, DataSettings, SampleBatch, fresh_batch
 from finlab.research.random_layouts import random_layout
 from finlab.research.training.loop import first_weights
 from tests.torch_weights import arrays_of
@@ -29,10 +29,10 @@ def robots() -> list[Layout]:
     return [random_layout(rng, n_fins=n, limits="varied") for n in (2, 5, 3, 4, 5, 2, 3, 4)]
 
 
-def padded(robots: list[Layout], fill: float) -> Batch:
+def padded(robots: list[Layout], fill: float) -> SampleBatch:
     """A batch of robots with random commands; `fill` stands where there is no fin."""
     rng = np.random.default_rng(4)
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in Batch._fields}
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in SampleBatch._fields}
     for layout in robots:
         command = rng.uniform(layout.lower, layout.upper)
         own = {name: getattr(layout, name) for name in PLACE} | {"command": command}
@@ -43,7 +43,7 @@ def padded(robots: list[Layout], fill: float) -> Batch:
         parts["mask"].append(np.arange(N_FINS) < layout.n)
         parts["wrench"].append(rng.normal(size=6))
     arrays = [np.stack(part) for part in parts.values()]
-    return Batch(
+    return SampleBatch(
         *(torch.from_numpy(a if a.dtype == bool else a.astype(np.float32)) for a in arrays)
     )
 
@@ -80,7 +80,7 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
     batch = padded(robots, fill)
     weights = TrainedWeights(
         "one",
-        Normalization(np.zeros(6), np.ones(6)),
+        WrenchNormalization(np.zeros(6), np.ones(6)),
         surrogate_sizes={"kind": "mlp", "hidden": list(HIDDEN.hidden)},
         surrogate=arrays_of(tensors),
     )
@@ -109,11 +109,11 @@ M = 3
 
 
 @pytest.fixture(scope="module")
-def batch() -> Batch:
+def batch() -> SampleBatch:
     return fresh_batch(DataSettings(layouts=12, commands=2, seed=5))
 
 
-def mixture_of(batch: Batch, log_std: float) -> Mixture:
+def mixture_of(batch: SampleBatch, log_std: float) -> Mixture:
     """A mixture whose components stand in the middle of the limits."""
     draw = torch.Generator().manual_seed(1)
     shape = (*batch.mask.shape, M)
@@ -121,7 +121,9 @@ def mixture_of(batch: Batch, log_std: float) -> Mixture:
     return Mixture(torch.randn(shape, generator=draw), torch.zeros(*shape, 3), flat)
 
 
-def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(batch: Batch) -> None:
+def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(
+    batch: SampleBatch,
+) -> None:
     mixture = mixture_of(batch, -0.5)
     found = modules.imitation(mixture, batch).numpy()
     for row in range(len(found)):
@@ -137,12 +139,12 @@ def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(batch: 
         assert found[row] == pytest.approx(expected, rel=1e-4)
 
 
-def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batch) -> None:
+def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: SampleBatch) -> None:
     mixture = mixture_of(batch, 1.0)
     mixture.mean.requires_grad_()
     seen: list[torch.Tensor] = []
 
-    def surrogate(command: torch.Tensor, batch: Batch) -> torch.Tensor:
+    def surrogate(command: torch.Tensor, batch: SampleBatch) -> torch.Tensor:
         seen.append(command)
         return (command * batch.mask[..., None]).sum(1).repeat(1, 2)
 
@@ -164,7 +166,7 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Batc
     ).all()  # a sample outside its limits teaches, too
 
 
-def test_entropy_is_that_of_the_weights_over_the_fins_that_exist(batch: Batch) -> None:
+def test_entropy_is_that_of_the_weights_over_the_fins_that_exist(batch: SampleBatch) -> None:
     mixture = mixture_of(batch, 0.0)
     found = modules.negative_entropy(mixture, batch.mask)
     entropy = torch.distributions.Categorical(logits=mixture.logits).entropy()

@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.modes import (
+from finlab.allocation.solution import Candidates
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout
+from finlab.physics import Plant
+from tests.any_robot import AnyRobot, normalized_error
+from webapp.tasks.modes import (
     ModeSignature,
     cluster,
     find_modes,
@@ -14,11 +19,6 @@ from finlab.allocation.modes import (
     same_signature,
     signature_difference,
 )
-from finlab.allocation.solution import Candidates
-from finlab.assets import shipped_layouts
-from finlab.layout import load_layout
-from finlab.physics import Plant
-from tests.any_robot import AnyRobot, normalized_error
 
 LOWER = np.tile([0.05, 0.1, -math.pi], (2, 1))
 UPPER = np.tile([0.6, 2.1, math.pi], (2, 1))
